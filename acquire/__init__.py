@@ -1,0 +1,1 @@
+"""Recorders and emulated instruments that write raw serial logs."""

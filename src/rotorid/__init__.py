@@ -1,0 +1,1 @@
+"""rotorid: from instrument logs to an identified, trustworthy quadrotor model."""
