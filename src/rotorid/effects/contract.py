@@ -1,9 +1,9 @@
 """What every effect of the catalogue states, and the flight data it is evaluated on.
 
-An effect is one physical, sensor or logging cause that the rigid-body baseline leaves out. It may have several
-forms that compete inside its id (drag at the hubs or at the centre of mass). A form is a function from the
-flight (`Motion`), the vehicle and parameter values to what it adds (`Contribution`); the contribution is linear
-in every parameter that is not marked `nonlinear`, which the selection relies on and a test holds.
+An effect is one physical, sensor or logging cause that the rigid-body baseline leaves out. It may have
+several forms that compete inside its id (drag at the hubs or at the centre of mass). A form is a function from
+the flight (`Motion`), the vehicle and parameter values to what it adds (`Contribution`); the contribution is
+linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds.
 
 Frames: world north-east-down, body forward-right-down. All functions take n instants at once.
 """
@@ -36,7 +36,11 @@ class Motion:
     angular_acceleration: np.ndarray | None = None
     """Derivative of the body rates, (n, 3), rad/s2, body axes."""
     specific_force: np.ndarray | None = None
-    """Acceleration without gravity, (n, 3), m/s2, body axes."""
+    """Acceleration without gravity, (n, 3), m/s2, body axes: measured, else derived from velocity or position."""
+    accelerometer: np.ndarray | None = None
+    """The same as an accelerometer read it, None where none is recorded."""
+    gyroscope: np.ndarray | None = None
+    """Body rates as a gyroscope read them beside a recorded attitude, None where there is only one source."""
     rotation: np.ndarray | None = None
     """Rotation of body vectors into the world, (n, 3, 3)."""
     velocity: np.ndarray | None = None
@@ -98,8 +102,8 @@ class Contribution:
 class Parameter:
     """A parameter of a form.
 
-    `low` and `high` are hard physical bounds (in the given unit, or in units of `scale(vehicle)` where that is
-    set). `nonlinear` parameters carry the starting values for their fit in `starts`.
+    `low` and `high` are hard physical bounds in the given unit. `nonlinear` parameters carry the starting
+    values for their fit in `starts`.
     """
 
     symbol: str
@@ -171,7 +175,10 @@ LACK = {
     "angular_velocity": "no body rates or attitude recorded",
     "angular_acceleration": "no body rates or attitude recorded",
     "rotor_acceleration": "no rotor speeds recorded",
-    "specific_force": "no accelerometer recorded",
+    "specific_force": "no acceleration, velocity or position recorded",
+    "accelerometer": "no accelerometer recorded",
+    "gyroscope": "no gyroscope and attitude recorded together",
+    "rotor_speed": "no rotor speeds, commands or throttle recorded",
 }
 
 
@@ -190,6 +197,4 @@ def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | N
 
 def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
     """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
-    return Contribution(
-        force=forces.sum(axis=1), moment=np.cross(positions_m[None, :, :], forces).sum(axis=1)
-    )
+    return Contribution(force=forces.sum(axis=1), moment=np.cross(positions_m[None, :, :], forces).sum(axis=1))

@@ -17,13 +17,11 @@ def scale(motion, vehicle, values):
 
 def misalignment(motion, vehicle, values):
     """Ω_m = Ω + θ × Ω."""
-    return Contribution(
-        angular_velocity=np.cross(np.asarray(values, float)[None, :], motion.angular_velocity)
-    )
+    return Contribution(angular_velocity=np.cross(np.asarray(values, float)[None, :], motion.angular_velocity))
 
 
 def forms(vehicle):
-    needs = ("angular_velocity", "rotation")
+    needs = ("gyroscope", "rotation")
     return (
         Form("bias", "Ω_m = Ω + b", tuple(Parameter(f"b_{a}", "rad/s") for a in "xyz"), bias, needs),
         Form(

@@ -1,0 +1,253 @@
+"""Joint generalised least squares over blocks of time, with intervals that hold for coloured residuals.
+
+Each channel is whitened by an autoregressive filter estimated from the residual of the fullest model; then all
+rows are reduced to Gram matrices of short blocks. Fits, tests, leave-run-out scores and cluster-robust
+covariances of any subset of terms follow from those matrices alone, so the cost of a search over the catalogue
+does not depend on the number of samples.
+
+Noisy regressors: `bias_gram` and `bias_cross` hold what the sensors' own noise adds to XᵀX and Xᵀy (learnt by
+adding the same noise once more); they are subtracted, which removes the attenuation (corrected least squares,
+Fuller, Measurement Error Models, 1987, ch. 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+from scipy.stats import chi2, f
+
+from rotorid.mismatch.rows import Rows, Term
+
+HIGHEST_AR_ORDER = 12
+MOST_ATTENUATION = 0.3
+"""Largest share of a column's energy that may be its own noise before the correction stops trusting it."""
+
+
+def autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
+    """Pooled autocovariance at lags 0 to `order` of stretches that do not touch each other."""
+    total = sum(len(p) for p in parts)
+    return np.array([sum(float(p[k:] @ p[: len(p) - k]) for p in parts if len(p) > k) for k in range(order + 1)]) / max(
+        total, 1
+    )
+
+
+def autoregression(parts: list[np.ndarray]) -> np.ndarray:
+    """Whitening filter (1, -a_1, …, -a_p)/σ of a coloured residual; the order by Akaike's criterion."""
+    total = sum(len(p) for p in parts)
+    highest = int(min(HIGHEST_AR_ORDER, max(1, total // 50)))
+    covariance = autocovariance(parts, highest)
+    if covariance[0] <= 0:
+        return np.array([1.0])
+    covariance[0] *= 1.0 + 1e-9
+    best = (np.inf, np.array([1.0 / np.sqrt(covariance[0])]))
+    for order in range(0, highest + 1):
+        a = solve_toeplitz(covariance[:order], covariance[1 : order + 1]) if order else np.zeros(0)
+        variance = covariance[0] - a @ covariance[1 : order + 1]
+        if variance <= 0:
+            break
+        criterion = total * np.log(variance) + 2 * order
+        if criterion < best[0]:
+            best = (criterion, np.concatenate([[1.0], -a]) / np.sqrt(variance))
+    return best[1]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fit of some terms: coefficients, covariance and what is left."""
+
+    columns: np.ndarray
+    beta: np.ndarray
+    covariance: np.ndarray
+    """Cluster-robust covariance, never below the model's own, shape (k, k)."""
+    residual_square: np.ndarray
+    """Whitened squared residual of every block (training and held out), shape (blocks,)."""
+    gain: float
+    """Whitened squares explained on the training blocks."""
+
+
+@dataclass
+class Regression:
+    """Gram matrices of all terms over blocks of time."""
+
+    terms: list[Term]
+    start: dict[str, int]
+    gram: np.ndarray
+    """(blocks, K, K)."""
+    cross: np.ndarray
+    """(blocks, K)."""
+    square: np.ndarray
+    """(blocks,)."""
+    run: np.ndarray
+    """Run number of each block."""
+    training: np.ndarray
+    """Mask of the blocks to fit."""
+    precision: np.ndarray
+    """Prior precision of every column, (K,)."""
+    bias_gram: np.ndarray
+    bias_cross: np.ndarray
+    bias_runs: int = 1
+
+    def columns(self, keys: Iterable[str]) -> np.ndarray:
+        """Column numbers of terms, in the order given."""
+        sizes = {t.key: t.size for t in self.terms}
+        parts = [np.arange(self.start[k], self.start[k] + sizes[k]) for k in keys]
+        return np.concatenate(parts).astype(int) if parts else np.zeros(0, int)
+
+    def _normal(self, cols: np.ndarray, mask: np.ndarray):
+        share = mask.sum() / len(mask)
+        grid = np.ix_(cols, cols)
+        gram = self.gram[mask].sum(axis=0)[grid]
+        cross = self.cross[mask].sum(axis=0)[cols]
+        bias = limited_bias(gram, self.bias_gram[grid] * share)
+        return gram, cross, bias, self.bias_cross[cols] * share
+
+    def fit(self, keys: Iterable[str], mask: np.ndarray | None = None, jackknife: bool = False) -> Fit:
+        """Fit terms on the masked blocks (training by default)."""
+        mask = self.training if mask is None else mask
+        cols = self.columns(keys)
+        gram, cross, bias, bias_cross = self._normal(cols, mask)
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(gram) + self.precision[cols], 1e-300))
+        left = (gram - bias) * np.outer(scale, scale) + np.diag(self.precision[cols] * scale**2)
+        left += 1e-10 * np.eye(len(cols))
+        inverse = np.linalg.inv(left) * np.outer(scale, scale)
+        beta = inverse @ (cross - bias_cross)
+        count = int(mask.sum())
+        grid = np.ix_(cols, cols)
+        blocks = self.gram[mask][:, grid[0], grid[1]]
+        scores = self.cross[mask][:, cols] - bias_cross / count - (blocks - bias / count) @ beta
+        if jackknife:
+            eye = np.eye(len(cols))
+            scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
+        spread = scores.T @ scores * count / max(count - 1, 1)
+        robust = inverse @ spread @ inverse
+        plain = inverse @ (gram + np.diag(self.precision[cols])) @ inverse
+        covariance = at_least(robust, plain)
+        all_blocks = self.gram[:, grid[0], grid[1]]
+        rss = self.square - 2 * self.cross[:, cols] @ beta + np.einsum("bij,i,j->b", all_blocks, beta, beta)
+        gain = float(self.square[mask].sum() - rss[mask].sum())
+        return Fit(cols, beta, covariance, rss, gain)
+
+    def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
+        """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
+        where = np.searchsorted(np.sort(fit.columns), cols)
+        where = np.argsort(fit.columns)[where]
+        b = fit.beta[where]
+        cov = fit.covariance[np.ix_(where, where)]
+        statistic = float(b @ np.linalg.pinv(cov, hermitian=True) @ b)
+        q = len(b)
+        if count - q < 2:
+            return 1.0
+        return float(f.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
+
+
+def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """The noise's Gram matrix, scaled down where it would eat more than MOST_ATTENUATION of any direction."""
+    if not len(gram):
+        return bias
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    g = gram * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(g + 1e-9 * np.eye(len(g)))
+    root = vectors / np.sqrt(np.maximum(values, 1e-9))
+    inner = root.T @ (bias * np.outer(scale, scale)) @ root
+    largest = float(np.linalg.eigvalsh((inner + inner.T) / 2)[-1])
+    return bias if largest <= MOST_ATTENUATION else bias * (MOST_ATTENUATION / largest)
+
+
+def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
+    """A covariance that is in no direction smaller than the plain one."""
+    values, vectors = np.linalg.eigh((plain + plain.T) / 2)
+    values = np.maximum(values, values[-1] * 1e-14 if len(values) else 0)
+    root = vectors * np.sqrt(values)
+    back = vectors / np.sqrt(values)
+    inner = back.T @ robust @ back
+    v, u = np.linalg.eigh((inner + inner.T) / 2)
+    return root @ (u * np.maximum(v, 1.0)) @ u.T @ root.T
+
+
+def whiten(rows: Rows, filters: np.ndarray | dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened y (n, 12) and x (n, 12, K), the filters' start-up dropped; absent channels become zero."""
+    longest = max(len(f) for f in filters.values()) - 1
+    y = np.zeros_like(rows.y)
+    x = np.zeros_like(rows.x)
+    for channel, taps in filters.items():
+        y[:, channel] = lfilter(taps, [1.0], rows.y[:, channel])
+        x[:, channel] = lfilter(taps, [1.0], rows.x[:, channel], axis=0)
+    return y[longest:], x[longest:]
+
+
+def full_fit_residuals(rows: list[Rows], precision: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """Residuals (n, 12) of every term fitted at once, channels weighted by their own spread (two rounds)."""
+    channels = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
+    weight = {c: 1.0 / (np.concatenate([r.y[:, c] for r in rows]).std() + 1e-12) for c in channels}
+    size = rows[0].x.shape[2]
+    beta = np.zeros(size)
+    for _ in range(2):
+        gram, cross = np.zeros((size, size)), np.zeros(size)
+        for r in rows:
+            for c in channels:
+                x = r.x[:, c] * weight[c]
+                gram += x.T @ x
+                cross += x.T @ (r.y[:, c] * weight[c])
+        gram += np.diag(precision)
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        beta = scale * np.linalg.solve(gram * np.outer(scale, scale) + 1e-7 * np.eye(size), cross * scale)
+        left = [r.y - r.x @ beta for r in rows]
+        weight = {c: 1.0 / (np.concatenate([r[:, c] for r in left]).std() + 1e-12) for c in channels}
+    return left, beta
+
+
+def build(
+    rows: list[Rows],
+    terms: list[Term],
+    filters: dict[int, np.ndarray],
+    training_runs: set[str],
+    block_s: float,
+    rate_hz: float,
+    noisy: list[Rows] | None = None,
+) -> Regression:
+    """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more."""
+    start, at = {}, 0
+    for term in terms:
+        start[term.key] = at
+        at += term.size
+    per_block = max(2, int(round(block_s * rate_hz)))
+    grams, crosses, squares, runs, training = [], [], [], [], []
+    bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
+    names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
+    for k, r in enumerate(rows):
+        y, x = whiten(r, filters)
+        if noisy is not None:
+            y2, x2 = whiten(noisy[k], filters)
+            flat = (x2 - x).reshape(-1, at)
+            bias_gram += flat.T @ flat
+            bias_cross += flat.T @ (y2 - y).reshape(-1)
+        count = max(1, len(y) // per_block)
+        for part in np.array_split(np.arange(len(y)), count):
+            flat, target = x[part].reshape(-1, at), y[part].reshape(-1)
+            grams.append(flat.T @ flat)
+            crosses.append(flat.T @ target)
+            squares.append(float(target @ target))
+            runs.append(names[r.run])
+            training.append(r.run in training_runs)
+    precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
+    return Regression(
+        terms,
+        start,
+        np.array(grams),
+        np.array(crosses),
+        np.array(squares),
+        np.array(runs),
+        np.array(training),
+        precision,
+        bias_gram,
+        bias_cross,
+    )
+
+
+def chi2_p(statistic: float, degrees: int) -> float:
+    """Upper tail of χ²."""
+    return float(chi2.sf(statistic, degrees))
