@@ -1,7 +1,7 @@
 """The code of the library as part of a rule's identity.
 
-Snakemake watches a script, not what the script imports. `Code.of` hashes the syntax tree of a script and of every
-`rotorid` module that it reaches, so that a changed formula reruns exactly what uses it, while comments,
+Snakemake watches a script, not what the script imports. `code_of` hashes the syntax tree of a script and of
+every `rotorid` module that it reaches, so that a changed formula reruns exactly what uses it, while comments,
 docstrings and layout change nothing.
 
 What a file reaches: every `import` in it, wherever it stands (also inside functions), and each name given to

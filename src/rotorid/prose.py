@@ -1,8 +1,8 @@
 """A chapter's text: Jinja2 over pandoc markdown, with every number read from a result file.
 
-A chapter's files are known in its text by the names that its rule gives them. A `.json` file is the object in it, a
-`.csv` file the list of its rows, a figure is placed with `figure("name", "caption")` and a table with
-`table("name", "caption", columns)`. A name that no file gives is an error, so no number can go missing quietly.
+A chapter's files are known in its text by the names that its rule gives them. A `.json` file is the object in
+it, a `.csv` file the list of its rows, a figure is placed with `figure("name", "caption")` and a table with
+`table("name", "caption", columns)`. A name that no file gives is an error, so no number goes missing quietly.
 """
 
 from __future__ import annotations
@@ -122,7 +122,8 @@ def table_of(
     caption
         Text above the table, markdown.
     columns
-        `(key, heading)` or `(key, heading, form)`; `form` is `text`, `fixN`, `sciN` or `percentN` with N decimals.
+        `(key, heading)` or `(key, heading, form)`; `form` is `text`, or `fixN`, `sciN` or `percentN` with N
+        decimals.
     label
         Identifier for references.
     """

@@ -39,7 +39,7 @@ def gather(raw: Sequence[str | Path], lock: str | Path, config: Mapping[str, Any
 
 
 def commit(folder: str | Path) -> str:
-    """The commit of the working tree, with `-dirty` where files differ from it; says so where there is none."""
+    """The commit of the working tree, with `-dirty` where files differ; says so where there is none."""
     command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from rotorid.errors import InputError
 
-# An underscore or a caret in prose is only markup where pandoc's own rules say so; raw TeX and HTML stay out, since
-# only one of the two outputs would show them.
+# Raw TeX and HTML stay out, since only one of the two outputs would show them.
 MARKDOWN = "markdown-raw_tex-raw_html+table_attributes"
 
 

@@ -1,6 +1,6 @@
 """Run one chapter's notebook by papermill.
 
-- The names of the rule's inputs, outputs and params become the parameters of the notebook, paths made absolute.
+- The names of the rule's inputs, outputs and params become the notebook's parameters, paths made absolute.
 - A name that the notebook's `parameters` cell does not set is an error (papermill itself only warns).
 - The executed notebook is kept as a log, also when it fails; its figures and tables are the outputs.
 """
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import papermill
+from traitlets.config import Config
 
 from rotorid import log
 
@@ -40,6 +41,7 @@ def main(notebook: str, parameters: Mapping[str, Any], outputs: Mapping[str, str
         cwd=Path(notebook).parent,
         progress_bar=False,
         log_output=True,
+        config=Config({"KernelManager": {"transport": "ipc"}}),
     )
     missing = [path for path in outputs.values() if not Path(path).is_file()]
     if missing:

@@ -1,4 +1,4 @@
-"""One look for every figure: sizes, fonts, one colour per quantity, and files that do not differ between runs."""
+"""One look for every figure: sizes, fonts, a colour per quantity, and the same bytes in every run."""
 
 from __future__ import annotations
 
