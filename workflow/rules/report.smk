@@ -39,23 +39,26 @@ def raw_files(wildcards):
 
 
 rule render_chapter:
+    """Numbers, tables and figures put into a chapter's text."""
+    message:
+        "Report: text of chapter {wildcards.chapter}"
     input:
         unpack(chapter_files),
         prose=ROOT / "notebooks" / "{chapter}.md",
     output:
         markdown="results/report/chapters/{chapter}.md",
-    log:
-        "results/logs/render_chapter/{chapter}.log",
     params:
         code=code_of("render_chapter"),
-    """Numbers, tables and figures put into a chapter's text."""
-    message:
-        "Report: text of chapter {wildcards.chapter}"
+    log:
+        "results/logs/render_chapter/{chapter}.log",
     script:
         "../scripts/render_chapter.py"
 
 
 rule typeset_pdf:
+    """The chapters as a book."""
+    message:
+        "Report: typesetting the PDF"
     input:
         chapters=expand(rules.render_chapter.output.markdown, chapter=CONFIG.report.chapters),
         figures=chapter_figures,
@@ -65,20 +68,20 @@ rule typeset_pdf:
     output:
         pdf="results/report/report.pdf",
         source="results/report/report.typ",
-    log:
-        "results/logs/typeset_pdf.log",
     params:
         title=CONFIG.report.title,
         subtitle=CONFIG.report.subtitle,
         code=code_of("typeset_pdf"),
-    """The chapters as a book."""
-    message:
-        "Report: typesetting the PDF"
+    log:
+        "results/logs/typeset_pdf.log",
     script:
         "../scripts/typeset_pdf.py"
 
 
 rule build_html:
+    """The chapters as one page that needs no other file."""
+    message:
+        "Report: building the HTML"
     input:
         chapters=expand(rules.render_chapter.output.markdown, chapter=CONFIG.report.chapters),
         figures=chapter_figures,
@@ -88,34 +91,31 @@ rule build_html:
         references=PARTS / "references.bib",
     output:
         html="results/report/report.html",
-    log:
-        "results/logs/build_html.log",
     params:
         title=CONFIG.report.title,
         subtitle=CONFIG.report.subtitle,
         code=code_of("build_html"),
-    """The chapters as one page that needs no other file."""
-    message:
-        "Report: building the HTML"
+    log:
+        "results/logs/build_html.log",
     script:
         "../scripts/build_html.py"
 
 
 rule record_provenance:
+    """Versions, commit, configuration and hashes of raw: the only output that may differ between two runs."""
+    message:
+        "Report: provenance"
     input:
         raw=raw_files,
         lock=ROOT / "requirements.lock",
         report=[rules.typeset_pdf.output.pdf, rules.build_html.output.html],
     output:
         provenance="results/report/provenance.json",
-    log:
-        "results/logs/record_provenance.log",
     params:
         config=config,
         code=code_of("record_provenance"),
-    """Versions, commit, configuration and hashes of raw: the only output that may differ between two runs."""
-    message:
-        "Report: provenance"
+    log:
+        "results/logs/record_provenance.log",
     script:
         "../scripts/record_provenance.py"
 
