@@ -197,6 +197,18 @@ def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, n
     return total
 
 
+def with_predicted_force(segment: Segment, specific_force: np.ndarray) -> Segment:
+    """The segment with the specific force that the model predicts, (n, 3), m/s2, for use as a regressor.
+
+    The measured one is the response itself: a column s·a beside a response m·a fits anything perfectly.
+    """
+    motion = segment.motion
+    if motion.specific_force is None:
+        return segment
+    accelerometer = None if motion.accelerometer is None else specific_force
+    return replace(segment, motion=replace(motion, specific_force=specific_force, accelerometer=accelerometer))
+
+
 def assemble_rows(
     prepared: Prepared,
     terms: list[Term],
@@ -208,7 +220,10 @@ def assemble_rows(
 
     def source(segment):
         columns = []
-        model = model_wrench(segment, vehicle, effects or []) if segment.motion.rotor_speed is not None else {}
+        model = {}
+        if segment.motion.rotor_speed is not None:
+            model = model_wrench(segment, vehicle, effects or [])
+            segment = with_predicted_force(segment, model["force"] / vehicle.mass_kg)
         for term in terms:
             if term.kind == "effect":
                 columns += form_columns(term.form, term.values, segment, vehicle, groups)

@@ -23,6 +23,11 @@ from scipy.stats import chi2, f
 from rotorid.mismatch.rows import Rows, Term
 
 HIGHEST_AR_ORDER = 12
+WHITE_SHARE = 0.01
+"""White part assumed in every residual, as a share of its variance: recordings smoothed before they were stored
+have almost no energy at high frequency, and whitening must not make that corner decide."""
+AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
+"""Two instruments that agree to within this (m/s2, rad/s; one sigma) are called equal."""
 MOST_ATTENUATION = 0.3
 """Largest share of a column's energy that may be its own noise before the correction stops trusting it."""
 
@@ -35,14 +40,17 @@ def autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
     )
 
 
-def autoregression(parts: list[np.ndarray]) -> np.ndarray:
-    """Whitening filter (1, -a_1, …, -a_p)/σ of a coloured residual; the order by Akaike's criterion."""
+def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
+    """Whitening filter (1, -a_1, …, -a_p)/σ of a coloured residual; the order by Akaike's criterion.
+
+    `floor` is the one-sigma of white noise assumed on top.
+    """
     total = sum(len(p) for p in parts)
     highest = int(min(HIGHEST_AR_ORDER, max(1, total // 50)))
     covariance = autocovariance(parts, highest)
     if covariance[0] <= 0:
         return np.array([1.0])
-    covariance[0] *= 1.0 + 1e-9
+    covariance[0] += WHITE_SHARE * covariance[0] + floor**2
     best = (np.inf, np.array([1.0 / np.sqrt(covariance[0])]))
     for order in range(0, highest + 1):
         a = solve_toeplitz(covariance[:order], covariance[1 : order + 1]) if order else np.zeros(0)
@@ -110,7 +118,7 @@ class Regression:
         mask = self.training if mask is None else mask
         cols = self.columns(keys)
         gram, cross, bias, bias_cross = self._normal(cols, mask)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(gram) + self.precision[cols], 1e-300))
+        scale = inverse_root(np.diag(gram) + self.precision[cols])
         left = (gram - bias) * np.outer(scale, scale) + np.diag(self.precision[cols] * scale**2)
         left += 1e-10 * np.eye(len(cols))
         inverse = np.linalg.inv(left) * np.outer(scale, scale)
@@ -144,11 +152,17 @@ class Regression:
         return float(f.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
 
 
+def inverse_root(diagonal: np.ndarray) -> np.ndarray:
+    """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
+    dead = diagonal <= 1e-24
+    return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+
+
 def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """The noise's Gram matrix, scaled down where it would eat more than MOST_ATTENUATION of any direction."""
     if not len(gram):
         return bias
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    scale = inverse_root(np.diag(gram))
     g = gram * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(g + 1e-9 * np.eye(len(g)))
     root = vectors / np.sqrt(np.maximum(values, 1e-9))
@@ -193,7 +207,7 @@ def full_fit_residuals(rows: list[Rows], precision: np.ndarray) -> tuple[list[np
                 gram += x.T @ x
                 cross += x.T @ (r.y[:, c] * weight[c])
         gram += np.diag(precision)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        scale = inverse_root(np.diag(gram))
         beta = scale * np.linalg.solve(gram * np.outer(scale, scale) + 1e-7 * np.eye(size), cross * scale)
         left = [r.y - r.x @ beta for r in rows]
         weight = {c: 1.0 / (np.concatenate([r[:, c] for r in left]).std() + 1e-12) for c in channels}
