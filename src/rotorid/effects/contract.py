@@ -96,6 +96,8 @@ class Contribution:
     """Error of the accelerometer's reading, m/s2."""
     angular_velocity: np.ndarray | None = None
     """Error of the gyroscope's reading, rad/s."""
+    angular_acceleration: np.ndarray | None = None
+    """Time derivative of that error, rad/s2 (stated apart: differentiating a noisy reading would bias it)."""
 
 
 @dataclass(frozen=True)

@@ -197,16 +197,21 @@ def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, n
     return total
 
 
-def with_predicted_force(segment: Segment, specific_force: np.ndarray) -> Segment:
-    """The segment with the specific force that the model predicts, (n, 3), m/s2, for use as a regressor.
+def with_predictions(segment: Segment, vehicle: Vehicle, model: dict[str, np.ndarray]) -> Segment:
+    """The segment with the accelerations that the model predicts, for use in regressors.
 
-    The measured one is the response itself: a column s·a beside a response m·a fits anything perfectly.
+    The measured ones are the response itself: a column s·a beside a response m·a fits anything perfectly, and
+    the noise of a differentiated body rate would bias every coefficient that multiplies it.
     """
-    motion = segment.motion
-    if motion.specific_force is None:
-        return segment
-    accelerometer = None if motion.accelerometer is None else specific_force
-    return replace(segment, motion=replace(motion, specific_force=specific_force, accelerometer=accelerometer))
+    motion, changed = segment.motion, {}
+    if motion.specific_force is not None:
+        changed["specific_force"] = model["force"] / vehicle.mass_kg
+        if motion.accelerometer is not None:
+            changed["accelerometer"] = changed["specific_force"]
+    if motion.angular_acceleration is not None:
+        inertia, rate = vehicle.inertia_kg_m2.matrix(), motion.angular_velocity
+        changed["angular_acceleration"] = (model["moment"] - np.cross(rate, rate @ inertia)) @ np.linalg.inv(inertia)
+    return replace(segment, motion=replace(motion, **changed))
 
 
 def assemble_rows(
@@ -223,7 +228,7 @@ def assemble_rows(
         model = {}
         if segment.motion.rotor_speed is not None:
             model = model_wrench(segment, vehicle, effects or [])
-            segment = with_predicted_force(segment, model["force"] / vehicle.mass_kg)
+            segment = with_predictions(segment, vehicle, model)
         for term in terms:
             if term.kind == "effect":
                 columns += form_columns(term.form, term.values, segment, vehicle, groups)

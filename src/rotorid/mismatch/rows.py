@@ -108,11 +108,9 @@ def project(
         if turning is not None:
             inertia = vehicle.inertia_kg_m2.matrix()
             rate = segment.motion.angular_velocity
-            parts.append(
-                np.gradient(turning, segment.dt_s, axis=0) @ inertia
-                + np.cross(turning, rate @ inertia)
-                + np.cross(rate, turning @ inertia)
-            )
+            parts.append(np.cross(turning, rate @ inertia) + np.cross(rate, turning @ inertia))
+            if contribution.angular_acceleration is not None:
+                parts.append(contribution.angular_acceleration @ inertia)
         out["moment"] = _sum(parts)
     if "accelerometer" in groups:
         out["accelerometer"] = reading
