@@ -29,7 +29,10 @@ have almost no energy at high frequency, and whitening must not make that corner
 AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
 """Two instruments that agree to within this (m/s2, rad/s; one sigma) are called equal."""
 MOST_ATTENUATION = 0.3
-"""Largest share of a column's energy that may be its own noise before the correction stops trusting it."""
+"""Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
+DOUBT_OF_CORRECTION = 0.5
+NOISE_SAFETY = 2.0
+"""Sensor noise is often more than its white part; energies of it are taken this much larger when they exclude."""
 
 
 def autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
@@ -97,7 +100,6 @@ class Regression:
     """Prior precision of every column, (K,)."""
     bias_gram: np.ndarray
     bias_cross: np.ndarray
-    bias_runs: int = 1
 
     def columns(self, keys: Iterable[str]) -> np.ndarray:
         """Column numbers of terms, in the order given."""
@@ -118,10 +120,8 @@ class Regression:
         mask = self.training if mask is None else mask
         cols = self.columns(keys)
         gram, cross, bias, bias_cross = self._normal(cols, mask)
-        scale = inverse_root(np.diag(gram) + self.precision[cols])
-        left = (gram - bias) * np.outer(scale, scale) + np.diag(self.precision[cols] * scale**2)
-        left += 1e-10 * np.eye(len(cols))
-        inverse = np.linalg.inv(left) * np.outer(scale, scale)
+        prior = np.diag(self.precision[cols])
+        inverse = ridge_inverse(gram - bias + prior)
         beta = inverse @ (cross - bias_cross)
         count = int(mask.sum())
         grid = np.ix_(cols, cols)
@@ -132,12 +132,27 @@ class Regression:
             scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
         spread = scores.T @ scores * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse
-        plain = inverse @ (gram + np.diag(self.precision[cols])) @ inverse
-        covariance = at_least(robust, plain)
+        plain = inverse @ (gram + prior) @ inverse
+        # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
+        shift = DOUBT_OF_CORRECTION * (beta - ridge_inverse(gram + prior) @ cross)
+        covariance = at_least(robust, plain) + np.outer(shift, shift)
         all_blocks = self.gram[:, grid[0], grid[1]]
         rss = self.square - 2 * self.cross[:, cols] @ beta + np.einsum("bij,i,j->b", all_blocks, beta, beta)
         gain = float(self.square[mask].sum() - rss[mask].sum())
         return Fit(cols, beta, covariance, rss, gain)
+
+    def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
+        """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
+        others = self.columns([k for k in keys if k != key])
+        own = self.columns([key])
+        cols = np.concatenate([others, own])
+        gram = self.gram[self.training].sum(axis=0)
+        bias = self.bias_gram * self.training.mean()
+        inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
+        direction = np.concatenate([-inner @ gram[np.ix_(others, own)] @ beta, beta])
+        energy = direction @ gram[np.ix_(cols, cols)] @ direction
+        noise = direction @ bias[np.ix_(cols, cols)] @ direction
+        return float(NOISE_SAFETY * noise / max(energy, 1e-300))
 
     def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
         """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
@@ -158,17 +173,28 @@ def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
 
 
+def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric normal matrix, scaled to unit diagonal, with a trace of ridge."""
+    scale = inverse_root(np.diag(matrix))
+    scaled = matrix * np.outer(scale, scale) + 1e-10 * np.eye(len(matrix))
+    return np.linalg.inv(scaled) * np.outer(scale, scale)
+
+
 def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """The noise's Gram matrix, scaled down where it would eat more than MOST_ATTENUATION of any direction."""
+    """The noise's Gram matrix, held to MOST_ATTENUATION of the energy in every direction."""
     if not len(gram):
         return bias
     scale = inverse_root(np.diag(gram))
-    g = gram * np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(g + 1e-9 * np.eye(len(g)))
-    root = vectors / np.sqrt(np.maximum(values, 1e-9))
-    inner = root.T @ (bias * np.outer(scale, scale)) @ root
-    largest = float(np.linalg.eigvalsh((inner + inner.T) / 2)[-1])
-    return bias if largest <= MOST_ATTENUATION else bias * (MOST_ATTENUATION / largest)
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram)))
+    values = np.maximum(values, 1e-9)
+    back = vectors / np.sqrt(values)
+    inner = back.T @ (bias * np.outer(scale, scale)) @ back
+    share, turn = np.linalg.eigh((inner + inner.T) / 2)
+    if share[-1] <= MOST_ATTENUATION:
+        return bias
+    root = (vectors * np.sqrt(values)) @ turn
+    unscale = np.where(scale > 0, 1.0 / np.where(scale > 0, scale, 1.0), 0.0)
+    return (root * np.minimum(share, MOST_ATTENUATION)) @ root.T * np.outer(unscale, unscale)
 
 
 def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:

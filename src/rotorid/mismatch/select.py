@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rotorid.mismatch.regression import Fit, Regression
+from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import Term
 
 ENTER_P = 1e-4
@@ -30,6 +30,7 @@ class Candidate:
     gain: float
     inflation: float
     physical: bool
+    """Coefficients inside their bounds, and regressors that are more than their own noise."""
 
     @property
     def score(self) -> float:
@@ -80,6 +81,7 @@ class Search:
         statistic = float(beta @ np.linalg.pinv(covariance, hermitian=True) @ beta)
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
+        physical = physical and self.regression.noise_share(keys, key, beta) < MOST_ATTENUATION
         return Candidate(key, beta, p_value, gain, inflation, physical)
 
     def without(self, key: str, active: list[str]) -> Fit:
