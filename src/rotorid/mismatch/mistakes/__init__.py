@@ -1,0 +1,20 @@
+"""Mistakes in the recording set itself, recognised before any physics is asked for, named and corrected."""
+
+from __future__ import annotations
+
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.mistakes import axes, dropout, units
+from rotorid.recordings import RecordingSet
+
+
+def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding, ...], tuple[str, ...]]:
+    """The set as corrected, what was wrong with it, and notes for the reader."""
+    findings: list[Finding] = []
+    if recordings.vehicle.kind == "flight":
+        recordings, lost = dropout.find(recordings)
+        findings += [lost] if lost else []
+    for error in units.by_size(recordings):
+        recordings = units.corrected(recordings, error)
+        findings.append(units.as_finding(error))
+    found = axes.find(recordings)
+    return found.recordings, tuple(findings) + found.findings, found.notes
