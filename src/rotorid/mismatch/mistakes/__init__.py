@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.mistakes import axes, dropout, units
+from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units
 from rotorid.recordings import RecordingSet
 
 
@@ -16,5 +16,9 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding
     for error in units.by_size(recordings):
         recordings = units.corrected(recordings, error)
         findings.append(units.as_finding(error))
-    found = axes.find(recordings)
-    return found.recordings, tuple(findings) + found.findings, found.notes
+    notes: tuple[str, ...] = ()
+    for step in (axes.find, rotor_layout.find, timing.find):
+        found = step(recordings)
+        recordings, notes = found.recordings, notes + found.notes
+        findings += found.findings
+    return recordings, tuple(findings), notes

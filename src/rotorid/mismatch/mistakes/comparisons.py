@@ -148,12 +148,12 @@ def following(all_signals: list[Signals], sensor: str) -> Blocks | None:
     parts = []
     for number, s in enumerate(all_signals):
         if {"rotors", sensor} <= set(s.values):
-            limits = band([s], ("rotors", sensor), (0.5, 15.0))
+            limits = band(all_signals, ("rotors", sensor), (0.5, 15.0))
+            if limits[1] < 2.5 * limits[0]:
+                continue
             for i in range(s.values["rotors"].shape[1]):
                 pick = slice(i, i + 1)
                 y, x = Signal(s.values["rotors"][:, pick]), Signal(s.values[sensor][:, pick])
                 parts.append(lagged.cut(y, x, None, s.rate_hz, limits, number))
     parts = [p for p in parts if p is not None]
-    if not parts or len({len(p.frequency_hz) for p in parts}) > 1:
-        return None
     return lagged.join(parts)
