@@ -164,7 +164,7 @@ class Effect:
     confusers: tuple[str, ...] = ()
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
-    kind: Literal["physics", "sensor"] = "physics"
+    kind: Literal["physics", "sensor", "mistake"] = "physics"
     lacking: dict[str, str] = field(default_factory=dict)
     """Reason shown for a missing field, by field name; a default text otherwise."""
 

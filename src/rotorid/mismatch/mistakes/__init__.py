@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units
+from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units, vibration
 from rotorid.recordings import RecordingSet
 
 
@@ -21,4 +21,6 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding
         found = step(recordings)
         recordings, notes = found.recordings, notes + found.notes
         findings += found.findings
+    shaking = vibration.find(recordings)
+    findings += [shaking] if shaking else []
     return recordings, tuple(findings), notes

@@ -26,10 +26,18 @@ LEAST_EXPLAINED = 0.6
 LEAST_BLURRED = 0.15
 """The same before a drifting clock has been put right, which blurs a comparison."""
 P_LIMIT = 1e-6
-LEAST_LIKELIHOOD = 30.0
-"""Rise of the log-likelihood that a delay must bring."""
+LEAST_LIKELIHOOD = 60.0
+"""Rise of the log-likelihood that a delay, or its growth, must bring."""
+MOTOR_FORM = 0.15
+"""A dead time up to this share of a motor's lag is the lag's form (no motor is exactly first order)."""
 FILTER_SAMPLES, FILTER_S = 2.6, 0.008
-"""A gyroscope or accelerometer alone late by less than both of these is a built-in filter, not a logger's delay."""
+"""One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
+SMALL_LAGS = {
+    "gyroscope": "as its built-in filter makes it; shifted, not counted as a finding",
+    "accelerometer": "as its built-in filter makes it; shifted, not counted as a finding",
+    "commands": "as motor controllers take; left as part of the motors' lag",
+    "throttle": "as motor controllers take; left as part of the motors' lag",
+}
 LARGEST_SKEW = 6e-3
 MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 LAG_STEP_S = 0.001
@@ -51,6 +59,10 @@ class Difference:
     """Rise of the log-likelihood by start and growth over none."""
     blocks: int
     explained: float
+    motor_s: float
+    """Motor lag taken out of the command first."""
+    gained: float
+    """Rise of the log-likelihood by the growth over the best constant."""
 
 
 def find(recordings: RecordingSet) -> Result:
@@ -62,8 +74,8 @@ def find(recordings: RecordingSet) -> Result:
     return Result(found.recordings, result.findings + found.findings, result.notes + found.notes)
 
 
-def comparisons(all_signals: list[Signals], vehicle: Vehicle) -> list[tuple[str, str, Blocks, LaggedFit]]:
-    """Every comparison that explains enough to tell time: later sensor, earlier sensor, spectra, fit."""
+def comparisons(all_signals: list[Signals], vehicle: Vehicle) -> list[tuple[str, str, Blocks, LaggedFit, float]]:
+    """Every comparison that may tell time: later sensor, earlier sensor, spectra, fit, motor lag taken out (s)."""
     have = set().union(*(s.values for s in all_signals))
     speeds = next((n for n in map(compare.speeds_of, all_signals) if n), None)
     force = "accelerometer" if "accelerometer" in have else None
@@ -89,21 +101,22 @@ def comparisons(all_signals: list[Signals], vehicle: Vehicle) -> list[tuple[str,
     for late, over, blocks in pairs:
         if blocks is None:
             continue
+        motor_s = 0.0
         if over in ("commands", "throttle"):
-            blocks = _through_motor(blocks)
+            motor_s, blocks = _through_motor(blocks)
         found = lagged.fit(blocks)
         if found is None or np.min(found.explained) < LEAST_BLURRED:
             continue
-        out.append((late, over, blocks, found))
+        out.append((late, over, blocks, found, motor_s))
     return out
 
 
-def _through_motor(blocks: Blocks) -> Blocks:
+def _through_motor(blocks: Blocks) -> tuple[float, Blocks]:
     """Commands replaced by what a first-order motor makes of them, its time constant fitted beside the delay."""
-    best = (-np.inf, blocks)
+    best = (-np.inf, 0.0, blocks)
     base = lagged.fit(blocks)
     if base is None:
-        return blocks
+        return 0.0, blocks
     for tau in MOTOR_LAGS_S:
         through = 1.0 / (1.0 + 2j * np.pi * blocks.frequency_hz * tau)
         trial = Blocks(
@@ -112,8 +125,8 @@ def _through_motor(blocks: Blocks) -> Blocks:
         found = lagged.fit(trial, np.arange(-0.03, 0.061, 0.005))
         left = np.sum(lagged.loss_by_block(trial, _weighted(found, base), found.gain, found.lag_s))
         if -left > best[0]:
-            best = (-left, trial)
-    return best[1]
+            best = (-left, tau, trial)
+    return best[1:]
 
 
 def _weighted(found: LaggedFit, base: LaggedFit) -> LaggedFit:
@@ -130,7 +143,7 @@ def _weighted(found: LaggedFit, base: LaggedFit) -> LaggedFit:
     )
 
 
-def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, drifting: bool) -> Difference:
+def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: float, drifting: bool) -> Difference:
     """Lateness, and its growth if asked for, at the likelihood's peak.
 
     Gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the first fit.
@@ -160,9 +173,14 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, drifting:
     # The likelihood's own curvature counts as a floor.
     covariance[:size, :size] = robust if np.trace(robust) > np.trace(inverse) else inverse
     covariance[0, 0] += LATE_FLOOR_S**2
+    constant = np.inf
+    for lag in np.arange(start - 0.06, start + 0.0601, 0.001) if drifting else ():
+        constant = min(constant, float(lagged.loss_by_block(blocks, found, found.gain, lag).sum()))
     unmoved = blocks.y - blocks.x @ found.gain.T - blocks.z @ found.nuisance.T
     rise = float(np.sum(weight * (np.abs(unmoved) ** 2 - np.abs(left) ** 2)))
-    return Difference(late, over, start, growth, covariance, rise, blocks.count, float(np.min(found.explained)))
+    gained = constant - float(np.sum(weight * np.abs(left) ** 2)) if drifting else 0.0
+    explained = float(np.min(found.explained))
+    return Difference(late, over, start, growth, covariance, rise, blocks.count, explained, motor_s, gained)
 
 
 def differences(all_signals: list[Signals], vehicle: Vehicle, drifting: bool) -> list[Difference]:
@@ -306,7 +324,7 @@ def _skew(recordings: RecordingSet) -> Result:
         sd = float(np.sqrt(d.covariance[1, 1]))
         p = float(2 * student.sf(abs(d.growth) / max(sd, 1e-12), max(d.blocks - 2, 1)))
         drift = abs(d.growth) * longest
-        if p < P_LIMIT and drift > max(periods[d.late], periods[d.over]) and d.likelihood > LEAST_LIKELIHOOD:
+        if p < P_LIMIT and drift > max(periods[d.late], periods[d.over]) and d.gained > LEAST_LIKELIHOOD:
             telling.append((p, d))
     if not telling:
         return Result(recordings)
@@ -355,11 +373,11 @@ def _delay(recordings: RecordingSet, drifting: bool) -> Result:
     sample = max(1.0 / s.rate_hz for s in signals)
     tolerance = {n: max(periods[n], 2 * sds[n]) for n in names}
     late = relative_to_most(values, groups, tolerance)
-    wrong, notes, filtered = [], [], []
+    wrong, notes = [], []
     for n in names:
-        limit = max(periods[n], sample)
-        p = float(norm.sf((abs(late[n]) - limit) / sds[n]))
         touching = [d for d in found if n in (d.late, d.over)]
+        limit = max(periods[n], sample, *(MOTOR_FORM * d.motor_s for d in touching))
+        p = float(norm.sf((abs(late[n]) - limit) / sds[n]))
         if p > P_LIMIT or max(d.likelihood for d in touching) < LEAST_LIKELIHOOD:
             continue
         if n == "position":
@@ -369,17 +387,19 @@ def _delay(recordings: RecordingSet, drifting: bool) -> Result:
             )
             continue
         wrong.append((n, p))
-    alone = [n for n, _ in wrong]
-    if len(alone) == 1 and alone[0] in ("gyroscope", "accelerometer") and 0 < late[alone[0]]:
-        if late[alone[0]] < min(FILTER_S, FILTER_SAMPLES * sample):
-            filtered, wrong = alone, []
     fixed = recordings
-    for sensor in filtered:
-        fixed = shifted(fixed, sensor, late[sensor], 0.0)
+    if (
+        len(wrong) == 1
+        and wrong[0][0] in SMALL_LAGS
+        and abs(late[wrong[0][0]]) < min(FILTER_S, FILTER_SAMPLES * sample)
+    ):
+        sensor = wrong[0][0]
+        wrong = []
         notes.append(
-            f"{WORDS[sensor].capitalize()} reads {1e3 * late[sensor]:.1f} ms late, as its built-in filter does; "
-            "shifted, not counted as a finding."
+            f"{WORDS[sensor].capitalize()}: {1e3 * late[sensor]:+.1f} ms against the rest, {SMALL_LAGS[sensor]}."
         )
+        if sensor in ("gyroscope", "accelerometer"):
+            fixed = shifted(fixed, sensor, late[sensor], 0.0)
     if not wrong:
         return Result(fixed, (), tuple(notes))
     findings = []
