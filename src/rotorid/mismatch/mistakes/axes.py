@@ -11,7 +11,7 @@ from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.lagged import LaggedFit
-from rotorid.mismatch.mistakes.signals import Signals, read_signals, replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import ReadSet, Signals, read_signals, replace_columns, sensor_columns
 from rotorid.mismatch.mistakes.units import UnitError, as_finding, corrected, nearest
 from rotorid.recordings import RecordingSet, Run
 
@@ -111,6 +111,8 @@ class Result:
 
 def signals_of(recordings: RecordingSet) -> list[Signals]:
     """Signals of every run."""
+    if isinstance(recordings, ReadSet):
+        return recordings.signals
     return [read_signals(run, recordings.vehicle) for run in recordings.runs]
 
 
@@ -197,8 +199,21 @@ def _gravity(recordings: RecordingSet) -> Result:
         sign = [1, 1, 1]
         sign[axis] = int(np.sign(mean[axis]))
         turn = Turn(tuple(source), tuple(sign))
-    finding = axis_finding(recordings, "accelerometer", turn, 0.0)
+    finding = axis_finding(recordings, "accelerometer", turn, _gravity_p(recordings, axis))
     return Result(apply_turn(recordings, "accelerometer", turn), (finding,))
+
+
+def _gravity_p(recordings: RecordingSet, axis: int) -> float:
+    """p-value that the mean of an axis is zero, from means of two seconds."""
+    means = []
+    for s in signals_of(recordings):
+        if "accelerometer" in s.values:
+            values = s.values["accelerometer"][:, axis]
+            count = max(1, int(len(values) / (2.0 * s.rate_hz)))
+            means += [np.nanmean(part) for part in np.array_split(values, count) if np.isfinite(part).any()]
+    if len(means) < 3:
+        return 1.0
+    return float(student.sf(abs(np.mean(means)) / (np.std(means, ddof=1) / np.sqrt(len(means))), len(means) - 1))
 
 
 def _scaled_sensor(recordings: RecordingSet, sensor: str, what: str, unit, expected: str, reading: Reading) -> Result:

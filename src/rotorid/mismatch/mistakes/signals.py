@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -78,6 +79,16 @@ def read_signals(run: Run, vehicle: Vehicle) -> Signals:
             values[key] = on_grid(t, raw, grid)
             own[key] = own_rate_hz(t, raw)
     return Signals(run.name, rate, grid, values, own)
+
+
+@dataclass(frozen=True)
+class ReadSet(RecordingSet):
+    """A recording set that reads its signals once; a changed copy (`replace`) reads its own."""
+
+    @cached_property
+    def signals(self) -> list[Signals]:
+        """Signals of every run."""
+        return [read_signals(run, self.vehicle) for run in self.runs]
 
 
 def replace_columns(recordings: RecordingSet, change) -> RecordingSet:

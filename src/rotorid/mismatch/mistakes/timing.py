@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import norm
 from scipy.stats import t as student
 
 from rotorid.mismatch.findings import Estimate, Finding
@@ -69,8 +68,11 @@ def find(recordings: RecordingSet) -> Result:
     """Clocks that drift first, then constant delays."""
     if recordings.vehicle.kind != "flight":
         return Result(recordings)
-    result = _skew(recordings)
-    found = _delay(result.recordings, drifting=bool(result.findings))
+    known = comparisons(signals_of(recordings), recordings.vehicle)
+    result = _skew(recordings, known)
+    if result.findings:
+        known = comparisons(signals_of(result.recordings), recordings.vehicle)
+    found = _delay(result.recordings, known)
     return Result(found.recordings, result.findings + found.findings, result.notes + found.notes)
 
 
@@ -151,7 +153,7 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: 
     lags = np.arange(-lagged.LONGEST_LAG_S, lagged.LONGEST_LAG_S + 1e-9, LAG_STEP_S)
     start, growth = found.lag_s, 0.0
     for _ in range(3 if drifting else 1):
-        curves = -np.stack([lagged.loss_by_block(blocks, found, found.gain, lag).sum(axis=1) for lag in lags], axis=1)
+        curves = likelihood(blocks, found, lags)
         start, growth = _peak(lags, curves, blocks.time_s, start, drifting)
         phase = lagged.delay(blocks.frequency_hz, start + growth * blocks.time_s)
         found = lagged.fit(replace(blocks, x=blocks.x * phase[:, :, None]), np.zeros(1))
@@ -173,19 +175,28 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: 
     # The likelihood's own curvature counts as a floor.
     covariance[:size, :size] = robust if np.trace(robust) > np.trace(inverse) else inverse
     covariance[0, 0] += LATE_FLOOR_S**2
-    constant = np.inf
-    for lag in np.arange(start - 0.06, start + 0.0601, 0.001) if drifting else ():
-        constant = min(constant, float(lagged.loss_by_block(blocks, found, found.gain, lag).sum()))
     unmoved = blocks.y - blocks.x @ found.gain.T - blocks.z @ found.nuisance.T
     rise = float(np.sum(weight * (np.abs(unmoved) ** 2 - np.abs(left) ** 2)))
-    gained = constant - float(np.sum(weight * np.abs(left) ** 2)) if drifting else 0.0
+    gained = 0.0
+    if drifting:
+        # The aligned fit's likelihood at no further lag is that of the drift itself.
+        drift = likelihood(replace(blocks, x=blocks.x * phase[:, :, None]), found, np.zeros(1)).sum()
+        gained = float(drift - likelihood(blocks, found, lags).sum(axis=0).max())
     explained = float(np.min(found.explained))
     return Difference(late, over, start, growth, covariance, rise, blocks.count, explained, motor_s, gained)
 
 
-def differences(all_signals: list[Signals], vehicle: Vehicle, drifting: bool) -> list[Difference]:
+def likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray:
+    """Log-likelihood of every lag in every block, (b, lags), up to what no lag changes."""
+    model = blocks.x @ found.gain.T
+    rest = blocks.y - blocks.z @ found.nuisance.T
+    cross = np.sum(found.weight.T[None] * rest.conj() * model, axis=2)
+    return 2 * np.real(cross @ np.exp(-2j * np.pi * np.outer(blocks.frequency_hz, lags)))
+
+
+def differences(known: list, drifting: bool) -> list[Difference]:
     """Every difference of lateness that a comparison is good enough to tell."""
-    found = [difference(*c, drifting=drifting) for c in comparisons(all_signals, vehicle)]
+    found = [difference(*c, drifting=drifting) for c in known]
     return [d for d in found if d.explained > LEAST_EXPLAINED]
 
 
@@ -202,33 +213,28 @@ def across(differences: list[Difference], wrong: list[str], key: int) -> tuple[f
 
 def _peak(lags: np.ndarray, curves: np.ndarray, time_s: np.ndarray, guess: float, drifting: bool):
     """Start and growth of lateness at the highest summed likelihood (b, lags), by grids that close in."""
-    rows = np.arange(len(time_s))
+    rows = np.arange(len(time_s))[None, :]
 
-    def total(start, growth):
-        at = (np.clip(start + growth * time_s, lags[0], lags[-1] - LAG_STEP_S) - lags[0]) / LAG_STEP_S
-        low = at.astype(int)
-        share = at - low
-        return float(np.sum(curves[rows, low] * (1 - share) + curves[rows, low + 1] * share))
+    def best(starts, growths):
+        """The pair with the highest sum, linear between the grid's lags."""
+        at = np.clip(starts[:, None] + growths[:, None] * time_s, lags[0], lags[-1] - LAG_STEP_S)
+        low = ((at - lags[0]) / LAG_STEP_S).astype(int)
+        low = np.minimum(low, len(lags) - 2)
+        share = (at - lags[low]) / LAG_STEP_S
+        totals = (curves[rows, low] * (1 - share) + curves[rows, low + 1] * share).sum(axis=1)
+        k = int(np.argmax(totals))
+        return float(starts[k]), float(growths[k])
 
-    start, growth = guess, 0.0
-    wide_start, wide_growth = 0.004, 0.0
+    start, growth, wide_start, wide_growth = guess, 0.0, 0.004, 0.0
     if drifting:
-        middle = float(time_s.mean())
-        trials = [
-            (total(guess + aside - rate * middle, rate), guess + aside - rate * middle, rate)
-            for rate in np.arange(-LARGEST_SKEW, LARGEST_SKEW + 1e-9, 2e-4)
-            for aside in np.arange(-0.06, 0.061, 0.005)
-        ]
-        _, start, growth = max(trials)
+        rates, asides = np.meshgrid(np.arange(-LARGEST_SKEW, LARGEST_SKEW + 1e-9, 2e-4), np.arange(-0.06, 0.061, 0.005))
+        rates, asides = rates.ravel(), asides.ravel()
+        start, growth = best(guess + asides - rates * float(time_s.mean()), rates)
         wide_start, wide_growth = 0.005, 2e-4
-    steps = (-1, -0.5, 0, 0.5, 1)
+    steps = np.array([-1, -0.5, 0, 0.5, 1])
     for _ in range(7):
-        trials = [
-            (total(start + a * wide_start, growth + b * wide_growth), start + a * wide_start, growth + b * wide_growth)
-            for a in steps
-            for b in (steps if drifting else (0,))
-        ]
-        _, start, growth = max(trials)
+        a, b = (g.ravel() for g in np.meshgrid(steps, steps if drifting else np.zeros(1)))
+        start, growth = best(start + a * wide_start, growth + b * wide_growth)
         wide_start, wide_growth = wide_start / 2, wide_growth / 2
     return start, growth
 
@@ -313,10 +319,10 @@ def _listed(sensors: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def _skew(recordings: RecordingSet) -> Result:
+def _skew(recordings: RecordingSet, known: list) -> Result:
     """Sensors whose lateness grows."""
     signals = signals_of(recordings)
-    found = differences(signals, recordings.vehicle, drifting=True)
+    found = differences(known, drifting=True)
     longest = max((s.time_s[-1] - s.time_s[0] for s in signals), default=0.0)
     periods = own_period_s(signals)
     telling = []
@@ -360,11 +366,11 @@ def _skew(recordings: RecordingSet) -> Result:
     return Result(fixed, (finding,))
 
 
-def _delay(recordings: RecordingSet, drifting: bool) -> Result:
+def _delay(recordings: RecordingSet, known: list) -> Result:
     """Sensors that are late by a constant of more than one sample."""
     signals = signals_of(recordings)
     periods = own_period_s(signals)
-    found = differences(signals, recordings.vehicle, drifting=False)
+    found = differences(known, drifting=False)
     if not found:
         return Result(recordings)
     names = sorted({d.late for d in found} | {d.over for d in found})
@@ -377,7 +383,8 @@ def _delay(recordings: RecordingSet, drifting: bool) -> Result:
     for n in names:
         touching = [d for d in found if n in (d.late, d.over)]
         limit = max(periods[n], sample, *(MOTOR_FORM * d.motor_s for d in touching))
-        p = float(norm.sf((abs(late[n]) - limit) / sds[n]))
+        blocks = max(d.blocks for d in touching)
+        p = float(student.sf((abs(late[n]) - limit) / sds[n], max(blocks - 2, 1)))
         if p > P_LIMIT or max(d.likelihood for d in touching) < LEAST_LIKELIHOOD:
             continue
         if n == "position":

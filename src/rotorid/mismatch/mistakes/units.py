@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm
 
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.mistakes.signals import scaled, sensor_columns
@@ -132,7 +133,9 @@ def _stand_force(recordings: RecordingSet, speed_columns: tuple[str, ...]) -> li
 
 
 def _error(columns, what, unit, expected, measured, spread) -> UnitError:
-    return UnitError(tuple(columns), what, unit[0], expected, unit[1], measured, spread)
+    # How sure the recording is that the ratio is nearer to the unit's factor than to one.
+    surely = abs(np.log(measured)) / 2 / max(spread / 1.96, 1e-6)
+    return UnitError(tuple(columns), what, unit[0], expected, unit[1], measured, spread, float(norm.sf(surely)))
 
 
 def corrected(recordings: RecordingSet, error: UnitError) -> RecordingSet:

@@ -86,13 +86,13 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
         length = int(WINDOW_S * s.rate_hz)
         if length < 24:
             continue
-        line, beside = demodulated(s, sensor, axis, order, length)
+        line, beside, crowd = demodulated(s, sensor, axis, order, length)
         good = np.isfinite(line).all(axis=1) & np.isfinite(beside).all(axis=1) & (beside.min(axis=1) > 0)
         if not good.any():
             continue
         # Rotors at nearly one speed see the same line: count each window once, by their mean.
         ratios.append((line[good] / beside[good]).mean(axis=1))
-        powers.append((line[good] - beside[good]).mean(axis=1))
+        powers.append(((line - beside)[good] / crowd[good]).mean(axis=1))
         levels.append(beside[good].mean(axis=1))
         lengths.append(np.full(good.sum(), length))
     if not ratios or sum(map(len, ratios)) < 20:
@@ -109,8 +109,13 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
     return Line(column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p)
 
 
-def demodulated(s: Signals, sensor: str, axis: int, order: int, length: int) -> tuple[np.ndarray, np.ndarray]:
-    """Squared amplitude at the order and beside it, (windows, rotors) each; NaN where it cannot be told."""
+def demodulated(
+    s: Signals, sensor: str, axis: int, order: int, length: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Squared amplitude at the order, beside it, and how many rotors share the line, (windows, rotors) each.
+
+    NaN where it cannot be told.
+    """
     speed = s.values["rotors"]
     reading = s.values[sensor][:, axis]
     count = len(reading) // length
@@ -127,17 +132,20 @@ def demodulated(s: Signals, sensor: str, axis: int, order: int, length: int) -> 
     taper = np.hanning(length + 2)[1:-1]
     taper = taper / taper.mean()
     line = np.full((count, speed.shape[1]), np.nan)
-    beside = np.full_like(line, np.nan)
+    beside, crowd = np.full_like(line, np.nan), np.full_like(line, np.nan)
+    steps = order * middle[: count * length].reshape(count, length, -1)
+    steps[:, 0] = 0.0
+    follow = np.exp(-1j * np.cumsum(steps, axis=1))
     for i in range(speed.shape[1]):
-        step = order * middle[: count * length, i].reshape(shape)
-        step[:, 0] = 0.0
-        phase = np.cumsum(step, axis=1)
-        base = x * taper * np.exp(-1j * phase)
+        base = x * taper * follow[:, :, i]
         spectrum = np.abs(np.fft.fft(base, axis=1) / length) ** 2 * 4
         # Where the alias comes near zero frequency, flight motion would be taken for a line.
         turn = order * speed[: count * length, i].reshape(shape).mean(axis=1) * dt
         turned = np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
         clear = turned / (2 * np.pi * dt) > LOWEST_HZ + 6 / WINDOW_S
         line[clear, i] = spectrum[clear, 0]
+        # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
+        together = np.mean(taper[:, None] * follow[:, :, i, None].conj() * follow, axis=1)
+        crowd[clear, i] = np.sum(np.abs(together[clear]) ** 2, axis=1)
         beside[clear, i] = np.mean(spectrum[clear][:, list(SIDE_BINS)], axis=1)
-    return line, beside
+    return line, beside, crowd
