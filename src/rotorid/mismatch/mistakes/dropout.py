@@ -15,6 +15,7 @@ SHORTEST_GAP_S = 0.3
 SHORTEST_GAP_PERIODS = 12
 """A missing or held stretch counts from this many of the sensor's own periods on."""
 MERGE_S = 0.3
+SHORTEST_STAND_S = 0.15
 STANDING = 0.2
 """A rotor below this share of what the others turn at, relative to its own habit, stands still."""
 IMPLAUSIBLE_THRUST = 0.45
@@ -177,6 +178,9 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
         zero = flying & (speed[:, i] < STANDING * top)
         sudden = np.zeros(len(zero), bool)
         for start, stop in stretches(zero):
+            # A saturated motor may truly stand for a moment.
+            if run.time_s[stop - 1] - run.time_s[start] < SHORTEST_STAND_S:
+                continue
             # A rotor cannot stop and start within a sample or two: look at its readings just outside.
             before = speed[max(start - 2, 0) : start, i]
             after = speed[stop : stop + 2, i]

@@ -51,6 +51,11 @@ class Blocks:
         """The same with some outputs only."""
         return Blocks(self.frequency_hz, self.y[:, :, chosen], self.x, self.z, self.run, self.time_s)
 
+    def part(self, chosen) -> Blocks:
+        """Some of the blocks only."""
+        kept = [getattr(self, n)[chosen] for n in ("y", "x", "z", "run", "time_s")]
+        return Blocks(self.frequency_hz, *kept)
+
 
 @dataclass(frozen=True)
 class Signal:

@@ -178,6 +178,9 @@ def find(recordings: RecordingSet) -> Result:
     yaw_rows = [_yaw_row(yaw, s) for s in senses] if yaw else []
     yaw_losses = np.array([loss(yaw, row) for row in yaw_rows]) if yaw else np.zeros(1)
     losses = losses_of_orders(parts, rows, orders)[:, None] + yaw_losses[None, :]
+    if not np.isfinite(losses).all():
+        # Rotors that all turn alike make no moment to tell them apart by.
+        return Result(recordings)
     whole = float(sum(m.square.sum() for m in parts) + (yaw.square.sum() if yaw else 0.0))
     costs = np.array([moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
     least = float(losses.min())
@@ -332,6 +335,7 @@ def _yaw_row(m: Moments, signs: np.ndarray) -> np.ndarray:
     basis[:k, 0], basis[k:, 1] = signs, signs
     gram, cross = basis.T @ m.gram.sum(axis=0) @ basis, basis.T @ m.cross.sum(axis=0)
     scale = 1 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    root = np.linalg.cholesky(gram * np.outer(scale, scale) + 1e-9 * np.eye(2))
-    gain, _ = nnls(root.T, np.linalg.solve(root, cross * scale))
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+    root = np.sqrt(np.maximum(values, 1e-9))
+    gain, _ = nnls(root[:, None] * vectors.T, vectors.T @ (cross * scale) / root)
     return basis @ (scale * gain)

@@ -7,6 +7,7 @@ group of sensors that agree is taken as right. What is below one sample is a nui
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -22,8 +23,6 @@ from rotorid.mismatch.motion import fresh_samples
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 LEAST_EXPLAINED = 0.6
-LEAST_BLURRED = 0.15
-"""The same before a drifting clock has been put right, which blurs a comparison."""
 P_LIMIT = 1e-6
 LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
@@ -37,7 +36,11 @@ SMALL_LAGS = {
     "commands": "as motor controllers take; left as part of the motors' lag",
     "throttle": "as motor controllers take; left as part of the motors' lag",
 }
-LARGEST_SKEW = 6e-3
+RUN_AGREEMENT = 0.3
+LARGEST_SKEW = 1.2e-2
+LONGEST_DRIFT_S = 0.4
+COARSE_SKEWS = 6
+COARSE_LAGS_S = np.arange(-0.12, 0.121, 0.01)
 MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 LAG_STEP_S = 0.001
 LATE_FLOOR_S = 2e-5
@@ -107,7 +110,7 @@ def comparisons(all_signals: list[Signals], vehicle: Vehicle) -> list[tuple[str,
         if over in ("commands", "throttle"):
             motor_s, blocks = _through_motor(blocks)
         found = lagged.fit(blocks)
-        if found is None or np.min(found.explained) < LEAST_BLURRED:
+        if found is None:
             continue
         out.append((late, over, blocks, found, motor_s))
     return out
@@ -150,11 +153,16 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: 
 
     Gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the first fit.
     """
-    lags = np.arange(-lagged.LONGEST_LAG_S, lagged.LONGEST_LAG_S + 1e-9, LAG_STEP_S)
+    longest = LONGEST_DRIFT_S if drifting else lagged.LONGEST_LAG_S
+    lags = np.arange(-longest, longest + 1e-9, LAG_STEP_S)
+    # Only the fast comparisons with the gyroscope blur beyond recognition.
+    if drifting and np.min(found.explained) < LEAST_EXPLAINED and "gyroscope" in (late, over):
+        found = unblurred(blocks, found)
     start, growth = found.lag_s, 0.0
     for _ in range(3 if drifting else 1):
         curves = likelihood(blocks, found, lags)
-        start, growth = _peak(lags, curves, blocks.time_s, start, drifting)
+        middle = start + growth * float(blocks.time_s.mean())
+        start, growth = _peak(lags, curves, blocks.time_s, middle, drifting)
         phase = lagged.delay(blocks.frequency_hz, start + growth * blocks.time_s)
         found = lagged.fit(replace(blocks, x=blocks.x * phase[:, :, None]), np.zeros(1))
     # Newton's steps to the peak itself, and the likelihood's shape there.
@@ -186,12 +194,32 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: 
     return Difference(late, over, start, growth, covariance, rise, blocks.count, explained, motor_s, gained)
 
 
+def unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
+    """The fit at the coarse growth that explains most, its delay that of the middle of the runs."""
+    aside = blocks.time_s - blocks.time_s.mean()
+    best = found
+    for rate in np.arange(-COARSE_SKEWS, COARSE_SKEWS + 1) * LARGEST_SKEW / COARSE_SKEWS:
+        phase = lagged.delay(blocks.frequency_hz, rate * aside)
+        trial = lagged.fit(replace(blocks, x=blocks.x * phase[:, :, None]), COARSE_LAGS_S)
+        if np.min(trial.explained) > np.min(best.explained):
+            best = trial
+    return best
+
+
 def likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray:
     """Log-likelihood of every lag in every block, (b, lags), up to what no lag changes."""
     model = blocks.x @ found.gain.T
     rest = blocks.y - blocks.z @ found.nuisance.T
     cross = np.sum(found.weight.T[None] * rest.conj() * model, axis=2)
-    return 2 * np.real(cross @ np.exp(-2j * np.pi * np.outer(blocks.frequency_hz, lags)))
+    cosine, sine = _waves(tuple(blocks.frequency_hz), float(lags[0]), len(lags))
+    return 2 * (cross.real @ cosine + cross.imag @ sine)
+
+
+@lru_cache(maxsize=16)
+def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """cos and sin of 2π f τ on the grid of lags, (m, lags) each."""
+    angle = 2 * np.pi * np.outer(frequency_hz, first_s + LAG_STEP_S * np.arange(count))
+    return np.cos(angle), np.sin(angle)
 
 
 def differences(known: list, drifting: bool) -> list[Difference]:
@@ -211,8 +239,26 @@ def across(differences: list[Difference], wrong: list[str], key: int) -> tuple[f
     return float(np.average(values, weights=weights)), float(1.0 / np.sqrt(np.sum(weights)))
 
 
+def in_every_run(whole: Difference, comparison: tuple) -> bool:
+    """Whether each run by itself shows the growth: what acts in part of a flight only must not pass for a clock."""
+    late, over, blocks, found, motor_s = comparison
+    agree, shown = [], []
+    for run in np.unique(blocks.run):
+        own = blocks.part(blocks.run == run)
+        if own.count < 2 * lagged.FEWEST_BLOCKS:
+            continue
+        d = difference(late, over, own, found, motor_s, drifting=True)
+        sd = float(np.sqrt(d.covariance[1, 1]))
+        agree.append(abs(d.growth - whole.growth) < 4 * sd + RUN_AGREEMENT * abs(whole.growth))
+        shown.append(d.growth * whole.growth > 0 and abs(d.growth) > 3 * sd and d.gained > LEAST_LIKELIHOOD / 4)
+    return bool(agree) and all(agree) and np.mean(shown) >= 0.6
+
+
 def _peak(lags: np.ndarray, curves: np.ndarray, time_s: np.ndarray, guess: float, drifting: bool):
-    """Start and growth of lateness at the highest summed likelihood (b, lags), by grids that close in."""
+    """Start and growth of lateness at the highest summed likelihood (b, lags), by grids that close in.
+
+    `guess` is the lateness in the middle of the runs.
+    """
     rows = np.arange(len(time_s))[None, :]
 
     def best(starts, growths):
@@ -323,6 +369,7 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     """Sensors whose lateness grows."""
     signals = signals_of(recordings)
     found = differences(known, drifting=True)
+    sources = {(late, over): (late, over, *rest) for late, over, *rest in known}
     longest = max((s.time_s[-1] - s.time_s[0] for s in signals), default=0.0)
     periods = own_period_s(signals)
     telling = []
@@ -331,6 +378,8 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
         p = float(2 * student.sf(abs(d.growth) / max(sd, 1e-12), max(d.blocks - 2, 1)))
         drift = abs(d.growth) * longest
         if p < P_LIMIT and drift > max(periods[d.late], periods[d.over]) and d.gained > LEAST_LIKELIHOOD:
+            if not in_every_run(d, sources[d.late, d.over]):
+                continue
             telling.append((p, d))
     if not telling:
         return Result(recordings)
@@ -344,6 +393,14 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     if not wrong:
         return Result(recordings)
     rate, sd = across(found, wrong, 1)
+    # Large drifts move the motion out of its block: measured once more with the first estimate taken out.
+    nearly = recordings
+    for sensor in wrong:
+        nearly = shifted(nearly, sensor, 0.0, rate)
+    again = differences(comparisons(signals_of(nearly), recordings.vehicle), drifting=True)
+    if any((d.late in wrong) != (d.over in wrong) for d in again):
+        rest, sd = across(again, wrong, 1)
+        rate += rest
     everywhere = wrong + (["position"] if {"velocity", "attitude"} <= set(wrong) and "position" not in wrong else [])
     fixed = recordings
     for sensor in everywhere:

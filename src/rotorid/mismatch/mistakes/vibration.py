@@ -86,14 +86,14 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
         length = int(WINDOW_S * s.rate_hz)
         if length < 24:
             continue
-        line, beside, crowd = demodulated(s, sensor, axis, order, length)
+        line, beside, crowd, floor = demodulated(s, sensor, axis, order, length)
         good = np.isfinite(line).all(axis=1) & np.isfinite(beside).all(axis=1) & (beside.min(axis=1) > 0)
         if not good.any():
             continue
         # Rotors at nearly one speed see the same line: count each window once, by their mean.
         ratios.append((line[good] / beside[good]).mean(axis=1))
         powers.append(((line - beside)[good] / crowd[good]).mean(axis=1))
-        levels.append(beside[good].mean(axis=1))
+        levels.append(floor[good].mean(axis=1))
         lengths.append(np.full(good.sum(), length))
     if not ratios or sum(map(len, ratios)) < 20:
         return None
@@ -109,10 +109,8 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
     return Line(column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p)
 
 
-def demodulated(
-    s: Signals, sensor: str, axis: int, order: int, length: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Squared amplitude at the order, beside it, and how many rotors share the line, (windows, rotors) each.
+def demodulated(s: Signals, sensor: str, axis: int, order: int, length: int) -> tuple[np.ndarray, ...]:
+    """Squared amplitude at the order, beside it, number of rotors that share the line, and noise: (windows, rotors).
 
     NaN where it cannot be told.
     """
@@ -132,7 +130,7 @@ def demodulated(
     taper = np.hanning(length + 2)[1:-1]
     taper = taper / taper.mean()
     line = np.full((count, speed.shape[1]), np.nan)
-    beside, crowd = np.full_like(line, np.nan), np.full_like(line, np.nan)
+    beside, crowd, floor = (np.full_like(line, np.nan) for _ in range(3))
     steps = order * middle[: count * length].reshape(count, length, -1)
     steps[:, 0] = 0.0
     follow = np.exp(-1j * np.cumsum(steps, axis=1))
@@ -147,5 +145,6 @@ def demodulated(
         # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
         together = np.mean(taper[:, None] * follow[:, :, i, None].conj() * follow, axis=1)
         crowd[clear, i] = np.sum(np.abs(together[clear]) ** 2, axis=1)
+        floor[clear, i] = np.median(spectrum[clear], axis=1) / np.log(2)
         beside[clear, i] = np.mean(spectrum[clear][:, list(SIDE_BINS)], axis=1)
-    return line, beside, crowd
+    return line, beside, crowd, floor
