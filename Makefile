@@ -36,7 +36,7 @@ check: $(READY) ## the checks of form alone: lint, format, stripped notebooks
 
 $(TESTED): $(READY) $(SOURCES)
 	@$(MAKE) --no-print-directory check
-	@$(BIN)/pytest -m "not slow" -n 2
+	@$(BIN)/pytest -m "not slow" -n 2 --dist loadgroup
 	@touch $@
 
 environment: $(READY) ## make the environment alone

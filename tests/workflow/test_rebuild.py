@@ -6,11 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
-from conftest import Project
-
-# One build is shared by all tests here, so they stay on one worker.
-pytestmark = pytest.mark.xdist_group("built")
+from copied_project import Project
 
 
 @contextmanager
