@@ -1,7 +1,7 @@
 """The public recordings as contract sets: which files make which set, and through which importer.
 
-`build(name, sources, vehicles, out)` writes one set: `vehicle.yaml` (copied with its comments on where each
-value comes from), one Parquet file a run, and `import_report.json` with every fault met on the way.
+`build` writes one set: `vehicle.yaml` (copied with its comments on where each value comes from), one Parquet
+file a run, and `import_report.json` with every fault met on the way.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from rotorid.errors import InputError
 from rotorid.importers import crazyflie
 from rotorid.importers.crazyflie_usd import read_usd_log
 from rotorid.importers.neurobem import read_neurobem
+from rotorid.importers.obtain import Obtained
 from rotorid.importers.rcbenchmark import read_rcbenchmark
 from rotorid.importers.report import Fault, ImportReport
 from rotorid.importers.vicon_csv import read_vicon_csv
@@ -210,39 +211,60 @@ def _public_sets() -> dict[str, PublicSet]:
 PUBLIC_SETS = _public_sets()
 
 
-def files_of(name: str) -> tuple[str, ...]:
-    """Files a set needs, relative to the public data folder."""
-    recipe = PUBLIC_SETS[name]
-    return tuple(f"{recipe.source}/{file}" for file in recipe.files)
+def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: Path) -> Path:
+    """Write the set `name` below `parent`; returns its folder.
 
+    Where a file could not be had, the folder holds `import_report.json` alone, which says so.
 
-def build(name: str, data: Path, vehicles: Path, sources: dict[str, dict], parent: Path) -> Path:
-    """Write the set `name` below `parent` from the files in `data`; returns its folder.
-
-    `vehicles` holds the believed vehicle files, `sources` the manifest's entries (licence, repository).
+    Parameters
+    ----------
+    obtained
+        The files of the set's source, already checked.
+    source
+        The source's entry in the manifest (licence, repository, commit, citation).
+    vehicles
+        Folder with the believed vehicle files.
     """
     recipe = PUBLIC_SETS[name]
-    source = sources[recipe.source]
-    runs, faults, used = [], [], []
+    folder = Path(parent) / name
+    folder.mkdir(parents=True, exist_ok=True)
+    origin = {
+        "source": f"https://github.com/{source['repository']} at {source['commit']}",
+        "licence": source["licence"],
+        "citation": source["citation"],
+    }
+    lost = [file for file in recipe.files if file not in obtained.files]
+    if lost:
+        reason = obtained.missing.get(lost[0], f"{lost[0]} is not in the manifest")
+        ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(
+            folder
+        )
+        return folder
+    runs, faults = [], []
     for file in recipe.files:
-        for run, (table, found) in recipe.read(Path(data) / recipe.source / file, file).items():
+        for run, (table, found) in recipe.read(obtained.folder / file, file).items():
             runs.append(Run(run, table))
             faults += [fault.in_run(run) for fault in found]
-            used.append(file)
     believed = Path(vehicles) / f"{recipe.vehicle}.yaml"
     ordered = tuple(sorted(runs, key=lambda run: run.name))
-    folder = write_set(RecordingSet(name, read_vehicle(believed), ordered, recipe.held_out), Path(parent))
+    write_set(RecordingSet(name, read_vehicle(believed), ordered, recipe.held_out), Path(parent))
     shutil.copyfile(believed, folder / "vehicle.yaml")
+    sums = {file["path"]: file["sha256"] for file in source["files"]}
     ImportReport(
-        set=name,
-        source=f"https://github.com/{source['repository']} at {source['commit']}",
-        licence=source["licence"],
-        files=tuple(dict.fromkeys(used)),
+        name,
+        True,
+        **origin,
+        files={file: sums[file] for file in recipe.files},
         axes=recipe.axes,
         faults=tuple(faults),
         notes=recipe.notes,
-    ).write(folder / "import_report.json")
+    ).write(folder)
     return folder
+
+
+def sets_of(source: str) -> list[str]:
+    """Names of the sets made from one source."""
+    return [name for name, recipe in PUBLIC_SETS.items() if recipe.source == source]
 
 
 def read_manifest(path: Path) -> dict[str, dict]:

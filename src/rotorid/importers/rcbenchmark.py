@@ -17,6 +17,7 @@ from rotorid.errors import InputError
 from rotorid.importers.clean import drop_repeated_times
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.rotor.coefficients import lost_speed
 
 GRAM_FORCE_N = 9.80665e-3
 RPM = 2 * np.pi / 60
@@ -106,6 +107,10 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
                 int(silent.sum()),
             )
         )
+    slow = lost_speed(speed, np.abs(thrust_n))
+    if slow.any():
+        found = f"speed far too low for its thrust ({int(slow.sum())} rows): pulses lost"
+        faults.append(Fault("speed_lost", "rotor_speed_1_rad_s", found, "kept as recorded", int(slow.sum())))
     negative = (thrust_n < 0) & ~turning
     if negative.any():
         faults.append(

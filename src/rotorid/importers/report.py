@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 
@@ -27,21 +27,35 @@ class Fault:
         return f"{place + ': ' if place else ''}{self.found}; {self.action}."
 
 
+FILE_NAME = "import_report.json"
+
+
 @dataclass(frozen=True)
 class ImportReport:
-    """Where a contract set comes from and every fault met on the way."""
+    """Where a contract set comes from and every fault met on the way; or why it is not there."""
 
     set: str
+    available: bool
     source: str
     licence: str
-    files: tuple[str, ...]
-    axes: str
-    faults: tuple[Fault, ...]
+    citation: str
+    reason: str = ""
+    files: dict[str, str] = field(default_factory=dict)
+    """SHA-256 of each file read."""
+    axes: str = ""
+    faults: tuple[Fault, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def write(self, path: Path) -> None:
-        """Write as JSON, the same bytes for the same content."""
+    def write(self, folder: Path) -> Path:
+        """Write `import_report.json` into a set's folder, the same bytes for the same content."""
         content = asdict(self)
         for entry, fault in zip(content["faults"], self.faults, strict=True):
             entry["sentence"] = fault.sentence
+        path = Path(folder) / FILE_NAME
         path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        return path
+
+
+def read_report(folder: Path) -> dict:
+    """The import report of a set's folder."""
+    return json.loads((Path(folder) / FILE_NAME).read_text(encoding="utf-8"))
