@@ -10,6 +10,7 @@ configfile: "config.yaml"
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/public.smk"
+include: "workflow/rules/check.smk"
 include: "workflow/rules/report.smk"
 
 

@@ -60,8 +60,8 @@ class Pooled:
 TOO_SLOW = 1.35
 """A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
 
-An offset of the balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data, so
-the rule is one-sided: it must not remove what the offset explains.
+An offset of the balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data,
+so the rule is one-sided: it must not remove what the offset explains.
 """
 
 
