@@ -2,11 +2,11 @@
 
 import os
 
-from rotorid.importers import public_sets
+from rotorid.importers.manifest import read_manifest
 
-MANIFEST = ROOT / "workflow" / "public_data.yaml"
-PUBLIC_SOURCES = public_sets.read_manifest(MANIFEST)
-PUBLIC_SETS_OF = {source: public_sets.sets_of(source) for source in PUBLIC_SOURCES}
+MANIFEST = "workflow/public_data.yaml"
+PUBLIC_SOURCES = read_manifest(MANIFEST)
+PUBLIC_SETS_OF = {source: entry["sets"] for source, entry in PUBLIC_SOURCES.items()}
 # Where the files already are; empty means that they are downloaded into cache/public.
 PUBLIC_FOLDER = os.environ.get("ROTORID_PUBLIC_DATA", "")
 if PUBLIC_FOLDER:
@@ -29,6 +29,7 @@ def public_files(source):
 for source in PUBLIC_SOURCES:
 
     rule:
+        """Files of one laboratory as contract sets."""
         name:
             f"import_public_{source.replace('-', '_')}"
         message:
@@ -36,7 +37,7 @@ for source in PUBLIC_SOURCES:
         input:
             files=public_files(source),
             manifest=MANIFEST,
-            vehicles=sorted((ROOT / "workflow" / "vehicles").glob("*.yaml")),
+            vehicles=sorted(str(path) for path in Path("workflow/vehicles").glob("*.yaml")),
         output:
             sets=[directory(public_set(name)) for name in PUBLIC_SETS_OF[source]],
             status=f"results/public/{source}.json",
