@@ -84,8 +84,9 @@ def test_a_deleted_figure_is_drawn_again_and_the_report_made_of_it(built: Projec
     kept = figure.read_bytes()
     figure.unlink()
     assert built.would_run() == AFTER_CALIBRATION
+    # Put back with the same bytes, only newer, it is as good as never gone.
     figure.write_bytes(kept)
-    built.snakemake("--touch")
+    assert built.would_run() == set()
 
 
 def test_a_changed_setting_reruns_what_takes_it(built: Project) -> None:
