@@ -15,6 +15,7 @@ include: "workflow/rules/report.smk"
 
 
 rule all:
+    """Everything: the report and all it needs."""
     default_target: True
     input:
         rules.report.input,
