@@ -262,6 +262,11 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
     return folder
 
 
+def of_one_motor(name: str) -> bool:
+    """Whether a set is of the bench and holds the runs of one motor only."""
+    return name.startswith("strawson-") and name.count("-") == 2
+
+
 def sets_of(source: str) -> list[str]:
     """Names of the sets made from one source."""
     return [name for name, recipe in PUBLIC_SETS.items() if recipe.source == source]
