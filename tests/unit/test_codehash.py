@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.codehash import code_of, reached_modules
+from rotorid.codehash import Code
 
 FILES = {
     "src/rotorid/__init__.py": "",
@@ -38,15 +38,12 @@ def edit(project: Path, name: str, old: str, new: str) -> None:
     path = project / name
     text = path.read_text()
     assert old in text
-    before = path.stat().st_mtime_ns
-    while path.stat().st_mtime_ns == before:
-        path.write_text(text.replace(old, new))
+    path.write_text(text.replace(old, new))
 
 
 def hashes(project: Path) -> dict[str, str]:
-    return {
-        name: code_of(f"workflow/scripts/{name}.py", project) for name in ("fit", "draw", "choose", "late")
-    }
+    code = Code(project)
+    return {name: code.of(f"workflow/scripts/{name}.py") for name in ("fit", "draw", "choose", "late")}
 
 
 def changed(project: Path, name: str, old: str, new: str) -> set[str]:
@@ -89,7 +86,7 @@ def test_import_module_with_a_constant_name_counts(project: Path) -> None:
 def test_a_relative_import_is_followed(project: Path) -> None:
     script = project / "workflow/scripts/relative.py"
     script.write_text("import rotorid.effects.lag\n")
-    names = [path.name for path in reached_modules(script, project)]
+    names = [path.name for path in Code(project).reached_modules(script)]
     assert names.count("drag.py") == 1
 
 
@@ -99,13 +96,13 @@ def test_a_notebooks_code_cells_count_and_its_text_does_not(project: Path) -> No
     text = {"cell_type": "markdown", "source": ["# TEXT"]}
     code = {"cell_type": "code", "source": ["import rotorid.fit"]}
     notebook.write_text(json.dumps({"cells": [text, code]}))
-    before = code_of("notebooks/fit.ipynb", project)
+    before = Code(project).of("notebooks/fit.ipynb")
     edit(project, "notebooks/fit.ipynb", "TEXT", "Other text")
-    assert code_of("notebooks/fit.ipynb", project) == before
+    assert Code(project).of("notebooks/fit.ipynb") == before
     edit(project, "src/rotorid/constants.py", "9.81", "9.82")
-    assert code_of("notebooks/fit.ipynb", project) != before
+    assert Code(project).of("notebooks/fit.ipynb") != before
 
 
 def test_a_script_that_is_not_there_is_named(project: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"there is no file .*nowhere\.py"):
-        code_of("workflow/scripts/nowhere.py", project)
+        Code(project).of("workflow/scripts/nowhere.py")

@@ -3,6 +3,7 @@
 import fnmatch
 import json
 import re
+import textwrap
 from pathlib import Path
 
 import nbformat
@@ -15,13 +16,16 @@ FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk")
 
 
 def rules() -> dict[str, str]:
-    """Text of each rule by its name."""
+    """Text of each rule by its name; a rule made in a loop goes by the start of its name."""
     found = {}
     for path in FILES:
-        parts = re.split(r"^(?:rule|checkpoint) (\w+):\n", path.read_text(), flags=re.MULTILINE)
-        for name, rest in zip(parts[1::2], parts[2::2], strict=True):
-            body = re.match(r"(?:[ \t]+.*\n|\n)*", rest)
-            found[name] = body.group() if body else ""
+        opening = re.compile(r"^( *)(?:rule|checkpoint) ?(\w*):\n", flags=re.MULTILINE)
+        text = path.read_text()
+        for match in opening.finditer(text):
+            body = re.match(rf"(?:{match[1]} +.*\n|\n)*", text[match.end() :])[0]
+            body = textwrap.indent(textwrap.dedent(body), "    ")
+            name = match[2] or re.search(r"name:\s+f?\"(\w+)", body)[1]
+            found[name] = body
     return found
 
 

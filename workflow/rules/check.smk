@@ -1,11 +1,14 @@
 """What the recordings contain, for a person: `snakemake --cores 1 check_recordings`."""
 
-from rotorid.recordings import list_sets
+
+def own_sets():
+    """Names of the sets in the recordings folder: the folders with a vehicle file."""
+    return sorted(path.parent.name for path in Path(CONFIG.recordings).glob("*/vehicle.yaml"))
 
 
 def folders_to_check(wildcards):
     """Sets in the recordings folder and the imported public ones."""
-    return [f"{CONFIG.recordings}/{name}" for name in list_sets(CONFIG.recordings)] + PUBLIC_SHOWN
+    return [f"{CONFIG.recordings}/{name}" for name in own_sets()] + PUBLIC_SHOWN
 
 
 rule check_recordings:

@@ -2,11 +2,11 @@
 
 import os
 
-from rotorid.importers import public_sets
+from rotorid.importers.manifest import of_one_motor, read_manifest
 
-MANIFEST = ROOT / "workflow" / "public_data.yaml"
-PUBLIC_SOURCES = public_sets.read_manifest(MANIFEST)
-PUBLIC_SETS_OF = {source: public_sets.sets_of(source) for source in PUBLIC_SOURCES}
+MANIFEST = "workflow/public_data.yaml"
+PUBLIC_SOURCES = read_manifest(MANIFEST)
+PUBLIC_SETS_OF = {source: entry["sets"] for source, entry in PUBLIC_SOURCES.items()}
 # Where the files already are; empty means that they are downloaded into cache/public.
 PUBLIC_FOLDER = os.environ.get("ROTORID_PUBLIC_DATA", "")
 if PUBLIC_FOLDER:
@@ -28,17 +28,14 @@ def public_files(source):
 
 # The bench's sets of a single motor are left out of lists for people: the sets of all motors hold the same runs.
 PUBLIC_SHOWN = [
-    public_set(name)
-    for names in PUBLIC_SETS_OF.values()
-    for name in names
-    if not public_sets.of_one_motor(name)
+    public_set(name) for names in PUBLIC_SETS_OF.values() for name in names if not of_one_motor(name)
 ]
 
 
 for source in PUBLIC_SOURCES:
 
     rule:
-        # One source: its files checked, its sets made.
+        """Files of one laboratory as contract sets."""
         name:
             f"import_public_{source.replace('-', '_')}"
         message:
@@ -46,7 +43,7 @@ for source in PUBLIC_SOURCES:
         input:
             files=public_files(source),
             manifest=MANIFEST,
-            vehicles=sorted((ROOT / "workflow" / "vehicles").glob("*.yaml")),
+            vehicles=sorted(str(path) for path in Path("workflow/vehicles").glob("*.yaml")),
         output:
             sets=[directory(public_set(name)) for name in PUBLIC_SETS_OF[source]],
             status=f"results/public/{source}.json",

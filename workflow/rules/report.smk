@@ -34,8 +34,8 @@ def chapter_figures(wildcards):
 
 
 def raw_files(wildcards):
-    """Everything that instruments wrote."""
-    return sorted(str(path) for path in Path("raw").rglob("*") if path.is_file())
+    """Everything that instruments wrote, and the list of public recordings with their hashes."""
+    return sorted(str(path) for path in Path("raw").rglob("*") if path.is_file()) + [MANIFEST]
 
 
 rule render_chapter:

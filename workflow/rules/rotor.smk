@@ -6,7 +6,7 @@ rule fit_rotor_coefficients:
     message:
         "Rotor: thrust coefficients"
     input:
-        sets=[public_set(f"strawson-{name}") for name in public_sets.PROPELLERS.values()],
+        sets=[public_set(name) for name in PUBLIC_SETS_OF["strawson-5inch-bench"] if not of_one_motor(name)],
     output:
         summary="results/rotor/coefficients.json",
         motors="results/rotor/motors.csv",

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rotorid import log
 from rotorid.importers import public_sets
+from rotorid.importers.manifest import read_manifest
 from rotorid.importers.obtain import obtain
 from rotorid.importers.report import read_report
 
@@ -21,7 +22,7 @@ def main(
     source: str, manifest: str, vehicles: Sequence[str], folder: str, cache: str, parent: str, status: str
 ) -> None:
     """Import every set of `source` below `parent` and write what was had to the JSON file `status`."""
-    entry = public_sets.read_manifest(Path(manifest))[source]
+    entry = read_manifest(manifest)[source]
     obtained = obtain(source, entry, Path(folder) if folder else None, Path(cache))
     for file, reason in obtained.missing.items():
         LOGGER.warning("%s: %s", file, reason)

@@ -51,7 +51,7 @@ def sources(status_files: Sequence[Path]) -> pd.DataFrame:
             {
                 "source": status["source"],
                 "repository": status["repository"],
-                "commit": status["commit"][:10],
+                "place": f"{status['repository']} at {status['commit'][:10]}",
                 "licence": status["licence"],
                 "contents": status["contents"],
                 "citation": status["citation"],

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import yaml
 
 from rotorid.errors import InputError
 from rotorid.importers import crazyflie
@@ -262,17 +261,6 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
     return folder
 
 
-def of_one_motor(name: str) -> bool:
-    """Whether a set is of the bench and holds the runs of one motor only."""
-    return name.startswith("strawson-") and name.count("-") == 2
-
-
 def sets_of(source: str) -> list[str]:
     """Names of the sets made from one source."""
     return [name for name, recipe in PUBLIC_SETS.items() if recipe.source == source]
-
-
-def read_manifest(path: Path) -> dict[str, dict]:
-    """Sources of the public recordings by name, from `public_data.yaml`."""
-    with open(path, encoding="utf-8") as file:
-        return yaml.safe_load(file)["sources"]
