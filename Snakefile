@@ -12,6 +12,8 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/public.smk"
 include: "workflow/rules/check.smk"
 include: "workflow/rules/calibration.smk"
+include: "workflow/rules/rotor.smk"
+include: "workflow/rules/neurobem.smk"
 include: "workflow/rules/report.smk"
 
 

@@ -20,6 +20,8 @@ from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 
 CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+TOTALS = ("force", "moment")
+"""Over three axes: sqrt(mean of the three squares), the convention of the NeuroBEM paper's table."""
 ORDER = 2
 
 
@@ -69,20 +71,21 @@ def airspeed(run: Run) -> np.ndarray:
 
 
 def rmse(residual: np.ndarray) -> dict[str, float]:
-    """Root mean square of each channel, and of force and moment over their three axes.
+    """Root mean square of each channel and of the totals, residual of shape (n, 6)."""
+    squares = np.mean(_squares(residual), axis=0)
+    return {name: float(np.sqrt(v)) for name, v in zip(CHANNELS + TOTALS, squares, strict=True)}
 
-    The latter is sqrt(mean of the three squared), the convention of the NeuroBEM paper's table.
-    """
-    squares = np.mean(residual**2, axis=0)
-    result = {name: float(np.sqrt(v)) for name, v in zip(CHANNELS, squares, strict=True)}
-    result["force"] = float(np.sqrt(squares[:3].mean()))
-    result["moment"] = float(np.sqrt(squares[3:].mean()))
-    return result
+
+def _squares(residual: np.ndarray) -> np.ndarray:
+    """Squares of the channels and, as columns 7 and 8, of the totals; shape (n, 8)."""
+    squares = residual**2
+    return np.column_stack([squares, squares[:, :3].mean(axis=1), squares[:, 3:].mean(axis=1)])
 
 
 @dataclass(frozen=True)
 class Binned:
-    """RMS residual in bins of airspeed with 95 % intervals; rows are bins, columns the six channels."""
+    """RMS residual in bins of airspeed with 95 % intervals; rows are bins, columns
+    the six channels and the two totals."""
 
     low_m_s: np.ndarray
     high_m_s: np.ndarray
@@ -93,7 +96,7 @@ class Binned:
     growth: np.ndarray
     """RMS in the fastest bin over RMS in the slowest, per channel."""
     growth_95: np.ndarray
-    """Its 95 % interval, shape (6, 2)."""
+    """Its 95 % interval, shape (8, 2)."""
 
 
 def by_airspeed(
@@ -130,9 +133,9 @@ def by_airspeed(
         which = np.digitize(airspeeds[name], edges) - 1
         block = ((times_s[name] - times_s[name][0]) // block_s).astype(int)
         inside = (which >= 0) & (which < bins)
-        total = np.zeros((block.max() + 1, bins, 6))
+        total = np.zeros((block.max() + 1, bins, 8))
         number = np.zeros((block.max() + 1, bins))
-        np.add.at(total, (block[inside], which[inside]), residual[inside] ** 2)
+        np.add.at(total, (block[inside], which[inside]), _squares(residual[inside]))
         np.add.at(number, (block[inside], which[inside]), 1.0)
         squares.append(total)
         counts.append(number)

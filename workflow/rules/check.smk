@@ -7,11 +7,8 @@ def own_sets():
 
 
 def folders_to_check(wildcards):
-    """Sets in the recordings folder and the imported public ones (of the bench, one set a propeller)."""
-    own = [f"{CONFIG.recordings}/{name}" for name in own_sets()]
-    public = [name for names in PUBLIC_SETS_OF.values() for name in names]
-    per_motor = {name for name in public if name.startswith("strawson-") and name.count("-") > 1}
-    return own + [public_set(name) for name in public if name not in per_motor]
+    """Sets in the recordings folder and the imported public ones."""
+    return [f"{CONFIG.recordings}/{name}" for name in own_sets()] + PUBLIC_SHOWN
 
 
 rule check_recordings:

@@ -88,7 +88,8 @@ def _from_network(name: str, source: dict, cache: Path, base: str) -> Obtained:
         except urllib.error.HTTPError as error:
             missing[file["path"]] = f"{url}: the server answers {error.code}"
         except OSError as error:
-            offline = f"{url}: no answer ({getattr(error, 'reason', error)})"
+            host = urllib.parse.urlsplit(base).netloc
+            offline = f"no answer from {host} ({getattr(error, 'reason', error)})"
             missing[file["path"]] = offline
     return Obtained(name, cache / name, tuple(files), missing)
 

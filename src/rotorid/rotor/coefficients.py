@@ -222,3 +222,20 @@ def modified_z_scores(values: Sequence[float]) -> np.ndarray:
     deviation = values - np.median(values)
     scale = np.median(np.abs(deviation))
     return np.zeros_like(values) if scale == 0 else 0.6745 * deviation / scale
+
+
+def rest_reading(thrust_n: Sequence[float]) -> dict:
+    """Mean thrust (N) of points with the rotor at rest, its 95 % interval and their number.
+
+    A true zero error of the balance would show here too; an offset that does not is a bend of the curve.
+    """
+    thrust_n = np.asarray(thrust_n, float)
+    if len(thrust_n) < 2:
+        return {"mean_n": None, "interval_95_n": None, "points": len(thrust_n)}
+    half = student_t.ppf(0.975, len(thrust_n) - 1) * thrust_n.std(ddof=1) / np.sqrt(len(thrust_n))
+    mean = float(thrust_n.mean())
+    return {
+        "mean_n": mean,
+        "interval_95_n": [float(mean - half), float(mean + half)],
+        "points": len(thrust_n),
+    }
