@@ -19,6 +19,8 @@ import jinja2
 from rotorid.errors import InputError
 
 FIGURES = {".svg", ".png"}
+WIDEST = 40
+"""A column longer than this many characters gets no more room in a table."""
 
 
 class ProseError(InputError):
@@ -142,12 +144,21 @@ def table_of(
     """
     headings = [column[1] for column in columns]
     forms = [column[2] if len(column) > 2 else "text" for column in columns]
-    rules = [":---" if form == "text" else "---:" for form in forms]
-    lines = [_row(headings), _row(rules)]
-    lines += [
-        _row([_formatted(row[column[0]], form) for column, form in zip(columns, forms, strict=True)])
+    cells = [
+        [_formatted(row[column[0]], form) for column, form in zip(columns, forms, strict=True)]
         for row in rows
     ]
+    # Where a table is too wide for one line a cell, pandoc takes the columns' shares from these dashes.
+    longest_words = [max(map(len, heading.split())) for heading in headings]
+    widths = [
+        max(3, word, *(min(len(line[place]), WIDEST) for line in cells))
+        for place, word in enumerate(longest_words)
+    ]
+    rules = [
+        ":" + "-" * width if form == "text" else "-" * width + ":"
+        for width, form in zip(widths, forms, strict=True)
+    ]
+    lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}}}\n"
 
 
