@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from rotorid.errors import InputError
 from rotorid.importers import clean, crazyflie, frames, px4_ulog
 from rotorid.importers.crazyflie_usd import decode_usd_log, read_usd_log
+from rotorid.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.importers.neurobem import USED, read_neurobem
 from rotorid.importers.rcbenchmark import decode_text, read_rcbenchmark
 from rotorid.importers.vicon_csv import read_vicon_csv
@@ -284,6 +285,34 @@ def test_vicon_messages(tmp_path: Path) -> None:
         read_vicon_csv(write_vicon(path, rows))
     with pytest.raises(InputError, match="file is missing"):
         read_vicon_csv(tmp_path / "none.csv")
+
+
+# IMRC bench ---------------------------------------------------------------------------------------
+
+
+def test_a_vehicle_on_a_scale_in_both_layouts(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n32768,4.0,9549.2966,0,1,1,100\n0,4.1,0,0,0,0,0\n"
+    )
+    table, faults = read_imrc_bench(path)
+    assert table["force_z_n"].tolist() == pytest.approx([-0.980665, 0])
+    assert table["throttle_4"].tolist() == [0.5, 0.0]
+    assert table["rotor_speed_1_rad_s"].tolist() == pytest.approx([1000, 0])
+    assert [(f.kind, f.column) for f in faults] == [
+        ("no_clock", "time_s"),
+        ("speed_dropout", "rotor_speed_2_rad_s"),
+    ]
+    path.write_text(
+        "weight[g],pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,v[V],i[A],p[W]\n1,0,4,0,0,0,0,4,0.5,2\n1,0,x,0,0,0,0,4,1,4\n"
+    )
+    with pytest.raises(InputError, match=r"line 3, column vbat\[V\]: expected a number, found 'x'"):
+        read_imrc_bench(path)
+    path.write_text("pwm,rpm1\n1,2\n")
+    with pytest.raises(InputError, match=r"line 1: expected the column vbat\[V\]"):
+        read_imrc_bench(path)
+    with pytest.raises(InputError, match="file is missing"):
+        read_imrc_bench(tmp_path / "none.csv")
 
 
 # Crazyflie uSD ------------------------------------------------------------------------------------

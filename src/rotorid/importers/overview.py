@@ -39,6 +39,7 @@ FAULT_NAMES = {
     "unknown_event": "unknown event",
     "dropout": "logger dropout",
     "no_command": "no command logged",
+    "no_clock": "no clock",
     "second_sensor": "second sensor",
 }
 CHOICES = {"cut", "on_ground"}

@@ -18,6 +18,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.importers import crazyflie
 from rotorid.importers.crazyflie_usd import read_usd_log
+from rotorid.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.importers.neurobem import read_neurobem
 from rotorid.importers.obtain import Obtained
 from rotorid.importers.rcbenchmark import read_rcbenchmark
@@ -110,6 +111,10 @@ def _crazypad(path: Path, name: str) -> Runs:
     return _crazyflie(path, Path(name).name)
 
 
+def _scale(path: Path, name: str) -> Runs:
+    return {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)}
+
+
 def _bench(path: Path, name: str) -> Runs:
     motor, voltage = re.fullmatch(r"([a-m])\d_(7|11)\.csv", Path(name).name).groups()
     return {f"{motor}_{CELLS[voltage]}": read_rcbenchmark(path)}
@@ -182,6 +187,26 @@ def _public_sets() -> dict[str, PublicSet]:
             notes=("roll and pitch window 55-90 s as upstream",),
         ),
     }
+    bench = "system-id/data"
+    scales = {
+        "stock": ("brushed", ("cf21_bitcraze2021/cf2.1-stock-prop", "cf21_bitcraze2021/cf21_stock2")),
+        "plus": (
+            "brushed",
+            tuple(
+                f"cf21plus/data_feb_24_2026_{battery}"
+                for battery in ("250mah_battery0", "350mah_battery0", "350mah_battery1")
+            ),
+        ),
+        "guards": ("brushless", ("cf21bl_guards/feb25_2026_0",)),
+    }
+    for name, (vehicle, files) in scales.items():
+        sets[f"imrc-bench-{name}"] = PublicSet(
+            "imrc-crazyflie-rpm",
+            tuple(f"{bench}/{file}.csv" for file in files),
+            _scale,
+            f"imrc-bench-{vehicle}",
+            "thrust of the whole vehicle along -z of the body",
+        )
     for label, (folder, numbers) in pad.items():
         sets[f"crazypad-{label}"] = PublicSet(
             "crazypad",
