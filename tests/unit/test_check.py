@@ -58,9 +58,7 @@ def test_a_full_flight_lacks_only_a_second_run() -> None:
     names += [f"quaternion_{axis}" for axis in "wxyz"]
     names += ["rotor_speed_1_rad_s", "rotor_command_1_rad_s", "height_m", "battery_voltage_v"]
     found = check_set(flight(**{name: ones for name in names}, odd=ones))
-    assert found.lacks == (
-        "One run only: blocks of it are held out, and repeatability between runs is unknown.",
-    )
+    assert found.lacks == ("One run only: blocks of it are held out, and repeatability between runs is unknown.",)
     assert found.other_columns == ("odd",)
 
 
@@ -68,9 +66,7 @@ def test_a_bench_needs_force_and_reference_together() -> None:
     table = pd.DataFrame({"time_s": [0.0, 1.0], "force_x_n": [1.0, 2.0]})
     vehicle = Vehicle(name="b", kind="bench", tared=True)
     found = check_set(RecordingSet("b", vehicle, (Run("a", table), Run("b", table))))
-    assert found.lacks == (
-        "force_x_n and reference_force_x_n are not both there: that axis cannot be compared.",
-    )
+    assert found.lacks == ("force_x_n and reference_force_x_n are not both there: that axis cannot be compared.",)
 
 
 def test_the_text_names_runs_columns_and_gaps() -> None:

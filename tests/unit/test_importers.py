@@ -223,9 +223,7 @@ def vicon_rows(seconds: float = 12.0, rate: float = 50.0) -> np.ndarray:
     air = (time >= 2) & (time < 10)
     rows = np.zeros((len(time), 25))
     rows[:, 0] = time
-    rows[:, 1:4] = np.column_stack(
-        [0.001 * time, 0.002 * time, np.where(air, 0.5, 0.05) + 1e-4 * np.sin(time)]
-    )
+    rows[:, 1:4] = np.column_stack([0.001 * time, 0.002 * time, np.where(air, 0.5, 0.05) + 1e-4 * np.sin(time)])
     rows[:, 4:7] = [0.1, 0.2, 0.3]
     rows[:, 7:10] = [3.0, 2.0, 0.0]
     rows[:, 10:13] = np.column_stack([np.sin(time), np.cos(time), time])
@@ -292,9 +290,7 @@ def test_vicon_messages(tmp_path: Path) -> None:
 
 def test_a_vehicle_on_a_scale_in_both_layouts(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
-    path.write_text(
-        "pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n32768,4.0,9549.2966,0,1,1,100\n0,4.1,0,0,0,0,0\n"
-    )
+    path.write_text("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n32768,4.0,9549.2966,0,1,1,100\n0,4.1,0,0,0,0,0\n")
     table, faults = read_imrc_bench(path)
     assert table["force_z_n"].tolist() == pytest.approx([-0.980665, 0])
     assert table["throttle_4"].tolist() == [0.5, 0.0]
@@ -318,9 +314,7 @@ def test_a_vehicle_on_a_scale_in_both_layouts(tmp_path: Path) -> None:
 # Crazyflie uSD ------------------------------------------------------------------------------------
 
 
-def usd_bytes(
-    variables, rows, version: int = 2, times=None, name: str = "fixedFrequency", extra=b""
-) -> bytes:
+def usd_bytes(variables, rows, version: int = 2, times=None, name: str = "fixedFrequency", extra=b"") -> bytes:
     """A log as the firmware writes it: header, events, checksum. `rows` match `variables` [(name, type)]."""
     data = struct.pack("<BHH", 0xBC, version, 1) + struct.pack("<H", 7) + name.encode() + b"\0"
     data += struct.pack("<H", len(variables))
@@ -458,9 +452,7 @@ def test_attitude_without_pitch_finds_the_pitch_of_a_thrust_along_z() -> None:
     attitude = Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll]))
     force = attitude.apply([[0.0, 0.05, 1.1], [0.0, -0.02, 0.9]])
     wxyz, body = crazyflie.attitude_without_pitch(force, roll, yaw)
-    np.testing.assert_allclose(
-        np.abs(np.sum(wxyz * attitude.as_quat()[:, [3, 0, 1, 2]], axis=1)), 1, atol=1e-12
-    )
+    np.testing.assert_allclose(np.abs(np.sum(wxyz * attitude.as_quat()[:, [3, 0, 1, 2]], axis=1)), 1, atol=1e-12)
     np.testing.assert_allclose(body, [[0.0, 0.05, 1.1], [0.0, -0.02, 0.9]], atol=1e-12)
 
 

@@ -68,9 +68,7 @@ def test_pandocs_identifiers_are_not_comments(tmp_path: Path, files: dict[str, s
         ('{{ table("cells", "x", [("a1", "A", "round2")]) }}', r"round2 is not a form of a number"),
     ],
 )
-def test_what_is_missing_stops_the_report(
-    tmp_path: Path, files: dict[str, str], text: str, message: str
-) -> None:
+def test_what_is_missing_stops_the_report(tmp_path: Path, files: dict[str, str], text: str, message: str) -> None:
     with pytest.raises(prose.ProseError, match=message):
         rendered(tmp_path, text, files)
 

@@ -104,9 +104,7 @@ def test_the_comparison_finds_a_drag_that_neurobem_knows_and_the_rigid_body_does
         runs.append(Run(name, pd.DataFrame(table)))
     found = compare(RecordingSet("s", VEHICLE, tuple(runs)), 20.0, 1.0, 1.0, seed=1)
     assert found.summary["one_flight_above_m_s"] == pytest.approx(6.0)
-    assert found.summary["flights"]["b"]["rigid_body"]["force_x"] == pytest.approx(
-        0.5 * 10 * np.sqrt(3 / 8), rel=1e-3
-    )
+    assert found.summary["flights"]["b"]["rigid_body"]["force_x"] == pytest.approx(0.5 * 10 * np.sqrt(3 / 8), rel=1e-3)
     assert found.summary["flights"]["b"]["neurobem"]["force"] == pytest.approx(0, abs=1e-9)
     lighter = found.summary["flights"]["a"]["neurobem_paper_mass"]["force_z"]
     assert lighter == pytest.approx((2.0 - 0.752) * 9.81)

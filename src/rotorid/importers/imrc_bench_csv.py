@@ -35,9 +35,7 @@ def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
         bad = pd.to_numeric(raw[name], errors="coerce").isna()
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
-            raise InputError(
-                f"{path}, line {row + 2}, column {name}: expected a number, found {raw[name].iloc[row]!r}"
-            )
+            raise InputError(f"{path}, line {row + 2}, column {name}: expected a number, found {raw[name].iloc[row]!r}")
     columns = {c.TIME: np.arange(len(raw), dtype=float)}
     throttle = raw["pwm"].to_numpy(float) / FULL_SCALE
     columns |= {name: throttle for name in c.rotor_columns("throttle", 4)}

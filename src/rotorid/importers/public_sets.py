@@ -70,9 +70,7 @@ def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | N
     for number, (start, stop) in enumerate(stretches):
         run, found = crazyflie.flight_run(table, start, stop)
         label = prefix if len(stretches) == 1 else f"{prefix}_{number + 1}"
-        flown = Fault(
-            "cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0
-        )
+        flown = Fault("cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0)
         runs[label] = (run, [*faults, *more, flown, *found])
     return runs
 
@@ -80,8 +78,7 @@ def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | N
 def _imrc_brushless(path: Path, name: str) -> Runs:
     """The controller's map of thrust to PWM is published: it gives the commanded speed of each rotor."""
     return {
-        run: (with_commanded_speed(table), faults)
-        for run, (table, faults) in _crazyflie(path, Path(name).name).items()
+        run: (with_commanded_speed(table), faults) for run, (table, faults) in _crazyflie(path, Path(name).name).items()
     }
 
 
@@ -260,9 +257,7 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
     lost = [file for file in recipe.files if file not in obtained.files]
     if lost:
         reason = obtained.missing.get(lost[0], f"{lost[0]} is not in the manifest")
-        ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(
-            folder
-        )
+        ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(folder)
         return folder
     runs, faults = [], []
     for file in recipe.files:

@@ -125,9 +125,7 @@ LEAST_FORCE_SD_N = 1e-4
 """The balance is never taken as more exact than this."""
 
 
-def fit_coefficient(
-    runs: Sequence[Points], offset: bool, speed_noise_relative: float = 0.0
-) -> CoefficientFit:
+def fit_coefficient(runs: Sequence[Points], offset: bool, speed_noise_relative: float = 0.0) -> CoefficientFit:
     """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
 
     Parameters
