@@ -11,6 +11,7 @@ configfile: "config.yaml"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/public.smk"
 include: "workflow/rules/check.smk"
+include: "workflow/rules/calibration.smk"
 include: "workflow/rules/rotor.smk"
 include: "workflow/rules/neurobem.smk"
 include: "workflow/rules/report.smk"
@@ -19,5 +20,7 @@ include: "workflow/rules/report.smk"
 rule all:
     """Everything: the report and all it needs."""
     default_target: True
+    message:
+        "All results are up to date"
     input:
         rules.report.input,

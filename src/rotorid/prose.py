@@ -181,7 +181,8 @@ def sci(value: float | None, decimals: int) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
     mantissa, exponent = f"{value:.{decimals}e}".split("e")
-    return f"{mantissa.replace('-', '−')} × 10^{str(int(exponent)).replace('-', '−')}^"
+    # No-break spaces: a number stays in one piece.
+    return f"{mantissa.replace('-', '−')}\u00a0×\u00a010^{str(int(exponent)).replace('-', '−')}^"
 
 
 def percent(value: float | None, decimals: int) -> str:

@@ -25,7 +25,7 @@ def rendered(tmp_path: Path, text: str, files: dict[str, str]) -> str:
 
 def test_numbers_come_from_the_file_with_the_asked_digits(tmp_path: Path, files: dict[str, str]) -> None:
     text = "{{ fit.c_f | sci(4) }}; {{ fit.a0 | fix(3) }}; {{ fit.share | percent(1) }} %"
-    assert rendered(tmp_path, text, files) == "1.3877 × 10^−6^; −0.074; 2.1 %"
+    assert rendered(tmp_path, text, files) == "1.3877\u00a0×\u00a010^−6^; −0.074; 2.1 %"
     assert rendered(tmp_path, "{{ fit.ends | interval(2) }}", files) == "39.75 to 39.76"
 
 
