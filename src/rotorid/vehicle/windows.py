@@ -11,13 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.effects.contract import LACK, Form, Motion
+from rotorid.effects.contract import Form
+from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
+from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
 from rotorid.vehicle.integrate import rk4_step
-from rotorid.vehicle.mixer import wrench_matrix
-from rotorid.vehicle.params import RigidBody
-from rotorid.vehicle.rigid_body import angular_acceleration
 
 LONGEST_STEP_S = 0.01
 
@@ -78,10 +77,10 @@ def plan_windows(
     """
     time_s = np.asarray(time_s, float)
     if len(time_s) < 2:
-        raise ValueError(f"a window needs at least 2 samples, the recording has {len(time_s)}")
+        raise InputError(f"a window needs at least 2 samples, the recording has {len(time_s)}")
     dt = np.diff(time_s)
     if not np.all(dt > 0):
-        raise ValueError("time_s must be strictly increasing")
+        raise InputError("time_s must be strictly increasing")
     period = float(np.median(dt))
     longest = max(LONGEST_STEP_S if step_s is None else step_s, period)
     stride = max(int(longest / period + 1e-6), 1)
@@ -112,7 +111,7 @@ def simulate_windows(
     `recorded` holds the recorded states at the n samples; where velocity or attitude is missing (None) only
     what does not hang on it is simulated. `effects` are forms with their parameter values; what they add to
     sensor readings is not part of the motion and is left out. `sample` (w, m) takes windows planned before
-    (then `window_s` and `step_s` are not used). ValueError where an effect needs what is not there.
+    (then `window_s` and `step_s` are not used). InputError where an effect needs what is not there.
 
     Angular acceleration and specific force, on which some effects
     depend, come from the last evaluation (a fixed point that converges as the step shrinks; two rounds at the
@@ -176,36 +175,34 @@ def halfway(values: np.ndarray, time_s: np.ndarray, sample: np.ndarray) -> np.nd
 
 
 class _Flight:
-    """Derivative of the state of all windows; remembers the last accelerations for the fixed point.
+    """Derivative of the state of all windows.
 
     State columns: rates 0:3, quaternion 3:7, velocity 7:10, position 10:13 (as far as they can be simulated).
     """
 
     def __init__(self, vehicle, effects, time_s, inputs: Inputs, recorded: States, sample):
         self.vehicle = vehicle
-        self.body = RigidBody.of_vehicle(vehicle)
-        self.matrix = wrench_matrix(vehicle).T
-        self.effects = [(form, np.asarray(values, float)) for form, values in effects]
+        self.dynamics = Dynamics(vehicle, effects, len(sample))
         self.sample = sample
         self.time_s = time_s
         self.recorded = recorded
         self.attitude = recorded.quaternion is not None
         self.translation = self.attitude and recorded.velocity is not None
         self.inputs = self._inputs_at_samples(inputs)
-        self.last_acceleration = np.zeros((len(sample), 3))
-        self.last_specific_force = np.zeros((len(sample), 3))
-        self._check_effects()
+        self._check_effects(effects)
 
     def _inputs_at_samples(self, inputs: Inputs) -> dict[str, np.ndarray]:
         """Inputs at the windows' samples, each (w, m, ...)."""
         n, k = inputs.rotor_speed.shape
         if n != len(self.time_s) or k != self.vehicle.rotor_count:
-            raise ValueError(
+            raise InputError(
                 f"rotor_speed has shape {inputs.rotor_speed.shape}, "
                 f"expected ({len(self.time_s)}, {self.vehicle.rotor_count})"
             )
         acceleration = inputs.rotor_acceleration
-        if acceleration is None and any("rotor_acceleration" in form.requires for form, _ in self.effects):
+        if acceleration is None and any(
+            "rotor_acceleration" in form.requires for form, _ in self.dynamics.effects
+        ):
             acceleration = np.gradient(inputs.rotor_speed, self.time_s, axis=0)
         wind = inputs.wind
         if wind is not None:
@@ -235,22 +232,16 @@ class _Flight:
             return np.full(len(first), self.vehicle.ground_z_m)
         return None
 
-    def _check_effects(self) -> None:
-        have = {"rotor_speed", "angular_velocity", "angular_acceleration", "specific_force"}
-        have |= {"rotation"} if self.attitude else set()
-        have |= {"velocity"} if self.translation else set()
-        have |= {"height"} if self.height_offset is not None else set()
-        have |= self.inputs.keys()
-        for form, _ in self.effects:
-            if getattr(form, "memory", False):
-                raise ValueError(
+    def _check_effects(self, effects) -> None:
+        for form, _ in effects:
+            if has_memory(form):
+                raise InputError(
                     f"effect form {form.name!r} has a memory of its own: give its wrench in inputs.force"
                 )
-            for name in form.requires:
-                if name not in have:
-                    raise ValueError(
-                        f"effect form {form.name!r} cannot be simulated: {LACK.get(name, f'no {name}')}"
-                    )
+        known = {"rotation"} if self.attitude else set()
+        known |= {"velocity"} if self.translation else set()
+        known |= {"height"} if self.height_offset is not None else set()
+        check_effects(effects, known | self.inputs.keys())
 
     def start(self) -> np.ndarray:
         """States at the windows' starts, (w, 3, 7 or 13)."""
@@ -263,9 +254,9 @@ class _Flight:
             position = self.recorded.position
             columns.append(np.zeros((len(first), 3)) if position is None else position[first])
         state = np.concatenate(columns, axis=1)
-        if self.effects:
+        if self.dynamics.effects:
             self.enter(0)
-            for _ in range(2):
+            for _ in range(3):
                 self.derivative(0.0, state)
         return state
 
@@ -281,47 +272,29 @@ class _Flight:
         now = self.begin if share == 0.0 else self.middle if share == 0.5 else self.end
         rates = state[:, 0:3]
         rotation = rotation_from_quaternion(state[:, 3:7]) if self.attitude else None
-        wrench = (now["rotor_speed"] ** 2) @ self.matrix
-        moment = wrench[:, 1:4]
-        force = np.zeros((len(state), 3))
-        force[:, 2] = -wrench[:, 0]
-        if "force" in now:
-            force += now["force"]
-        if "moment" in now:
-            moment = moment + now["moment"]
-        if self.effects:
-            motion = self._motion(share, state, rotation, now)
-            for form, values in self.effects:
-                added = form.contribution(motion, self.vehicle, values)
-                if added.force is not None:
-                    force = force + added.force
-                if added.moment is not None:
-                    moment = moment + added.moment
+        around = self._surroundings(share, state, rotation, now) if self.dynamics.effects else {}
         out = np.empty_like(state)
-        out[:, 0:3] = self.last_acceleration = angular_acceleration(self.body, rates, moment)
-        self.last_specific_force = force / self.body.mass_kg
+        out[:, 0:3], specific_force = self.dynamics.accelerations(
+            rates, now["rotor_speed"], around, now.get("force"), now.get("moment")
+        )
         if self.attitude:
             out[:, 3:7] = quaternion_rate(state[:, 3:7], rates)
         if self.translation:
-            out[:, 7:10] = np.einsum("nij,nj->ni", rotation, self.last_specific_force)
-            out[:, 9] += self.body.gravity_m_s2
+            out[:, 7:10] = np.einsum("nij,nj->ni", rotation, specific_force)
+            out[:, 9] += self.dynamics.body.gravity_m_s2
             out[:, 10:13] = state[:, 7:10]
         return out
 
-    def _motion(self, share, state, rotation, now) -> Motion:
+    def _surroundings(self, share, state, rotation, now) -> dict[str, np.ndarray | None]:
         begin, end = self.step_time
         velocity = height = None
         if self.translation:
             velocity = np.einsum("nji,nj->ni", rotation, state[:, 7:10])
         if self.height_offset is not None:
             height = self.height_offset - state[:, 12]
-        return Motion(
+        return dict(
             time_s=begin + share * (end - begin),
-            rotor_speed=now["rotor_speed"],
             rotor_acceleration=now.get("rotor_acceleration"),
-            angular_velocity=state[:, 0:3],
-            angular_acceleration=self.last_acceleration,
-            specific_force=self.last_specific_force,
             rotation=rotation,
             velocity=velocity,
             wind=now.get("wind"),
