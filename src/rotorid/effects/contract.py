@@ -11,7 +11,7 @@ Frames: world north-east-down, body forward-right-down. All functions take n ins
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -150,6 +150,42 @@ FormsFor = Callable[[Vehicle], tuple[Form, ...]]
 
 
 @dataclass(frozen=True)
+class SpeedPath:
+    """What lies between command and rotor speed, at n even instants."""
+
+    speed: np.ndarray
+    """Speed so far along the path, (n, k), rad/s."""
+    time_s: np.ndarray
+    full_speed: float
+    """Upper limit of the rotor speed (or its largest command), rad/s; scales the parameters."""
+    voltage: np.ndarray | None = None
+    """Battery voltage, (n,), V."""
+    full_voltage: float | None = None
+    """Largest battery voltage of the set, V."""
+
+    @property
+    def dt_s(self) -> float:
+        return float(self.time_s[1] - self.time_s[0])
+
+
+@dataclass(frozen=True)
+class SpeedForm:
+    """One way in which rotor speed differs from its command; `apply(path, values)` gives the new speed (n, k).
+
+    `stage` orders the path: 0 static map, 1 supply, 2 limits, 3 delay, 4 lag. `neutral` are the parameter values
+    that change nothing.
+    """
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    stage: int
+    apply: Callable[[SpeedPath, np.ndarray], np.ndarray]
+    neutral: tuple[float, ...]
+    requires: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Effect:
     """One id of the catalogue."""
 
@@ -165,8 +201,8 @@ class Effect:
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
     kind: Literal["physics", "sensor"] = "physics"
-    lacking: dict[str, str] = field(default_factory=dict)
-    """Reason shown for a missing field, by field name; a default text otherwise."""
+    speed_forms: tuple[SpeedForm, ...] = ()
+    """Forms that act between command and rotor speed."""
 
 
 LACK = {
