@@ -19,8 +19,9 @@ from rotorid.effects.contract import Contribution, Form, Motion
 from rotorid.errors import InputError
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.improve import Model, improved_vehicle, model_of
-from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments
+from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import sensor_noise
+from rotorid.mismatch.shares import segments_of
 from rotorid.mismatch.speedpath import commanded_path
 from rotorid.mismatch.verdict import Channel, Errors, PValues, SplitErrors
 from rotorid.recordings import Vehicle
@@ -29,7 +30,6 @@ from rotorid.vehicle.windows import Inputs, States, simulate_windows
 WINDOW_S = 0.5
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
 STAGES = ("before", "refitted", "after")
-HIGHEST_CUTOFF_HZ = 20.0
 SAME = 1e-5
 """Relative difference above which a vehicle read back is not the model written (errors are stated to six digits)."""
 
@@ -105,11 +105,10 @@ def prove(analysis: Analysis, reloaded: Vehicle, forward: Forward) -> None:
 
 def _segments(analysis: Analysis) -> tuple[list[Segment], dict[str, float]]:
     """Stretches of flight that can be simulated, and the sensors' noise."""
-    recordings, vehicle = analysis.recordings, analysis.believed
-    rate_hz, cutoff = analysis_rate_hz(recordings.runs, vehicle, HIGHEST_CUTOFF_HZ)
-    segments = [s for run in recordings.runs for s in build_segments(run, vehicle, rate_hz, cutoff)]
-    usable = [s for s in segments if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None]
-    return usable, sensor_noise(recordings.runs, vehicle)
+    usable = [
+        s for s in segments_of(analysis) if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
+    ]
+    return usable, sensor_noise(analysis.recordings.runs, analysis.believed)
 
 
 def _missing(errors) -> list[str]:

@@ -3,9 +3,10 @@
 Three sources, in this order of trust:
 
 1. Findings that state their own windows (a gust, a saturated command) are taken as they are.
-2. What the findings explain, `before` minus `after`, carries almost no noise. An interval is where its local
-   size matters beside the channel's noise; it is kept if the energy of the residual `before` is above what the
-   coloured noise of `after` allows.
+2. What a finding adds to a channel carries almost no noise. An interval is where its local size matters beside
+   the channel's noise; it is kept if the energy of the residual `before` is above what the coloured noise of
+   `after` allows. Findings at work for most of the flight are listed only where nothing is confined in time:
+   their place is a regime, not a time.
 3. What the findings leave, `after`, is whitened and scanned over windows of 0.5 to 4 s for energy and for a mean
    other than zero. The threshold is Bonferroni's over every window of every channel of every run; the spread of
    both statistics is measured on the blocks of the residual themselves, so that colour that whitening left, or
@@ -23,6 +24,7 @@ from scipy.stats import chi2, f
 
 from rotorid.mismatch.findings import Analysis, Trace
 from rotorid.mismatch.regression import autoregression
+from rotorid.mismatch.shares import segments_of, shares
 from rotorid.mismatch.verdict import SMALLEST_P, Location, Regime, rms, with_status
 
 FAMILY_ERROR = 0.002
@@ -33,10 +35,13 @@ MATTERS = 0.3
 """Local size beside the channel's noise from which an explained mismatch matters at all."""
 ON_SHARE_OF_PEAK = 0.2
 ON_SHARE_OF_NOISE = 0.15
+LOST_AT_ENDS_S = 1.0
 SHORTEST_GAP_S = 0.25
 LONGEST_GAP_S = 2.0
 THROUGHOUT = 0.7
 """Covering more than this share of the flight counts as being there throughout."""
+CONFINED = 0.5
+"""Covering less than this share of the flight counts as acting in part of it."""
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
 LOUDER = 1.6
 """Energy of a window beside the usual, below which louder noise is not called a mismatch."""
@@ -63,11 +68,10 @@ class Interval:
 def locate(analysis: Analysis) -> list[Location]:
     """Locations of the mismatch, in the order of channels, runs and time; empty where there is none."""
     own = _stated(analysis)
-    known = {(loc.trace.channel) for loc in own}
     found = list(own)
     if with_status(analysis, "established", "ambiguous", "absorbed") or analysis.values:
         partial, throughout = _explained(analysis)
-        found += [i for i in partial if i.trace.channel not in known]
+        found += partial
         if not found:
             found += throughout
     found += _unexplained(analysis)
@@ -86,19 +90,26 @@ def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]
         signal = mismatch_of(i.trace, i.explained)
         total = float(np.nansum(signal**2))
         share = float(np.nansum(signal[i.start : i.stop] ** 2)) / total if total > 0 else 0.0
-        time_s = i.trace.time_s
         out.append(
             Location(
                 run=i.trace.run,
                 channel=i.trace.channel,
-                start_s=float(time_s[i.start]),
-                stop_s=float(time_s[i.stop - 1]),
+                start_s=_edge(analysis, i, i.start, 0),
+                stop_s=_edge(analysis, i, i.stop - 1, -1),
                 p_value=float(np.clip(i.p_value, SMALLEST_P, 1.0)),
                 energy_share=min(share, 1.0),
                 regime=regimes[key],
             )
         )
     return out
+
+
+def _edge(analysis: Analysis, interval: Interval, sample: int, end: int) -> float:
+    """Time of an interval's edge; at a trace's end that of the run, of which filtering cost a moment."""
+    time_s, run_s = interval.trace.time_s, analysis.recordings.run(interval.trace.run).time_s
+    if time_s[sample] == time_s[end] and abs(run_s[end] - time_s[end]) < LOST_AT_ENDS_S:
+        return float(run_s[end])
+    return float(time_s[sample])
 
 
 def mismatch_of(trace: Trace, explained: bool) -> np.ndarray:
@@ -147,30 +158,51 @@ def _stated(analysis: Analysis) -> list[Interval]:
 
 
 def _explained(analysis: Analysis) -> tuple[list[Interval], list[Interval]]:
-    """Intervals of effects in part of the flight, and whole runs of those throughout."""
+    """Intervals of what acts in part of the flight, and of what acts for most of it.
+
+    Each finding's own contribution says where it acts; where a channel has none (values refitted, what lies
+    between command and rotor speed), all that was taken away from the channel.
+    """
+    channels = _by_channel(analysis)
+    own = shares(analysis, segments_of(analysis))
+    parts = [(channel, series) for found in own.values() for channel, series in found.items() if channel in channels]
+    spoken_for = {channel for channel, _ in parts}
+    parts += [
+        (channel, [mismatch_of(t, True) for t in traces])
+        for channel, traces in channels.items()
+        if channel not in spoken_for
+    ]
     partial, throughout = [], []
-    for traces in _by_channel(analysis).values():
-        noise = channel_noise(traces)
-        levels = [_local_size(t) for t in traces]
-        peak = float(np.quantile(np.concatenate(levels), 0.99))
-        if not peak > MATTERS * noise:
-            continue
-        threshold = max(ON_SHARE_OF_PEAK * peak, ON_SHARE_OF_NOISE * noise)
-        masks = [_closed(level > threshold, _period(t)) for level, t in zip(levels, traces, strict=True)]
-        everywhere = np.concatenate(masks).mean() > THROUGHOUT
-        freedom = _freedom_per_sample(traces)
-        for trace, mask in zip(traces, masks, strict=True):
-            spans = [(0, len(mask))] if everywhere else _spans(mask)
-            for start, stop in spans:
-                p = _energy_p(trace.before[start:stop], noise, freedom)
-                if p < FAMILY_ERROR / max(len(spans) * len(analysis.traces), 1):
-                    (throughout if everywhere else partial).append(Interval(trace, start, stop, p, True))
+    for channel, series in parts:
+        here, confined = _where(channels[channel], series, len(analysis.traces))
+        (partial if confined else throughout).extend(here)
     return partial, throughout
 
 
-def _local_size(trace: Trace) -> np.ndarray:
-    """Local root mean square of what the findings explain, (n,)."""
-    return np.sqrt(_moving_mean(np.nan_to_num(mismatch_of(trace, True)) ** 2, LOCAL_S / _period(trace)))
+def _where(traces: Sequence[Trace], series: Sequence[np.ndarray], count: int) -> tuple[list[Interval], bool]:
+    """Intervals in which a contribution to a channel matters, and whether they are the smaller part of the flight."""
+    noise = channel_noise(traces)
+    levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
+    peak = float(np.quantile(np.concatenate(levels), 0.99))
+    if not peak > MATTERS * noise:
+        return [], True
+    threshold = max(ON_SHARE_OF_PEAK * peak, ON_SHARE_OF_NOISE * noise)
+    masks = [_closed(level > threshold, _period(t)) for level, t in zip(levels, traces, strict=True)]
+    share = float(np.concatenate(masks).mean())
+    freedom = _freedom_per_sample(traces)
+    found = []
+    for trace, mask in zip(traces, masks, strict=True):
+        spans = [(0, len(mask))] if share > THROUGHOUT else _spans(mask)
+        for start, stop in spans:
+            p = _energy_p(trace.before[start:stop], noise, freedom)
+            if p < FAMILY_ERROR / max(len(spans) * count, 1):
+                found.append(Interval(trace, start, stop, p, True))
+    return found, share < CONFINED
+
+
+def _local_size(values: np.ndarray, period_s: float) -> np.ndarray:
+    """Local root mean square, (n,)."""
+    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, LOCAL_S / period_s))
 
 
 def _moving_mean(values: np.ndarray, width: float) -> np.ndarray:
