@@ -142,14 +142,32 @@ def form_columns(form: Form, values, segment: Segment, vehicle: Vehicle, groups)
     return columns
 
 
-def value_columns(key: str, segment: Segment, vehicle: Vehicle, groups, model: dict[str, np.ndarray]):
+def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:
+    """J dΩ/dt + Ω × J Ω from the measured body rates, (n, 3), N m."""
+    inertia, rate = vehicle.inertia_kg_m2.matrix(), segment.motion.angular_velocity
+    return segment.motion.angular_acceleration @ inertia + np.cross(rate, rate @ inertia)
+
+
+def value_columns(
+    key: str,
+    segment: Segment,
+    vehicle: Vehicle,
+    groups,
+    model: dict[str, np.ndarray],
+    reverse: np.ndarray | None = None,
+):
     """Column of a relative change of one believed value, as channel contributions.
 
     Accelerations on the left side are replaced by what the current model predicts (`model`: force N and moment
-    N m, native rate), because a regression on a noisy derivative of the body rate would be biased.
+    N m, native rate), because a regression on a noisy derivative of the body rate would be biased. `reverse`
+    (the measured moment, (n, 3), N m) takes the predicted moments' place for a check from the other side.
     """
     motion = segment.motion
     force, arm, torque = baseline_wrench(motion, vehicle)
+    if reverse is not None:
+        arm = reverse * np.array([1.0, 1.0, 0.0])
+        torque = reverse * np.array([0.0, 0.0, 1.0])
+        model = {**model, "moment": reverse}
     out = {}
     if key == "thrust":
         out = {"force": force, "moment": arm}
@@ -210,6 +228,7 @@ class Thinner:
     """Low-pass and thinning, the same for everything."""
 
     def __init__(self, rate_hz: float, cutoff_hz: float):
+        self.cutoff_hz = cutoff_hz
         self.kernel = kernels.low_pass(rate_hz, cutoff_hz)
         self.step = max(1, int(np.floor(rate_hz / (2 * cutoff_hz) + 1e-9)))
         self.rate_hz = rate_hz / self.step
