@@ -21,7 +21,7 @@ from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.improve import Model, improved_vehicle, model_of
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import sensor_noise
-from rotorid.mismatch.shares import segments_of
+from rotorid.mismatch.shares import fitted_part, segments_of
 from rotorid.mismatch.speedpath import commanded_path
 from rotorid.mismatch.verdict import Channel, Errors, PValues, SplitErrors
 from rotorid.recordings import Vehicle
@@ -42,6 +42,16 @@ class Forward:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class WindowErrors:
+    """Lengths of the errors in the windows of one stretch, (windows, samples without the restart) by channel."""
+
+    run: str
+    start_s: np.ndarray
+    stop_s: np.ndarray
+    channels: dict[str, np.ndarray]
+
+
 def forward_channels(analysis: Analysis) -> Forward:
     """Errors of every channel that the recording allows, for the three models."""
     vehicle = analysis.recordings.vehicle
@@ -56,27 +66,27 @@ def forward_channels(analysis: Analysis) -> Forward:
         "refitted": Model(analysis.refitted),
         "after": model_of(improved_vehicle(analysis)),
     }
-    errors: dict[str, dict[str, dict[str, np.ndarray]]] = {}
+    errors: dict[str, list[WindowErrors]] = {}
     for stage, model in models.items():
         try:
-            errors[stage] = by_run(segments, model)
+            errors[stage] = errors_of(segments, model)
         except InputError as error:
             notes.append(f"Simulation run forward leaves out the effects found: {error}.")
-            errors[stage] = by_run(segments, replace(model, forms=(), chain=(), chain_values=()))
+            errors[stage] = errors_of(segments, replace(model, forms=(), chain=(), chain_values=()))
     floor = noise_floor(segments, models["refitted"], noise)
     notes += _missing(errors["before"])
-    channels = {}
+    channels, part = {}, fitted_part(analysis)
     for name in UNITS:
-        if not any(name in found for found in errors["before"].values()):
+        if not any(name in found.channels for found in errors["before"]):
             continue
 
-        def share(runs, name=name):
-            return Errors(**{stage: _rms(errors[stage], name, runs) for stage in STAGES})
+        def share(sign, name=name):
+            return Errors(**{stage: _rms(errors[stage], name, part, sign) for stage in STAGES})
 
         channels[name] = Channel(
             unit=UNITS[name],
             noise_floor=floor.get(name),
-            rmse=SplitErrors(training=share(analysis.split.training), held_out=share(analysis.split.held_out)),
+            rmse=SplitErrors(training=share(1), held_out=share(-1)),
             p_value=PValues(before=None, after=None),
         )
     return Forward(channels, tuple(notes))
@@ -88,13 +98,10 @@ def prove(analysis: Analysis, reloaded: Vehicle, forward: Forward) -> None:
     if not forward.channels or not segments or any("leaves out" in note for note in forward.notes):
         model_of(reloaded)
         return
-    errors = by_run(segments, model_of(reloaded))
+    errors, part = errors_of(segments, model_of(reloaded)), fitted_part(analysis)
     for name, channel in forward.channels.items():
-        for runs, stated in (
-            (analysis.split.training, channel.rmse.training.after),
-            (analysis.split.held_out, channel.rmse.held_out.after),
-        ):
-            found = _rms(errors, name, runs)
+        for sign, stated in ((1, channel.rmse.training.after), (-1, channel.rmse.held_out.after)):
+            found = _rms(errors, name, part, sign)
             if stated is None and found is None:
                 continue
             if found is None or stated is None or abs(found - stated) > SAME * abs(stated) + 1e-12:
@@ -111,25 +118,26 @@ def _segments(analysis: Analysis) -> tuple[list[Segment], dict[str, float]]:
     return usable, sensor_noise(analysis.recordings.runs, analysis.believed)
 
 
-def _missing(errors) -> list[str]:
-    names = {name for found in errors.values() for name in found}
+def _missing(errors: Sequence[WindowErrors]) -> list[str]:
+    names = {name for found in errors for name in found.channels}
     lacking = [name.replace("_", " ") for name in UNITS if name not in names]
     return [f"Not run forward for want of recorded columns: {', '.join(lacking)}."] if lacking else []
 
 
-def _rms(errors, name: str, runs: Sequence[str]) -> float | None:
-    parts = [errors[run][name] for run in runs if name in errors.get(run, {})]
-    values = np.concatenate([p.ravel() for p in parts]) if parts else np.zeros(0)
+def _rms(errors: Sequence[WindowErrors], name: str, part, sign: int) -> float | None:
+    """Error over the windows that lie wholly in the fitted (+1) or held-out (-1) part; None without any."""
+    kept = [
+        e.channels[name][(part(e.run, e.start_s) == sign) & (part(e.run, e.stop_s) == sign)]
+        for e in errors
+        if name in e.channels
+    ]
+    values = np.concatenate([k.ravel() for k in kept]) if kept else np.zeros(0)
     return float(np.sqrt(np.mean(values**2))) if len(values) else None
 
 
-def by_run(segments: Sequence[Segment], model: Model) -> dict[str, dict[str, np.ndarray]]:
-    """Lengths of the errors of every channel by run."""
-    found: dict[str, dict[str, list[np.ndarray]]] = {}
-    for segment, inputs, states in zip(segments, *_driven(segments, model), strict=True):
-        for name, values in window_errors(segment, model, inputs, states).items():
-            found.setdefault(segment.run, {}).setdefault(name, []).append(values)
-    return {run: {n: np.concatenate(p) for n, p in channels.items()} for run, channels in found.items()}
+def errors_of(segments: Sequence[Segment], model: Model) -> list[WindowErrors]:
+    """Errors of every stretch's windows."""
+    return [window_errors(*driven, model) for driven in zip(segments, *_driven(segments, model), strict=True)]
 
 
 def _driven(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], list[States]]:
@@ -194,11 +202,13 @@ def predict(segment: Segment, model: Model, inputs: Inputs, states: States):
     return simulate_windows(model.vehicle, quick, segment.motion.time_s, inputs, states, WINDOW_S)
 
 
-def window_errors(segment: Segment, model: Model, inputs: Inputs, states: States) -> dict[str, np.ndarray]:
-    """Length of the error of every channel, (windows, samples without the restart)."""
+def window_errors(segment: Segment, inputs: Inputs, states: States, model: Model) -> WindowErrors:
+    """Errors of the windows of one stretch."""
     windows = predict(segment, model, inputs, states)
     recorded = States(**{n: None if v is None else v[windows.sample] for n, v in vars(states).items()})
-    return {name: values[:, 1:] for name, values in _between(windows.predicted, recorded).items()}
+    channels = {name: values[:, 1:] for name, values in _between(windows.predicted, recorded).items()}
+    time_s = segment.motion.time_s[windows.sample]
+    return WindowErrors(segment.run, time_s[:, 0], time_s[:, -1], {n: v for n, v in channels.items() if v.size})
 
 
 def noise_floor(segments: Sequence[Segment], model: Model, noise: dict[str, float]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import SpeedForm
+from rotorid.effects.contract import Form, SpeedForm
 from rotorid.errors import InputError
 from rotorid.mismatch.findings import Analysis, Finding
 from rotorid.mismatch.verdict import one_per_class, with_status
@@ -31,17 +31,26 @@ class Model:
 def modelled(analysis: Analysis) -> list[Finding]:
     """Findings that the improved model holds: the established ones, and one of each class of alternatives."""
     found = with_status(analysis, "established") + one_per_class(with_status(analysis, "ambiguous"))
-    chosen = {id(f) for f in found if f.form is not None}
+    chosen = {id(f) for f in found if form_of(f) is not None}
     return [f for f in analysis.findings if id(f) in chosen]
+
+
+def form_of(finding: Finding) -> Form | SpeedForm | None:
+    """The form of a finding; one between command and rotor speed is known by its equation."""
+    if finding.form is not None or not finding.values or finding.id not in catalogue():
+        return finding.form
+    speed_forms = catalogue()[finding.id].speed_forms
+    return next((f for f in speed_forms if f.equation == finding.equation), None)
 
 
 def improved_vehicle(analysis: Analysis) -> Vehicle:
     """The vehicle with values re-estimated and an entry under `effects` for each finding of the model."""
     entries = []
     for finding in modelled(analysis):
-        symbols = [p.symbol for p in finding.form.parameters]
+        form = form_of(finding)
+        symbols = [p.symbol for p in form.parameters]
         values = dict(zip(symbols, map(float, finding.values), strict=True))
-        entries.append({"id": finding.id, "form": finding.form.name, "parameters": values})
+        entries.append({"id": finding.id, "form": form.name, "parameters": values})
     return analysis.improved.model_copy(update={"effects": tuple(entries)})
 
 

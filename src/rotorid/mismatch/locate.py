@@ -386,7 +386,8 @@ def regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | Non
 
         energies.append(blocks(np.nan_to_num(mismatch_of(trace, explained)) ** 2) / max(noise, 1e-300) ** 2)
         for name in names:
-            values.setdefault(name, []).append(blocks(analysis.regimes[trace.run][name]))
+            regimes = analysis.regimes[trace.run]
+            values.setdefault(name, []).append(blocks(np.interp(trace.time_s, regimes["time_s"], regimes[name])))
     if not energies:
         return None
     energy = np.concatenate(energies)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rotorid.effects.contract import Form
 from rotorid.mismatch.findings import Analysis, Finding
 from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments
+from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.rows import project
-from rotorid.mismatch.verdict import with_status
 
 HIGHEST_CUTOFF_HZ = 20.0
 GROUPS = ("force", "moment", "accelerometer", "gyroscope")
@@ -21,6 +23,20 @@ def segments_of(analysis: Analysis) -> list[Segment]:
     return [s for run in runs for s in build_segments(run, vehicle, rate_hz, cutoff_hz)]
 
 
+def fitted_part(analysis: Analysis) -> Callable[[str, np.ndarray], np.ndarray]:
+    """Function of a run and instants that gives +1 where fitted, -1 where held out, 0 in the gap between.
+
+    Whole runs where there are several; of a single run the stretches that the analysis chose.
+    """
+    rule = training_rule(analysis.split, segments_of(analysis))
+    code = {True: 1, False: -1, None: 0}
+
+    def part(run: str, time_s: np.ndarray) -> np.ndarray:
+        return np.array([code[rule(run, t)] for t in np.ravel(time_s)], int).reshape(np.shape(time_s))
+
+    return part
+
+
 def shares(analysis: Analysis, segments: list[Segment]) -> dict[int, dict[str, list[np.ndarray]]]:
     """Number of a finding to channel to its contribution on each of that channel's traces, in their order.
 
@@ -30,9 +46,9 @@ def shares(analysis: Analysis, segments: list[Segment]) -> dict[int, dict[str, l
     by_run: dict[str, list[Segment]] = {}
     for segment in segments:
         by_run.setdefault(segment.run, []).append(segment)
-    at_work = with_status(analysis, "established", "ambiguous")
     for number, finding in enumerate(analysis.findings):
-        if finding not in at_work or not isinstance(finding.form, Form) or finding.windows:
+        at_work = finding.status in ("established", "ambiguous")
+        if not at_work or finding.windows or not isinstance(finding.form, Form):
             continue
         series = {run: _series(finding, parts, analysis.improved) for run, parts in by_run.items()}
         for trace in analysis.traces:

@@ -16,7 +16,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from rotorid.mismatch.findings import Analysis, Finding
+from rotorid.mismatch.findings import Analysis, Finding, Trace
+from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.words import (
     capital,
     channel_words,
@@ -48,9 +49,9 @@ def _rounded(value: float | None) -> float | None:
 
 
 Number = Annotated[float | None, BeforeValidator(_rounded)]
-Probability = Annotated[float | None, BeforeValidator(_rounded), Field(ge=0, le=1)]
+Probability = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_rounded)]
 Share = Annotated[float, BeforeValidator(_rounded), Field(ge=0, le=1)]
-Magnitude = Annotated[float | None, BeforeValidator(_rounded), Field(ge=0)]
+Magnitude = Annotated[Annotated[float, Field(ge=0)] | None, BeforeValidator(_rounded)]
 Interval = tuple[Number, Number]
 
 
@@ -240,26 +241,28 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
 
 def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
     """Errors of every channel that the traces hold, by inverse dynamics."""
-    found = {}
+    found, part = {}, fitted_part(analysis)
     for channel in dict.fromkeys(t.channel for t in analysis.traces):
         traces = [t for t in analysis.traces if t.channel == channel]
         before, after = analysis.p_values.get(channel, (None, None))
+        masks = [part(t.run, t.time_s) for t in traces]
         found[channel] = Channel(
             unit=traces[0].unit,
             noise_floor=analysis.noise_floor.get(channel),
             rmse=SplitErrors(
-                training=_errors(traces, analysis.split.training),
-                held_out=_errors(traces, analysis.split.held_out),
+                training=_errors(traces, [m > 0 for m in masks]), held_out=_errors(traces, [m < 0 for m in masks])
             ),
             p_value=PValues(before=before, after=after),
         )
     return found
 
 
-def _errors(traces, runs) -> Errors:
-    chosen = [t for t in traces if t.run in runs]
+def _errors(traces: Sequence[Trace], masks: Sequence[np.ndarray]) -> Errors:
     return Errors(
-        **{stage: rms([getattr(t, stage) for t in chosen]) if chosen else None for stage in Errors.model_fields}
+        **{
+            stage: rms([getattr(t, stage)[mask] for t, mask in zip(traces, masks, strict=True)])
+            for stage in Errors.model_fields
+        }
     )
 
 

@@ -17,8 +17,10 @@ FORWARD_WORDS = {
 }
 REGIME_WORDS = {
     "airspeed_m_s": ("airspeed", "m/s"),
-    "vertical_speed_ratio": ("vertical speed over hover inflow", ""),
-    "height_ratio": ("height over rotor radius", ""),
+    "forward_speed_m_s": ("forward speed", "m/s"),
+    "sideward_speed_m_s": ("sideward speed", "m/s"),
+    "vertical_speed_over_hover_inflow": ("speed of descent over hover inflow", ""),
+    "height_over_rotor_radius": ("height over rotor radius", ""),
     "height_m": ("height", "m"),
     "rotor_speed_rad_s": ("mean rotor speed", "rad/s"),
     "rotor_acceleration_rad_s2": ("rate of the rotor speed", "rad/s²"),
