@@ -1,8 +1,9 @@
 """The general simulator: vehicles with motors, effects, disturbances, sensors and a controller, n at a time.
 
 Rigid body by quaternion inside, Euler angles outside. The controller and the disturbance are held over each
-step; the motion between is integrated by the classical Runge-Kutta method. For plain rigid bodies and known
-commands `rotorid.vehicle.fast` is far faster; a test holds that both fly the same.
+step; the motion between is integrated by the classical Runge-Kutta method: compiled where no effect is
+switched on, by array code that calls the effects' own functions otherwise. A test holds that both fly the
+same.
 """
 
 from __future__ import annotations

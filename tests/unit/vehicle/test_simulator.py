@@ -225,6 +225,25 @@ def test_compiled_flight_is_the_same_flight():
         np.testing.assert_allclose(states[v, :, 13:], trace.rotor_speed[0], rtol=1e-12)
 
 
+def test_compiled_steps_and_array_code_fly_the_same():
+    """An effect of size zero sends the same flight through the array code."""
+    vehicle = thesis_vehicle()
+    drag = catalogue()["rotor_drag"].forms(vehicle)[0]
+    zero = [(drag, np.zeros(len(drag.parameters)))]
+    how = dict(motors=Motors(0.04, 0.02), disturbance=Disturbance(0.1, 1e-3, 0.1))
+    controller = AttitudePid(vehicle, training_reference())
+    start = Start(euler_rad=np.array([[0.1, 0.05, 0.3]]), velocity_m_s=np.array([[1.0, 0, 0]]))
+
+    def flown(effects):
+        rng = np.random.default_rng(4)
+        return simulate(vehicle, controller, 0.5, 0.002, start, effects=effects, rng=rng, **how)
+
+    fast, slow = flown([]), flown(zero)
+    for name in ("position", "quaternion", "angular_velocity", "angular_acceleration", "specific_force"):
+        np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(fast.rotor_speed, slow.rotor_speed, rtol=1e-10)
+
+
 def test_vehicles_of_a_batch_do_not_touch_each_other():
     start = Start(
         position_m=np.zeros((2, 3)),
