@@ -9,10 +9,15 @@ configfile: "config.yaml"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/public.smk"
+include: "workflow/rules/check.smk"
+include: "workflow/rules/rotor.smk"
+include: "workflow/rules/neurobem.smk"
 include: "workflow/rules/report.smk"
 
 
 rule all:
+    """Everything: the report and all it needs."""
     default_target: True
     input:
         rules.report.input,

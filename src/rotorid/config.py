@@ -54,10 +54,32 @@ class Report(Section):
         return self
 
 
+class RotorSettings(Section):
+    """Thrust coefficients from stand runs."""
+
+    speed_noise_relative: float = Field(
+        ge=0, lt=0.2, description="One-sigma noise of a rotor-speed reading, as a share of it [1]."
+    )
+    outlying_above: float = Field(
+        gt=0, description="Modified z-score beyond which a motor is called outlying [1]."
+    )
+
+
+class Residuals(Section):
+    """Rigid-body residuals of the NeuroBEM flights."""
+
+    cutoff_hz: float = Field(gt=0, lt=190, description="Low-pass of both sides of the residual [Hz].")
+    airspeed_bin_m_s: float = Field(gt=0, description="Width of a bin of airspeed [m/s].")
+    block_s: float = Field(gt=0, description="Length of the blocks that the bootstrap draws [s].")
+    seed: int = Field(ge=0, description="Seed of the bootstrap [1].")
+
+
 class Config(Section):
     """The whole of `config.yaml`."""
 
     recordings: Text = Field(description="Folder that holds the recording sets, one folder each [path].")
+    rotor: RotorSettings = Field(description="Thrust coefficients from stand runs.")
+    residuals: Residuals = Field(description="Rigid-body residuals of the NeuroBEM flights.")
     report: Report = Field(description="The report.")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,9 @@ def render(path: str | Path, files: Mapping[str, str]) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(fix=fix, sci=sci, interval=interval, text=text, percent=percent)
+    environment.filters.update(
+        {form.__name__: _defined(form) for form in (fix, sci, interval, text, percent)}
+    )
     known: dict[str, Any] = {name: _read(Path(file)) for name, file in files.items()}
 
     def figure(name: str, caption: str, width: str = "100%") -> str:
@@ -78,6 +80,17 @@ def render(path: str | Path, files: Mapping[str, str]) -> str:
         if isinstance(error, ProseError):
             raise
         raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
+
+
+def _defined(form: Callable[..., str]) -> Callable[..., str]:
+    """`form`, but naming the value where it is undefined."""
+
+    def checked(value: Any, *rest: Any) -> str:
+        if isinstance(value, jinja2.Undefined):
+            str(value)  # raises Jinja2's own error, with the name
+        return form(value, *rest)
+
+    return checked
 
 
 def _line_of(error: BaseException) -> int | str:

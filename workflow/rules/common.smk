@@ -4,10 +4,11 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from rotorid import codehash
+from rotorid.codehash import Code
 from rotorid.config import ConfigError, check
 
 ROOT = Path(workflow.basedir)
+CODE = Code(ROOT)
 
 try:
     CONFIG = check(config)
@@ -18,7 +19,7 @@ except ConfigError as error:
 def code_of(script):
     """Hash of the code that a script (its name without .py) or a notebook (its path) runs."""
     path = script if script.endswith(".ipynb") else f"workflow/scripts/{script}.py"
-    return codehash.code_of(path, ROOT)
+    return CODE.of(path)
 
 
 def code_of_chapter(name):
