@@ -123,9 +123,7 @@ def _value(cell: str) -> float | str | None:
         return cell
 
 
-def table_of(
-    rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[Sequence[str]], label: str
-) -> str:
+def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[Sequence[str]], label: str) -> str:
     """A pandoc pipe table.
 
     Parameters
@@ -145,8 +143,7 @@ def table_of(
     rules = [":---" if form == "text" else "---:" for form in forms]
     lines = [_row(headings), _row(rules)]
     lines += [
-        _row([_formatted(row[column[0]], form) for column, form in zip(columns, forms, strict=True)])
-        for row in rows
+        _row([_formatted(row[column[0]], form) for column, form in zip(columns, forms, strict=True)]) for row in rows
     ]
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}}}\n"
 

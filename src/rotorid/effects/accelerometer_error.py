@@ -31,7 +31,7 @@ def all_errors(motion, vehicle, values):
 
 
 def forms(vehicle):
-    needs = ("specific_force",)
+    needs = ("accelerometer",)
     b = tuple(Parameter(f"b_{a}", "m/s2", -20.0, 20.0) for a in "xyz")
     s = tuple(Parameter(f"s_{a}", "1", -0.9, 2.0) for a in "xyz")
     t = tuple(Parameter(f"theta_{a}", "rad", -0.5, 0.5) for a in "xyz")

@@ -31,7 +31,7 @@ def forms(vehicle):
             text + ", a_m = a + dΩ × (−r_c) + Ω × (Ω × (−r_c))",
             plane,
             with_lever_arm,
-            ("rotor_speed", "angular_velocity", "angular_acceleration", "specific_force"),
+            ("rotor_speed", "angular_velocity", "angular_acceleration", "accelerometer"),
         ),
     )
 
@@ -43,5 +43,5 @@ EFFECT = Effect(
     forms=forms,
     source="physics.md F15",
     confusers=("unequal_rotors", "thrust_tilt"),
-    separating_manoeuvre="excite roll, pitch and yaw by doublets with rotor speeds recorded, or move the payload",
+    separating_manoeuvre="excite roll, pitch and yaw by doublets with rotor speeds recorded",
 )

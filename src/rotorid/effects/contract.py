@@ -1,9 +1,9 @@
 """What every effect of the catalogue states, and the flight data it is evaluated on.
 
-An effect is one physical, sensor or logging cause that the rigid-body baseline leaves out. It may have several
-forms that compete inside its id (drag at the hubs or at the centre of mass). A form is a function from the
-flight (`Motion`), the vehicle and parameter values to what it adds (`Contribution`); the contribution is linear
-in every parameter that is not marked `nonlinear`, which the selection relies on and a test holds.
+An effect is one physical, sensor or logging cause that the rigid-body baseline leaves out. It may have
+several forms that compete inside its id (drag at the hubs or at the centre of mass). A form is a function from
+the flight (`Motion`), the vehicle and parameter values to what it adds (`Contribution`); the contribution is
+linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds.
 
 Frames: world north-east-down, body forward-right-down. All functions take n instants at once.
 """
@@ -11,7 +11,7 @@ Frames: world north-east-down, body forward-right-down. All functions take n ins
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -36,7 +36,11 @@ class Motion:
     angular_acceleration: np.ndarray | None = None
     """Derivative of the body rates, (n, 3), rad/s2, body axes."""
     specific_force: np.ndarray | None = None
-    """Acceleration without gravity, (n, 3), m/s2, body axes."""
+    """Acceleration without gravity, (n, 3), m/s2, body axes: measured, else derived from velocity or position."""
+    accelerometer: np.ndarray | None = None
+    """The same as an accelerometer read it, None where none is recorded."""
+    gyroscope: np.ndarray | None = None
+    """Body rates as a gyroscope read them beside a recorded attitude, None where there is only one source."""
     rotation: np.ndarray | None = None
     """Rotation of body vectors into the world, (n, 3, 3)."""
     velocity: np.ndarray | None = None
@@ -92,14 +96,16 @@ class Contribution:
     """Error of the accelerometer's reading, m/s2."""
     angular_velocity: np.ndarray | None = None
     """Error of the gyroscope's reading, rad/s."""
+    angular_acceleration: np.ndarray | None = None
+    """Time derivative of that error, rad/s2 (stated apart: differentiating a noisy reading would bias it)."""
 
 
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of a form.
 
-    `low` and `high` are hard physical bounds (in the given unit, or in units of `scale(vehicle)` where that is
-    set). `nonlinear` parameters carry the starting values for their fit in `starts`.
+    `low` and `high` are hard physical bounds in the given unit. `nonlinear` parameters carry the starting
+    values for their fit in `starts`.
     """
 
     symbol: str
@@ -144,6 +150,42 @@ FormsFor = Callable[[Vehicle], tuple[Form, ...]]
 
 
 @dataclass(frozen=True)
+class SpeedPath:
+    """What lies between command and rotor speed, at n even instants."""
+
+    speed: np.ndarray
+    """Speed so far along the path, (n, k), rad/s."""
+    time_s: np.ndarray
+    full_speed: float
+    """Upper limit of the rotor speed (or its largest command), rad/s; scales the parameters."""
+    voltage: np.ndarray | None = None
+    """Battery voltage, (n,), V."""
+    full_voltage: float | None = None
+    """Largest battery voltage of the set, V."""
+
+    @property
+    def dt_s(self) -> float:
+        return float(self.time_s[1] - self.time_s[0])
+
+
+@dataclass(frozen=True)
+class SpeedForm:
+    """One way in which rotor speed differs from its command; `apply(path, values)` gives the new speed (n, k).
+
+    `stage` orders the path: 0 static map, 1 supply, 2 limits, 3 delay, 4 lag. `neutral` are the parameter values
+    that change nothing.
+    """
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    stage: int
+    apply: Callable[[SpeedPath, np.ndarray], np.ndarray]
+    neutral: tuple[float, ...]
+    requires: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Effect:
     """One id of the catalogue."""
 
@@ -159,8 +201,8 @@ class Effect:
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
     kind: Literal["physics", "sensor"] = "physics"
-    lacking: dict[str, str] = field(default_factory=dict)
-    """Reason shown for a missing field, by field name; a default text otherwise."""
+    speed_forms: tuple[SpeedForm, ...] = ()
+    """Forms that act between command and rotor speed."""
 
 
 LACK = {
@@ -171,7 +213,10 @@ LACK = {
     "angular_velocity": "no body rates or attitude recorded",
     "angular_acceleration": "no body rates or attitude recorded",
     "rotor_acceleration": "no rotor speeds recorded",
-    "specific_force": "no accelerometer recorded",
+    "specific_force": "no acceleration, velocity or position recorded",
+    "accelerometer": "no accelerometer recorded",
+    "gyroscope": "no gyroscope and attitude recorded together",
+    "rotor_speed": "no rotor speeds, commands or throttle recorded",
 }
 
 
@@ -190,6 +235,4 @@ def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | N
 
 def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
     """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
-    return Contribution(
-        force=forces.sum(axis=1), moment=np.cross(positions_m[None, :, :], forces).sum(axis=1)
-    )
+    return Contribution(force=forces.sum(axis=1), moment=np.cross(positions_m[None, :, :], forces).sum(axis=1))

@@ -12,18 +12,23 @@ def bias(motion, vehicle, values):
 
 def scale(motion, vehicle, values):
     """Ω_m = (1 + s) Ω per axis."""
-    return Contribution(angular_velocity=np.asarray(values) * motion.angular_velocity)
+    factor = np.asarray(values)
+    return Contribution(
+        angular_velocity=factor * motion.angular_velocity, angular_acceleration=factor * motion.angular_acceleration
+    )
 
 
 def misalignment(motion, vehicle, values):
     """Ω_m = Ω + θ × Ω."""
+    turn = np.asarray(values, float)[None, :]
     return Contribution(
-        angular_velocity=np.cross(np.asarray(values, float)[None, :], motion.angular_velocity)
+        angular_velocity=np.cross(turn, motion.angular_velocity),
+        angular_acceleration=np.cross(turn, motion.angular_acceleration),
     )
 
 
 def forms(vehicle):
-    needs = ("angular_velocity", "rotation")
+    needs = ("gyroscope", "rotation")
     return (
         Form("bias", "Ω_m = Ω + b", tuple(Parameter(f"b_{a}", "rad/s") for a in "xyz"), bias, needs),
         Form(

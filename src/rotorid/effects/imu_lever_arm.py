@@ -9,9 +9,7 @@ def lever_arm(motion, vehicle, values):
     """a_m = a + dΩ × r + Ω × (Ω × r), r beyond the believed position."""
     arm = np.asarray(values, float)[None, :]
     rate = motion.angular_velocity
-    return Contribution(
-        specific_force=np.cross(motion.angular_acceleration, arm) + np.cross(rate, np.cross(rate, arm))
-    )
+    return Contribution(specific_force=np.cross(motion.angular_acceleration, arm) + np.cross(rate, np.cross(rate, arm)))
 
 
 def forms(vehicle):
@@ -21,7 +19,7 @@ def forms(vehicle):
             "a_m = a + dΩ × r + Ω × (Ω × r)",
             tuple(Parameter(f"r_{a}", "m", -0.5, 0.5) for a in "xyz"),
             lever_arm,
-            ("specific_force", "angular_velocity", "angular_acceleration"),
+            ("accelerometer", "angular_velocity", "angular_acceleration"),
         ),
     )
 

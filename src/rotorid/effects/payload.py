@@ -32,9 +32,7 @@ def rigid(motion, vehicle, values):
     """F = -m_p a, M = -(m_p r) × a: added mass m_p at (x, y) carried along; a the specific force."""
     mass_kg, moment_x, moment_y = values
     lever = np.array([moment_x, moment_y, 0.0])
-    return Contribution(
-        force=-mass_kg * motion.specific_force, moment=-np.cross(lever, motion.specific_force)
-    )
+    return Contribution(force=-mass_kg * motion.specific_force, moment=-np.cross(lever, motion.specific_force))
 
 
 def forms(vehicle):

@@ -54,5 +54,5 @@ EFFECT = Effect(
     forms=forms,
     source="physics.md F16",
     confusers=("accelerometer_error", "steady_wind", "com_offset"),
-    separating_manoeuvre="record velocity or position beside the accelerometer while yawing through 360 degrees",
+    separating_manoeuvre="record position beside the accelerometer while yawing through 360 degrees",
 )

@@ -80,5 +80,5 @@ EFFECT = Effect(
     forms=forms,
     source="physics.md F17",
     confusers=("com_offset", "thrust_tilt"),
-    separating_manoeuvre="swap two propellers and fly the same hover, or excite roll, pitch and yaw by doublets",
+    separating_manoeuvre="swap two propellers and repeat the hover, or excite roll, pitch and yaw",
 )
