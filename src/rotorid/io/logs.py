@@ -125,8 +125,8 @@ def _instrument(path: Path, start: wire.StartRecord | None, session: Session | N
     name = start.instrument if start else session.instrument if session else None
     if name is None:
         raise LogError(
-            f"{path}: no start record in it and no {session_path(path).name} beside it, so nothing says which "
-            "instrument wrote it"
+            f"{path}: no start record in it and no {session_path(path).name} beside it, "
+            "so nothing says which instrument wrote it"
         )
     if name not in wire.INSTRUMENTS:
         raise LogError(f"{path}: unknown instrument {name!r}; known are {', '.join(wire.INSTRUMENTS)}")

@@ -9,7 +9,6 @@ kept gzipped (`.rlog.gz`); the reader takes both, and cut ones of both.
 
 from __future__ import annotations
 
-import json
 import struct
 import zlib
 from binascii import crc_hqx
@@ -54,11 +53,6 @@ def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
         chunk = CHUNK_HEAD.pack(tag, host_ns, len(part)) + part
         out += chunk + CHUNK_TAIL.pack(crc_hqx(chunk, 0xFFFF))
     return out
-
-
-def pack_note(host_ns: int, note: dict) -> bytes:
-    """A note of the recorder, as a chunk."""
-    return pack_chunk(NOTE, host_ns, json.dumps(note, separators=(",", ":")).encode())
 
 
 def read_raw(path: str | Path) -> RawLog:

@@ -130,7 +130,7 @@ class Session(_Model):
     baud_rate: int | None = None
     setup: Setup = Setup()
     procedure: dict[str, Any] = {}  # what the recorder was told to do
-    marks: dict[str, int] = {}  # sample number (place in the table) at which a step began or ended
+    marks: dict[str, int] = {}  # step: value of the table's column `index` at its first (or last) sample
     tare: dict[str, float] | None = None  # column: mean of the 25 tare samples
     promised_rate_hz: float | None = None
     measured_rate_hz: float | None = None  # samples over device time
