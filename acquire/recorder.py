@@ -123,6 +123,7 @@ class Recorder:
         self._sequence = 0
         self._bytes = 0
         self._samples = 0
+        self._consumed = 0
         self._port_losses = 0
         self._skipped = 0
         self._last_values: tuple[float, ...] = ()
@@ -213,8 +214,9 @@ class Recorder:
             f"({self._timings.tries} tries). Is it powered, and is this the right port?"
         )
 
-    def start(self, interval_s: float = 0.0) -> None:
-        """Start the stream; an interval of 0 leaves the choice to the instrument."""
+    def start(self, interval_s: float = 0.0, resumable: bool = True) -> None:
+        """Start the stream; an interval of 0 leaves the choice to the instrument. A stream that is not
+        `resumable` is void when the device restarts."""
         arguments = struct.pack("<I", round(interval_s * 1e6))
 
         def go() -> None:
@@ -222,7 +224,9 @@ class Recorder:
             self.begin_stream()
 
         go()
-        if self.resume is None:
+        if not resumable:
+            self.resume = None
+        elif self.resume is None:
             self.resume = go
 
     def begin_stream(self) -> None:
@@ -244,9 +248,11 @@ class Recorder:
 
         Samples known to be lost count as well, so that a recording does not grow longer by its losses.
         """
-        self.wanted = None if count is None else self.progress + count
-        while self.wanted is None or self.progress < self.wanted or self._rows:
+        self.wanted = None if count is None else self._consumed + count + self._tracker.missing
+        goal = self.wanted
+        while goal is None or self._consumed + self._tracker.missing < goal:
             if self._rows:
+                self._consumed += 1
                 yield self._rows.popleft()
             elif self.ended is not None:
                 return
@@ -254,7 +260,8 @@ class Recorder:
                 self.pump()
 
     def drop_rows(self) -> None:
-        """Forget samples that no one asked for; they are in the log."""
+        """Pass over samples that no one looks at now; they are in the log."""
+        self._consumed += len(self._rows)
         self._rows.clear()
 
     @property

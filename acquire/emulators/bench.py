@@ -7,13 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from acquire.emulators.load_cell import LoadCells
+from acquire.emulators.loads import AXES, put_down
 from acquire.emulators.oscillator import Oscillator
 from acquire.emulators.truth import BenchTruth, CellsTruth
-from acquire.geometry import GF_N, cell_response
-
-AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, -1.0])}
-LOAD_SPREAD = 1e-4  # weights are never put down twice in the same place: relative, and in gf
-LOAD_SPREAD_GF = 0.08
+from acquire.geometry import cell_response
 
 
 class BenchPhysics:
@@ -30,16 +27,15 @@ class BenchPhysics:
         self._time_s = 0.0
 
     def place_load(self, axis: str, load_gf: float) -> None:
-        """Put a weight on (or, with 0, take all off). Direction and place are never quite the same twice."""
-        load_gf *= 1 + LOAD_SPREAD * self._rng.standard_normal()
-        load_gf += LOAD_SPREAD_GF * self._rng.standard_normal() if load_gf else 0.0
+        """Put a weight on (or, with 0, take all off); the direction is never quite the same twice."""
+        load_n = put_down(load_gf, self._rng)
         direction = AXES[axis]
         slant = self._bench.misalignment_rad["xyz".index(axis)] * self._rng.standard_normal(3)
         direction = direction + np.cross(slant, direction)
-        self._load_n = load_gf * GF_N * direction / np.linalg.norm(direction)
+        self._load_n = load_n * direction / np.linalg.norm(direction)
 
     def drive(self, force: Callable[[float], np.ndarray]) -> None:
-        """A force on the body, N, shape (3,), as a function of the time from now on in s (a flying vehicle)."""
+        """A force on the body in N, shape (3,), as a function of the time from now on in s (rotors)."""
         begin = self._time_s
         self._drive = lambda time_s: force(time_s - begin)
 
@@ -74,9 +70,8 @@ class CellClamp:
 
     def place_load(self, axis: str, load_gf: float) -> None:
         """Put a weight on the cell's plate; the axis is the cell's own."""
-        load_gf *= 1 + LOAD_SPREAD * self._rng.standard_normal()
-        load_gf += LOAD_SPREAD_GF * self._rng.standard_normal() if load_gf else 0.0
-        self._load_n = np.array([load_gf * GF_N])
+        load_n = put_down(load_gf, self._rng)
+        self._load_n = np.array([load_n])
 
     def process(self, dt_s: float) -> None:
         """Advance by `dt_s`."""

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from acquire.emulators.loads import AXES, put_down
 from acquire.emulators.rotor import Rotors
 from acquire.emulators.sensor import SixAxis
 from acquire.emulators.truth import RotorTruth, SensorTruth, VehicleTruth
@@ -80,12 +81,7 @@ class LoadedSensor:
 
     def place_load(self, axis: str, load_gf: float) -> None:
         """A weight along +x, +y or, like thrust, −z."""
-        from acquire.emulators.bench import AXES, LOAD_SPREAD, LOAD_SPREAD_GF
-        from acquire.geometry import GF_N
-
-        load_gf *= 1 + LOAD_SPREAD * self._rng.standard_normal()
-        load_gf += LOAD_SPREAD_GF * self._rng.standard_normal() if load_gf else 0.0
-        self._load = np.concatenate([AXES[axis] * load_gf * GF_N, np.zeros(3)])
+        self._load = np.concatenate([AXES[axis] * put_down(load_gf, self._rng), np.zeros(3)])
 
     def drive(self, force) -> None:
         """A force on the body, N, shape (3,), as a function of the time from now on in s."""

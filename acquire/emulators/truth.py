@@ -152,7 +152,7 @@ def draw_truth(seed: int) -> Truth:
         return [float(f"{value:.4g}") for value in rng.uniform(low, high, count)]
 
     def signed(low: float, high: float, count: int) -> list[float]:
-        return [float(f"{v * s:.4g}") for v, s in zip(rng.uniform(low, high, count), _signs(rng, count))]
+        return [float(f"{value:.4g}") for value in rng.uniform(low, high, count) * _signs(rng, count)]
 
     compliance = spread(0.0040, 0.0050, 1)[0]
     turn = spread(0.0020, 0.0030, 1)[0]
@@ -212,7 +212,9 @@ def draw_truth(seed: int) -> Truth:
             resonance_hz=60.0,
         ),
         specimen_scatter=0.012,
-        clocks=ClockTruth(**{n: v * 1e-6 for n, v in zip(ClockTruth.model_fields, signed(30, 120, 6))}),
+        clocks=ClockTruth(
+            **dict(zip(ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))
+        ),
     )
 
 
@@ -221,7 +223,8 @@ def _signs(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def _crosstalk(rng: np.random.Generator) -> list[list[float]]:
-    """Identity plus up to 1.5 % between forces and between moments, and up to 1.5e-3 m or 1/m across.
+    """Identity plus up to 1.5 % between forces and between moments, and, across, up to 0.3 N per N m and
+    8e-4 N m per N.
 
     The moment about z is left clean of the others, since table 4.1's torque coefficient is measured by it.
     """
