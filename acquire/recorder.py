@@ -506,7 +506,8 @@ class Recorder:
             host_s = (self._latest_host_ns - self._first_host_ns) / 1e9
             session.measured_rate_hz = round(rate, 6)
             session.duration_s = round(device_s + self._restart_device_s, 6)
-            if host_s > 1:
+            # bytes come up to one read late, so a short recording says little about the clock
+            if host_s > 4 * self._timings.poll_s / RATE_TOLERANCE:
                 session.device_clock_ratio = round(device_s / host_s, 6)
         session.warnings = list(_warnings(session))
         with open(self.log_path, "rb") as log:
