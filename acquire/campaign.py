@@ -344,7 +344,8 @@ class TorqueRig:
     def __init__(self, campaign: Campaign, battery: Battery, rng: np.random.Generator) -> None:
         truth = campaign.truth
         self.rotors = Rotors(truth.rotor, battery, 4)
-        self.stand = StandPhysics(truth.vehicle, truth.rotor, truth.wrench, self.rotors, 0.0, 0.0, rng)
+        level = truth.wrench.model_copy(update={"tilt_rad": [0.0, 0.0]})  # a fixture of its own, levelled
+        self.stand = StandPhysics(truth.vehicle, truth.rotor, level, self.rotors, 0.0, 0.0, rng)
         self.tester = TesterPhysics(self.rotors, truth.rotor, truth.tester, rng, loaded=False)
 
     def process(self, dt_s: float) -> None:

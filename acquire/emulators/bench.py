@@ -20,6 +20,7 @@ class BenchPhysics:
         self._rng = rng
         self._bench = bench
         self._cells = LoadCells(cells, rng)
+        self._compliance = np.array(bench.compliance_1_n)
         self._structure = Oscillator(3, bench.resonance_hz, bench.damping)
         self._to_cells = cell_response() * np.array([1.0, 1.0, -1.0])  # for forces along +x, +y, +z
         self._load_n = np.zeros(3)
@@ -29,6 +30,8 @@ class BenchPhysics:
     def place_load(self, axis: str, load_gf: float) -> None:
         """Put a weight on (or, with 0, take all off); the direction is never quite the same twice."""
         load_n = put_down(load_gf, self._rng)
+        if axis != "z":
+            load_n *= 1 - self._bench.pulley_loss * self._rng.random()
         direction = AXES[axis]
         slant = self._bench.misalignment_rad["xyz".index(axis)] * self._rng.standard_normal(3)
         direction = direction + np.cross(slant, direction)
@@ -54,7 +57,7 @@ class BenchPhysics:
         """The force as the cells feel it once the structure has given way: larger, and turned."""
         size = float(np.sqrt(force_n @ force_n))
         turned = force_n + self._bench.turn_rad_n * size * np.cross(np.array([0.6, 0.8, 0.0]), force_n)
-        return turned * (1 + self._bench.compliance_1_n * size)
+        return turned * (1 + self._compliance @ np.abs(force_n))
 
 
 class CellClamp:

@@ -39,11 +39,12 @@ class CellsTruth(_Truth):
 class BenchTruth(_Truth):
     """The structure around the cells, for one material."""
 
-    compliance_1_n: float = 0.0  # relative growth of the reading per newton
+    compliance_1_n: list[float] = [0.0] * 3  # relative growth of the reading per newton, loads along x, y, z
     turn_rad_n: float = 0.0  # by how much the load's direction turns per newton
     resonance_hz: float = 40.0
     damping: float = 0.05
     misalignment_rad: list[float] = [0.0, 0.0, 0.0]  # spread of the load's direction, loads along x, y, z
+    pulley_loss: float = 0.0  # loads along x and y hang over a pulley that takes up to this share of them
 
 
 class BatteryTruth(_Truth):
@@ -99,7 +100,7 @@ class SensorTruth(_Truth):
     vibration: list[float] = [0.0] * 6  # further noise at 1000 rad/s, growing with the speed squared
     drift_per_s: list[float] = [0.0] * 6
     position_error_m: list[float] = [0.0, 0.0, 0.0]
-    tilt_rad: list[float] = [0.0, 0.0]  # the sensor is not quite level: roll, pitch
+    tilt_rad: list[float] = [0.0, 0.0]  # on the stand the sensor is not quite level: roll, pitch
     resonance_hz: float = 30.0
     damping: float = 0.05
 
@@ -154,34 +155,36 @@ def draw_truth(seed: int) -> Truth:
     def signed(low: float, high: float, count: int) -> list[float]:
         return [float(f"{value:.4g}") for value in rng.uniform(low, high, count) * _signs(rng, count)]
 
-    compliance = spread(0.0040, 0.0050, 1)[0]
-    turn = spread(0.0020, 0.0030, 1)[0]
+    vertical, *lateral = spread(0.0028, 0.0034, 1) + spread(0.06, 0.09, 2)  # the long tube bends sideways
+    turn = spread(0.0010, 0.0014, 1)[0]
     stiffer = 1.9482 / 68.9  # table 2.4: the moduli of PLA and aluminium
     return Truth(
         cells=CellsTruth(
             zero_v=signed(2e-5, 2e-4, 6),
-            drift_v_s=signed(1e-9, 4e-9, 6),
-            wander_v_sqrt_s=4e-9,
+            drift_v_s=signed(3e-10, 1e-9, 6),
+            wander_v_sqrt_s=2e-9,
             creep_share=spread(3e-4, 9e-4, 6),
             creep_s=spread(60, 240, 6),
-            backlash_n=spread(2e-4, 5e-4, 6),
+            backlash_n=spread(5e-5, 2e-4, 6),
             overload_loss=spread(0.05, 0.12, 1)[0],
             noise_v=6e-8,
         ),
         bench={
             "al": BenchTruth(
-                compliance_1_n=compliance * stiffer,
-                turn_rad_n=turn * stiffer,
+                compliance_1_n=[round(c * stiffer, 7) for c in (*lateral, vertical)],
+                turn_rad_n=round(turn * stiffer, 8),
                 resonance_hz=spread(30, 38, 1)[0],
                 damping=0.04,
-                misalignment_rad=[0.010, 0.014, 0.003],
+                misalignment_rad=[0.010, 0.014, 0.0008],
+                pulley_loss=0.008,
             ),
             "pla": BenchTruth(
-                compliance_1_n=compliance,
+                compliance_1_n=[*lateral, vertical],
                 turn_rad_n=turn,
                 resonance_hz=spread(9, 12, 1)[0],
                 damping=0.06,
-                misalignment_rad=[0.010, 0.014, 0.003],
+                misalignment_rad=[0.010, 0.014, 0.0008],
+                pulley_loss=0.008,
             ),
         },
         rotor=RotorTruth(
