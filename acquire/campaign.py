@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import csv
 import gzip
 import math
 import shutil
@@ -43,6 +42,7 @@ from acquire.recorder import Recorder, Timings
 from acquire.transport import LoopbackTransport
 from acquire.weights import COMBINATIONS, weight_gf
 from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.index import write_index
 from rotorid.io.session import Air, Session, Setup, session_path, write_session
 from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 
@@ -54,10 +54,6 @@ PROPELLER = "5040 three-blade"
 FIRST_DAY = datetime(2024, 3, 4, 9, 0, tzinfo=timezone(timedelta(hours=-6)))
 TESTS_PER_BATTERY = 6
 RADIO_FAULTS = 2e-4  # share of frames that each kind of fault befalls on the Bluetooth line
-INDEX_COLUMNS = (
-    "id group kind instrument platform axis load_gf cell experiment mount_roll_deg mount_pitch_deg throttle "
-    "infill_percent specimen repeat started source ended samples missing file metadata"
-).split()
 
 
 @dataclass
@@ -68,7 +64,7 @@ class Campaign:
     truth: Truth
     seed: int
     date: datetime = FIRST_DAY
-    index: list[dict] = field(default_factory=list)
+    recordings: list[Session] = field(default_factory=list)
 
     def rng(self, name: str) -> np.random.Generator:
         """Random numbers of one session, whatever comes before it."""
@@ -128,7 +124,7 @@ class Campaign:
         _within(recorders, run)
         for recorder in recorders:
             pack(recorder.log_path, recorder.session)
-            self.index.append(_row(recorder.session, recorder.log_path, self.raw))
+            self.recordings.append(recorder.session)
         self.date += timedelta(seconds=round(clock.now_ns() / 1e9 + pause_s))
 
 
@@ -151,23 +147,6 @@ def pack(log: Path, session: Session) -> Path:
     session.log = packed.name
     write_session(session, session_path(packed))
     return packed
-
-
-def _row(session: Session, log: Path, raw: Path) -> dict:
-    setup = session.setup
-    file = log.with_name(session.log).relative_to(raw)
-    values = {
-        **{name: getattr(setup, name) for name in INDEX_COLUMNS if hasattr(setup, name)},
-        **{
-            name: getattr(session, name)
-            for name in ("id", "group", "instrument", "started", "source", "ended")
-        },
-        "samples": session.counts.samples,
-        "missing": session.counts.missing,
-        "file": file.as_posix(),
-        "metadata": session_path(file).as_posix(),
-    }
-    return {name: "" if values.get(name) is None else values[name] for name in INDEX_COLUMNS}
 
 
 def _operator(place: Callable[[float], None], load_gf: float, reaction_samples: int) -> procedures.Prompt:
@@ -474,24 +453,20 @@ def run_campaign(
     parts: Iterable[str] = PARTS,
     truth: Truth | None = None,
     say: Callable[[str], None] = print,
-) -> list[dict]:
-    """Record all parts into `raw/campaign` (written anew), the index, and the sealed truth. Returns the
-    index. The sealed file must lie outside `raw`; raises ValueError otherwise."""
+) -> list[Session]:
+    """Record all parts into `raw/campaign` (written anew), the index, and the sealed truth. Returns
+    the recordings. The sealed file must lie outside `raw`; raises ValueError otherwise."""
     if sealed.resolve().is_relative_to(raw.resolve()):
         raise ValueError(f"{sealed}: the truth must lie outside {raw}, or it is not concealed")
     campaign = Campaign(raw, truth or draw_truth(seed), seed)
     shutil.rmtree(raw / "campaign", ignore_errors=True)
     for name in parts:
         PARTS[name](campaign)
-        say(f"{name}: {sum(row['kind'] == name for row in campaign.index)} recordings")
+        say(f"{name}: {sum(s.setup.kind == name for s in campaign.recordings)} recordings")
         campaign.date = datetime.combine(campaign.date.date() + timedelta(days=1), FIRST_DAY.timetz())
-    raw.mkdir(parents=True, exist_ok=True)
-    with open(raw / "sessions.tsv", "w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, INDEX_COLUMNS, delimiter="\t", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(campaign.index)
+    write_index(raw)
     write_truth(campaign.truth, sealed, seed)
-    return campaign.index
+    return campaign.recordings
 
 
 def main() -> None:
@@ -504,9 +479,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--part", action="append", choices=list(PARTS), help="only this part; repeatable")
     given = parser.parse_args()
-    index = run_campaign(given.raw, given.sealed, given.seed, given.part or PARTS)
+    recordings = run_campaign(given.raw, given.sealed, given.seed, given.part or PARTS)
     size = sum(file.stat().st_size for file in (given.raw / "campaign").rglob("*") if file.is_file())
-    print(f"{len(index)} recordings, {size / 1e6:.1f} MB in {given.raw}/campaign; truth in {given.sealed}")
+    print(
+        f"{len(recordings)} recordings, {size / 1e6:.1f} MB in {given.raw}/campaign; truth in {given.sealed}"
+    )
 
 
 if __name__ == "__main__":

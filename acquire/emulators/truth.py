@@ -203,7 +203,7 @@ def draw_truth(seed: int) -> Truth:
             crosstalk=_crosstalk(rng),
             noise=[0.06, 0.06, 0.08, 0.0007, 0.0007, 0.0006],
             vibration=[0.05, 0.05, 0.08, 0.0015, 0.0015, 0.0008],
-            drift_per_s=signed(2e-4, 8e-4, 3) + signed(2e-6, 6e-6, 3),
+            drift_per_s=signed(2e-4, 8e-4, 3) + signed(5e-7, 1.5e-6, 3),
             position_error_m=signed(0.001, 0.003, 3),
             tilt_rad=signed(0.005, 0.015, 2),
             resonance_hz=spread(24, 32, 1)[0],

@@ -167,6 +167,13 @@ class World:
         self.physics = physics
         self.lines = lines
         self.now_s = 0.0
+        self._plans: list[tuple[float, str, float]] = []
+        self._waiting: list[tuple[float, str, float]] = []
+        self._streaming_since: float | None = None
+
+    def plan(self, time_s: float, axis: str, load_gf: float) -> None:
+        """Put a weight on, `time_s` after the stream has begun (for an emulator that runs by itself)."""
+        self._plans = sorted([*self._plans, (time_s, axis, load_gf)])
 
     def run_until(self, time_s: float) -> None:
         """Advance to a true time in s, taking every sample that falls due."""
@@ -189,3 +196,16 @@ class World:
                 line.advance(time_s)
             self.physics.process(step_s)
             self.now_s = time_s
+            if self._plans:
+                self._carry_out()
+
+    def _carry_out(self) -> None:
+        if not any(line.device.streaming for line in self.lines):
+            self._streaming_since = None
+            return
+        if self._streaming_since is None:  # a new recording: whatever lay on the bench is taken off
+            self._streaming_since = self.now_s
+            self._waiting = list(self._plans)
+            self.physics.place_load("z", 0.0)
+        while self._waiting and self.now_s - self._streaming_since >= self._waiting[0][0]:
+            self.physics.place_load(*self._waiting.pop(0)[1:])
