@@ -376,7 +376,8 @@ class Recorder:
         except PortLost as error:
             self._reconnect(error)
 
-    def _identify(self) -> None:
+    def _ask_identity(self) -> bool:
+        """Ask the device who it is; whether it answered. Its start record also tells a restart."""
         self.identity = None
         for _ in range(self._timings.tries):
             self._send(IDENTIFY, b"")
@@ -384,8 +385,11 @@ class Recorder:
             while self.identity is None and self._clock.now_ns() < deadline:
                 self._pump()
             if self.identity is not None:
-                break
-        else:
+                return True
+        return False
+
+    def _identify(self) -> None:
+        if not self._ask_identity():
             raise DeviceSilent(
                 f"{self._transport.name} is open but nothing on it answers like a {self.instrument.title}. "
                 "Is it powered, is this the right port, is the baud rate right "
@@ -403,35 +407,32 @@ class Recorder:
         write_session(self.session, self.session_path)
 
     def _after_restart(self) -> None:
-        self._restarted = False
+        """Bring a device that restarted, or whose port was gone, back to streaming."""
         if self.resume is None:
             raise DeviceReset(
                 f"the {self.instrument.title} restarted in the middle of the run, which is void. "
                 "Check its supply and plug, then record again; what came before is in the log."
             )
-        self._say(f"the {self.instrument.title} restarted; going on")
-        self.resume()
-
-    def _after_silence(self) -> None:
-        self._event("silence", f"nothing for {self._timings.silence_s:g} s")
-        identity, self.identity = self.identity, None
-        self._send(IDENTIFY, b"")
-        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-        while self.identity is None and self._clock.now_ns() < deadline:
-            self._pump()
-        if self.identity is None:
-            self.identity = identity
+        # its start record has to come before its samples, or these look like old ones
+        if not self._ask_identity():
             self._streaming = False
             raise DeviceSilent(
                 f"the {self.instrument.title} on {self._transport.name} has gone silent. "
                 "Check its power and cable, then record again; what came before is in the log."
             )
+        self._restarted = False
+        self._say(f"telling the {self.instrument.title} to go on")
+        self.resume()
+
+    def _after_silence(self) -> None:
+        self._event("silence", f"nothing for {self._timings.silence_s:g} s")
         self._after_restart()
 
     def _reconnect(self, error: PortLost) -> None:
         """Wait for a port that went away. Raises PortLost when it does not come back."""
         self._port_losses += 1
         self._event("port_lost", str(error))
+        self._decoder.break_off()
         if self._closing:
             raise error
         self._say(f"{self._transport.name} went away; waiting up to {self._timings.reconnect_s:g} s for it")

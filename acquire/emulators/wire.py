@@ -150,7 +150,7 @@ class WireHalf:
         return frame
 
     def _emit(self, data: bytes) -> None:
-        if self._faults.silent_from is not None and self.line.count >= self._faults.silent_from:
+        if self._faults.silent_from is not None and self.line.count > self._faults.silent_from:
             return
         arrival_s = self._now_s
         if self._burst_s:

@@ -126,3 +126,8 @@ class StreamDecoder:
                 self.lost_bytes += len(block)
         self.frames += len(found)
         return found
+
+    def break_off(self) -> None:
+        """The line was cut: what was begun will not be ended by what comes later."""
+        self.lost_bytes += len(self.pending)
+        self.pending = b""

@@ -77,7 +77,10 @@ def read_log(path: str | Path) -> Log:
     for chunk in raw.chunks:
         host_ns = chunk.host_ns - origin_ns
         if chunk.tag == rawlog.NOTE:
-            notes.append((host_ns / 1e9, json.loads(chunk.data)))
+            note = json.loads(chunk.data)
+            notes.append((host_ns / 1e9, note))
+            if note.get("note") == "port_lost":
+                decoder.break_off()
         if chunk.tag != rawlog.RECEIVED:
             continue
         for frame in decoder.feed(chunk.data):

@@ -69,7 +69,7 @@ class Tracker:
         self._clock = 0
         self._kind = START
         self._rollovers = 0
-        self._after_reset = False
+        self._flags = Quality.GOOD  # for the next sample
 
     @property
     def missing(self) -> int:
@@ -102,35 +102,35 @@ class Tracker:
                 self._begin_segment(UNKNOWN_BOOT)
                 return self._first(frame)
             return self._old(index, clock)
-        flags = Quality.GOOD
         if step > 1:
             self.gaps.append(Gap(self.segment, self._index + 1, step - 1, self._clock / 1e6, clock / 1e6))
-            flags |= Quality.AFTER_GAP
+            self._flags |= Quality.AFTER_GAP
         self._index, self._clock, self._kind = index, clock, frame.kind
-        return Placed(self.segment, index, clock, flags | self._reset_flag(frame))
+        return Placed(self.segment, index, clock, self._take_flags(frame))
 
     def _first(self, frame: Frame) -> Placed:
         if self.segment < 0:
             self.segment = 0
         self._index, self._clock, self._kind = frame.sequence, frame.clock_us, frame.kind
-        return Placed(self.segment, self._index, self._clock, self._reset_flag(frame))
+        return Placed(self.segment, self._index, self._clock, self._take_flags(frame))
 
     def _begin_segment(self, boot_id: int) -> None:
         # frames may come before the first start record: they belong to the boot it names
         if self.boot_id is not None:
             self.resets += 1
             self._rollovers = self.rollovers
-            self._after_reset = True
+            self._flags = Quality.AFTER_RESET
             self.segment += 1
             self._index = None
             self._clock = 0
         self.boot_id = boot_id
 
-    def _reset_flag(self, frame: Frame) -> Quality:
-        if self._after_reset and frame.kind != START:
-            self._after_reset = False
-            return Quality.AFTER_RESET
-        return Quality.GOOD
+    def _take_flags(self, frame: Frame) -> Quality:
+        """Gaps and resets are told by the next sample, whatever frames come between."""
+        if frame.kind != DATA:
+            return Quality.GOOD
+        flags, self._flags = self._flags, Quality.GOOD
+        return flags
 
     def _whole_periods(self, step: int, ticks: int) -> int:
         """Multiples of 65,536 frames that the clock says have passed unseen."""
