@@ -184,5 +184,6 @@ class EmulatedPorts:
         elif i in self._away_until and time.monotonic() >= self._away_until[i]:
             del self._away_until[i]
             line.unplugged = False
+            line.cut()
             line.power_up()
             terminal.plug()

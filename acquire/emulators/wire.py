@@ -65,6 +65,10 @@ class WireHalf:
         """Whether something happens by itself as time passes."""
         return self.due_s is not None or bool(self._out) or self.unplugged
 
+    def falls_due(self, time_s: float) -> bool:
+        """Whether a sample is to be taken up to this time; a device without a cable has no power."""
+        return self.due_s is not None and self.due_s <= time_s and not self.unplugged
+
     # ---- time ----------------------------------------------------------------------------------------
 
     def advance(self, now_s: float) -> None:
@@ -178,15 +182,13 @@ class World:
     def run_until(self, time_s: float) -> None:
         """Advance to a true time in s, taking every sample that falls due."""
         while True:
-            due = [line for line in self.lines if line.due_s is not None and line.due_s <= time_s]
+            due = [line for line in self.lines if line.falls_due(time_s)]
             if not due:
                 break
             line = min(due, key=lambda line: line.due_s)
             self._advance(line.due_s)
             if line.due_s is not None:
                 line.sample()
-            if line.unplugged:
-                return
         self._advance(time_s)
 
     def _advance(self, time_s: float) -> None:
