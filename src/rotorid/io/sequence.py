@@ -96,11 +96,11 @@ class Tracker:
         ticks = _signed(frame.clock_us - self._clock, CLOCK_PERIOD_US)
         if frame.kind == DATA == self._kind:  # between other frames the device may have idled for hours
             step += self._whole_periods(step, ticks)
-        index, clock = self._index + step, self._clock + ticks
-        if step <= 0:
             if self._contradicts(step, ticks):
                 self._begin_segment(UNKNOWN_BOOT)
                 return self._first(frame)
+        index, clock = self._index + step, self._clock + ticks
+        if step <= 0:
             return self._old(index, clock)
         if step > 1:
             self.gaps.append(Gap(self.segment, self._index + 1, step - 1, self._clock / 1e6, clock / 1e6))
@@ -139,10 +139,10 @@ class Tracker:
         return round((ticks / self.interval_us - step) / SEQUENCE_PERIOD) * SEQUENCE_PERIOD
 
     def _contradicts(self, step: int, ticks: int) -> bool:
-        """Whether a step back in the sequence goes with a clock that no late or repeated frame has."""
-        if not self.interval_us:
+        """Whether a step back, or over periods unseen, goes with a clock that does not fit it: a reset."""
+        if not self.interval_us or 0 < step < SEQUENCE_PERIOD // 2:
             return False
-        return abs(ticks - step * self.interval_us) > 1_000_000 + 50 * self.interval_us
+        return abs(ticks - step * self.interval_us) > max(1_000_000, ticks // 100) + 50 * self.interval_us
 
     def _old(self, index: int, clock: int) -> Placed | None:
         for i, gap in enumerate(self.gaps):
