@@ -79,9 +79,7 @@ class Readings:
     rate_hz: float
 
     @classmethod
-    def at_hover(
-        cls, vehicle: Vehicle, rates_rad_s: float, speed_relative: float, rate_hz: float
-    ) -> Readings:
+    def at_hover(cls, vehicle: Vehicle, rates_rad_s: float, speed_relative: float, rate_hz: float) -> Readings:
         """Noise of the moments from relative noise of each rotor's speed, all rotors at hover."""
         matrix = wrench_matrix(vehicle)
         square = allocation_matrix(vehicle) @ [vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0]

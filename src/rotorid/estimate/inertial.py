@@ -66,9 +66,7 @@ def fit_masked_network(
     return train(network, regressors(rates, moments), accelerations, training)
 
 
-def fit_least_squares(
-    rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, block: int = 50
-) -> WeightFit:
+def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, block: int = 50) -> WeightFit:
     """The weights where the network would end, with a covariance that holds for residuals correlated in time.
 
     Scores are summed over blocks of `block` samples (cluster-robust), so that correlation shorter than a

@@ -27,9 +27,7 @@ class RateWindows:
     dt_s: float
 
 
-def cut_windows(
-    rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0
-) -> RateWindows:
+def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0) -> RateWindows:
     """Consecutive windows of an evenly sampled flight (n, 3); windows with missing samples are left out."""
     length = int(round(window_s / dt_s)) + 1
     first = np.arange(start, len(rates) - length + 1, length - 1)
@@ -138,9 +136,7 @@ class OutputErrorFit:
     @property
     def inertia_intervals_95(self) -> np.ndarray:
         """(3, 2), kg m2."""
-        half = student_t.ppf(0.975, max(self.windows - len(self.parameters), 1)) * np.sqrt(
-            np.diag(self.covariance)[:3]
-        )
+        half = student_t.ppf(0.975, max(self.windows - len(self.parameters), 1)) * np.sqrt(np.diag(self.covariance)[:3])
         return np.exp(self.parameters[:3, None] + half[:, None] * np.array([-1.0, 1.0]))
 
 

@@ -121,9 +121,7 @@ def _store(path: Path, epoch: int, weights, biases, history) -> None:
 
 def _restore(path: Path, weights, biases, history) -> int:
     with np.load(path) as held:
-        names = [f"w{i}" for i in range(len(weights))] + [
-            f"b{i}" for i, b in enumerate(biases) if b is not None
-        ]
+        names = [f"w{i}" for i in range(len(weights))] + [f"b{i}" for i, b in enumerate(biases) if b is not None]
         mine = [*weights, *(b for b in biases if b is not None)]
         if set(names) | {"epoch", "history"} != set(held.files) or any(
             held[n].shape != m.shape for n, m in zip(names, mine, strict=True)
