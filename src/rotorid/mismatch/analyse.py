@@ -26,7 +26,7 @@ from rotorid.mismatch.wrench import (
     nonlinear_intervals,
     path_segments,
     refine_nonlinear,
-    reverse_values,
+    reverse_regression,
     speed_path,
     with_gusts,
     with_wind,
@@ -86,8 +86,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         model.regression,
         model.search,
         model.selection,
-        reverse_values(prepared, model, segments),
-        lambda key, change: model.search.size_of(key, np.array([change]), []),
+        reverse_regression(prepared, model, segments),
+        lambda key, change: float(model.search.sizes_of(key, np.array([change])).max()),
     )
     findings += absorbed_findings(model, values, findings)
     refitted, improved = vehicles(prepared.vehicle, model, values)
