@@ -14,6 +14,7 @@ include: "workflow/rules/check.smk"
 include: "workflow/rules/calibration.smk"
 include: "workflow/rules/rotor.smk"
 include: "workflow/rules/neurobem.smk"
+include: "workflow/rules/mismatch.smk"
 include: "workflow/rules/report.smk"
 
 

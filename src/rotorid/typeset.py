@@ -16,9 +16,7 @@ class TypesetError(InputError):
     """The report could not be typeset; carries what pandoc or typst said."""
 
 
-def typst_source(
-    chapters: Sequence[str | Path], title: str, subtitle: str, parts: str | Path, out: str | Path
-) -> None:
+def typst_source(chapters: Sequence[str | Path], title: str, subtitle: str, parts: str | Path, out: str | Path) -> None:
     """Chapters to one typst document.
 
     Parameters
@@ -41,16 +39,12 @@ def pdf(source: str | Path, out: str | Path) -> None:
     import typst
 
     try:
-        typst.compile(
-            str(source), output=str(out), root=".", ignore_system_fonts=True, timestamp=0, pdf_standards=[]
-        )
+        typst.compile(str(source), output=str(out), root=".", ignore_system_fonts=True, timestamp=0, pdf_standards=[])
     except typst.TypstError as error:
         raise TypesetError(f"{source}: typst says: {error}") from None
 
 
-def html(
-    chapters: Sequence[str | Path], title: str, subtitle: str, parts: str | Path, out: str | Path
-) -> None:
+def html(chapters: Sequence[str | Path], title: str, subtitle: str, parts: str | Path, out: str | Path) -> None:
     """Chapters to one HTML file that holds its figures, style and equations (MathML); see `typst_source`."""
     parts = Path(parts)
     options = ["--to=html5", "--standalone", "--embed-resources", "--mathml", "--toc", "--toc-depth=2"]
