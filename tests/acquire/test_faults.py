@@ -139,9 +139,7 @@ def test_wrong_checksum(plugged, recorder_on):
 
 
 def test_dropped_repeated_and_reordered_frames(plugged, recorder_on):
-    faults = Faults(
-        drop=frozenset({30, 31, 32, 100}), repeat=frozenset({40, 41, 200}), swap=frozenset({50, 150})
-    )
+    faults = Faults(drop=frozenset({30, 31, 32, 100}), repeat=frozenset({40, 41, 200}), swap=frozenset({50, 150}))
     log = record(recorder_on("bench", plugged("bench", faults).names[0]))
     numbers = frame_numbers(log)
     assert (np.diff(numbers) > 0).all()
