@@ -21,5 +21,7 @@ include: "workflow/rules/report.smk"
 rule all:
     """Everything: the report and all it needs."""
     default_target: True
+    message:
+        "All results are up to date"
     input:
         rules.report.input,

@@ -122,6 +122,8 @@ rule record_provenance:
 
 rule report:
     """The report and where it came from."""
+    message:
+        "The report is up to date"
     input:
         results_behind(
             rules.typeset_pdf.output.pdf,

@@ -37,9 +37,7 @@ class LineFit:
 
     def interval(self, which: int, level: float = 0.95) -> tuple[float, float]:
         """Confidence interval of a0 (`which` 0) or a1 (`which` 1)."""
-        half = student_t.ppf(0.5 + level / 2, self.degrees_of_freedom) * np.sqrt(
-            self.covariance[which][which]
-        )
+        half = student_t.ppf(0.5 + level / 2, self.degrees_of_freedom) * np.sqrt(self.covariance[which][which])
         centre = (self.a0, self.a1)[which]
         return float(centre - half), float(centre + half)
 
@@ -60,9 +58,7 @@ def fit_line(x: Sequence[float], y: Sequence[float]) -> LineFit:
     x, y = np.asarray(x, float), np.asarray(y, float)
     n = len(x)
     if n < 3 or len(y) != n:
-        raise InputError(
-            f"a line with intervals needs at least 3 pairs, found {n} readings and {len(y)} values"
-        )
+        raise InputError(f"a line with intervals needs at least 3 pairs, found {n} readings and {len(y)} values")
     if np.ptp(x) == 0:
         raise InputError("all readings are equal, so no slope can be found")
     sxx = n * np.sum(x**2) - np.sum(x) ** 2

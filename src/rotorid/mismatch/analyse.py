@@ -22,10 +22,14 @@ from rotorid.mismatch.speedpath import SpeedResult, commanded_path
 from rotorid.mismatch.wrench import (
     WrenchModel,
     chosen,
+    in_wind,
+    nonlinear_intervals,
     path_segments,
     refine_nonlinear,
     reverse_values,
     speed_path,
+    with_gusts,
+    with_wind,
     wrench_model,
 )
 from rotorid.recordings import RecordingSet, Vehicle
@@ -57,6 +61,9 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         noisy = path_segments(prepared.noisy_segments, *found, cutoff)
         model = refined_model(prepared, segments, noisy)
 
+    if model.wind is not None:
+        findings.append(wind_finding(model))
+        segments = in_wind(segments, model.wind)
     if found is None:
         reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
     else:
@@ -65,9 +72,23 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
             reasons.setdefault("battery_sag", "no battery voltage")
     rule = training_rule(prepared.split, segments)
     held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
-    findings += wrench_findings(model.rows, model.regression, model.search, model.selection, model.noise, held)
+    findings += wrench_findings(
+        model.rows,
+        model.regression,
+        model.search,
+        model.selection,
+        model.noise,
+        held,
+        nonlinear_intervals(prepared, model, segments),
+    )
 
-    values = wrong_values(model.regression, model.search, model.selection, reverse_values(prepared, model, segments))
+    values = wrong_values(
+        model.regression,
+        model.search,
+        model.selection,
+        reverse_values(prepared, model, segments),
+        lambda key, change: model.search.size_of(key, np.array([change]), []),
+    )
     findings += absorbed_findings(model, values, findings)
     refitted, improved = vehicles(prepared.vehicle, model, values)
     traces = make_traces(prepared, model, segments, found, measured)
@@ -99,10 +120,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
     model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
-    if not model.selection.active:
-        return model
     terms = list(prepared.terms)
-    for _ in range(2):
+    for _ in range(2 if any(model.search.terms[k].form.nonlinear for k in model.selection.active) else 0):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
         again = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
@@ -110,7 +129,36 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         model = again
         if same:
             break
-    return model
+    model = with_wind(prepared, model, segments, noisy, terms)
+    if model.wind is not None:
+        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
+        terms = [t for t in model.terms if not t.run]
+    return with_gusts(prepared, model, segments, noisy, terms)
+
+
+def wind_finding(model: WrenchModel) -> Finding:
+    """The steady wind as a velocity, fitted through the drag."""
+    effect = catalogue()["steady_wind"]
+    w, sd = model.wind, model.wind_sd
+    drag = next(
+        (v for k, v in zip(model.selection.active, chosen(model), strict=True) if k.startswith("rotor_drag/")), None
+    )
+    form = next(f for f in effect.forms(model.prepared.vehicle) if f.name == "on the rotors")
+    k_d = 0.0 if drag is None or "independent" in drag[0].name else float(np.mean(drag[1]))
+    return Finding(
+        id="steady_wind",
+        status="established",
+        form=form if k_d else None,
+        values=tuple(float(k_d * x) for x in w),
+        equation="v_air = v − Rᵀ w",
+        sentence=effect.sentence,
+        parameters=tuple(
+            Estimate(f"w_{axis}", float(x), "m/s", float(x - 1.96 * s), float(x + 1.96 * s))
+            for axis, x, s in zip(("north", "east"), w, sd, strict=True)
+        ),
+        p_value=float(np.exp(-0.5 * min(1400.0, np.sum((w / sd) ** 2)))),
+        channels=("force_x", "force_y"),
+    )
 
 
 def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool) -> list[Finding]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.stats import chi2
 from scipy.stats import t as student
@@ -10,11 +12,12 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
-from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
 
 VALUE_Z = 3.5
 """A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""
-HETEROGENEITY_P = 1e-4
+SMALLEST_CHANGE = 0.015
+"""A relative change below this is no wrong value: no laboratory knows its numbers better."""
 BOOTSTRAPS = 400
 EXPECTED_HELD_OUT = 25.0
 """Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
@@ -45,6 +48,8 @@ def between_runs(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray
         cross = (
             regression.cross[mask][:, cols] - regression.gram[mask][:, cols][:, :, fit.columns[rest]] @ fit.beta[rest]
         )
+        if total[0, 0] < 1e-3 * regression.gram[regression.training][:, cols[0], cols[0]].sum():
+            continue  # the effect is hardly excited in this run
         inverse = np.linalg.pinv(total, rcond=1e-10, hermitian=True)
         beta = inverse @ cross.sum(axis=0)
         scores = cross - own @ beta
@@ -135,7 +140,13 @@ def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: n
 
 
 def wrench_findings(
-    rows: list[Rows], regression: Regression, search: Search, selection: Selection, noise: np.ndarray, held
+    rows: list[Rows],
+    regression: Regression,
+    search: Search,
+    selection: Selection,
+    noise: np.ndarray,
+    held: list[np.ndarray],
+    nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
 ) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive."""
     effects = catalogue()
@@ -156,7 +167,13 @@ def wrench_findings(
         values = np.array(term.values, float)
         if term.form.linear:
             values[list(term.form.linear)] = beta
-        parameters = list(estimates(regression, selection.fit, search, key)) if term.form.linear else []
+        parameters = estimates(regression, selection.fit, search, key) if term.form.linear else ()
+        if key in nonlinear:
+            values, sd = nonlinear[key]
+            parameters = tuple(
+                Estimate(p.symbol, float(v), p.unit, float(v - 1.96 * s), float(v + 1.96 * s))
+                for p, v, s in zip(term.form.parameters, values, sd, strict=True)
+            )
         findings.append(
             Finding(
                 id=term.effect,
@@ -165,11 +182,12 @@ def wrench_findings(
                 values=tuple(float(v) for v in values),
                 equation=term.form.equation,
                 sentence=effect.sentence,
-                parameters=tuple(parameters),
+                parameters=parameters,
                 p_value=selection.p_values[key],
                 channels=tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels),
                 alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
                 gain=held_out_gain(rows, regression, with_it, without, channels[0], held),
+                windows=(term.window,) if term.window else (),
             )
         )
     for effect_id, reason in selection.not_established.items():
@@ -181,12 +199,17 @@ def wrench_findings(
 
 
 def wrong_values(
-    regression: Regression, search: Search, selection: Selection, reverse: dict[str, tuple[float, float]]
+    regression: Regression,
+    search: Search,
+    selection: Selection,
+    reverse: dict[str, tuple[float, float]],
+    size_of: Callable[[str, float], float],
 ) -> dict[str, tuple[float, float]]:
     """The fewest believed values that must change: relative change and one-sigma.
 
     Grown one at a time (the others at their belief) until what all remaining values together still explain is
-    not significant. A value is named only where the check from the other side (`reverse`) agrees.
+    not significant. A value is named only where the check from the other side (`reverse`) agrees, and where it
+    matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`).
     """
     nuisance = [t.key for t in regression.terms if t.kind == "nuisance"]
     values = [t.key for t in regression.terms if t.kind == "value"]
@@ -212,7 +235,8 @@ def wrong_values(
             noisy = regression.noise_share([*always, *named, key], key, np.ones(1)) > MOST_ATTENUATION
             other, sd = reverse.get(key, (beta[0], 0.0))
             agrees = np.sign(other) == np.sign(beta[0]) and abs(other) > 0.3 * abs(beta[0])
-            if z > VALUE_Z and not noisy and agrees:
+            matters = abs(beta[0]) > SMALLEST_CHANGE and size_of(key, float(beta[0])) > SMALLEST_SIZE
+            if z > VALUE_Z and matters and not noisy and agrees:
                 p = regression.wald(fit, regression.columns([key]), count)
                 options.append((penalised(fit) - penalised(base), key, p))
         options = [o for o in options if o[2] < 5e-4]

@@ -22,6 +22,7 @@ from rotorid.mismatch.rows import (
     form_columns,
     offset_columns,
     project,
+    slope_column,
     value_columns,
 )
 from rotorid.mismatch.rows import (
@@ -242,6 +243,25 @@ def with_predictions(segment: Segment, vehicle: Vehicle, model: dict[str, np.nda
     return replace(segment, motion=replace(motion, **changed))
 
 
+def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[dict[str, np.ndarray]]:
+    """What one metre a second more wind from each of north and east adds through the effects that feel the air."""
+    wind = np.zeros(3) if segment.motion.wind is None else segment.motion.wind
+    columns = []
+    for axis in range(2):
+        parts = []
+        for sign in (0.5, -0.5):
+            step = np.zeros(3)
+            step[axis] = sign
+            moved = replace(segment.motion, wind=wind + step)
+            total: dict[str, np.ndarray] = {}
+            for form, values in effects:
+                for name, part in project(form.contribution(moved, vehicle, values), segment, vehicle, groups).items():
+                    total[name] = total.get(name, 0.0) + part
+            parts.append(total)
+        columns.append({k: parts[0][k] - parts[1][k] for k in parts[0]})
+    return columns
+
+
 def assemble_rows(
     prepared: Prepared,
     terms: list[Term],
@@ -264,7 +284,13 @@ def assemble_rows(
             model = model_wrench(segment, vehicle, effects or [])
             segment = with_predictions(segment, vehicle, model)
         for term in terms:
-            if term.kind == "effect":
+            if term.run and term.run != segment.run:
+                columns += [{}] * term.size
+            elif term.kind == "wind":
+                columns += wind_columns(segment, vehicle, groups, effects or [])
+            elif term.kind == "slope":
+                columns.append(slope_column(term, segment, vehicle, groups))
+            elif term.kind == "effect":
                 columns += form_columns(term.form, term.values, segment, vehicle, groups)
             elif term.kind == "value":
                 columns.append(value_columns(term.key, segment, vehicle, groups, model, reverse))

@@ -44,6 +44,12 @@ class Term:
     """Current values of a form's parameters (nonlinear ones matter for its columns)."""
     size: int = 1
     prior_sd: tuple[float, ...] = (np.inf,)
+    run: str = ""
+    """Only run that the term acts in; empty for all."""
+    window: tuple[str, float, float] | None = None
+    """(run, start_s, stop_s) of an effect in part of the flight."""
+    slope_of: int | None = None
+    """For the slope of a nonlinear parameter: its index in the form."""
 
 
 def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -140,6 +146,18 @@ def form_columns(form: Form, values, segment: Segment, vehicle: Vehicle, groups)
         unit[index] = 1.0
         columns.append(project(form.contribution(motion, vehicle, unit), segment, vehicle, groups))
     return columns
+
+
+def slope_column(term: Term, segment: Segment, vehicle: Vehicle, groups) -> dict[str, np.ndarray]:
+    """Derivative of a form's contribution by one nonlinear parameter at the term's values."""
+    values = np.asarray(term.values, float)
+    step = 1e-3 * max(abs(values[term.slope_of]), 1e-6)
+    up, down = values.copy(), values.copy()
+    up[term.slope_of] += step
+    down[term.slope_of] -= step
+    a = project(term.form.contribution(segment.motion, vehicle, up), segment, vehicle, groups)
+    b = project(term.form.contribution(segment.motion, vehicle, down), segment, vehicle, groups)
+    return {k: (a[k] - b[k]) / (2 * step) for k in a}
 
 
 def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:

@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from rotorid.effects.contract import Form
+from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import AGREEMENT, Regression, autoregression, build, full_fit_residuals
@@ -39,6 +40,9 @@ class WrenchModel:
     selection: Selection
     noise: np.ndarray
     """Noise of each of the twelve channels in the band of the rows."""
+    wind: np.ndarray | None = None
+    """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
+    wind_sd: np.ndarray | None = None
 
 
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:
@@ -82,13 +86,16 @@ def wrench_model(
     per = max(2, int(rate))
 
     def size_of(key: str, beta: np.ndarray, active: list[str]) -> float:
-        return local_size(rows, regression.columns([key]), beta, noise, per)
+        short = any(t.key == key and t.run for t in terms)
+        return local_size(rows, regression.columns([key]), beta, noise, per, 1.0 if short else 0.9)
 
     search = Search(regression, size_of)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
 
 
-def local_size(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray, per: int) -> float:
+def local_size(
+    rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray, per: int, quantile: float = 0.9
+) -> float:
     """Strongest tenth of the seconds of a contribution in any channel, in units of the channel's noise."""
     best = 0.0
     for r in rows:
@@ -98,7 +105,7 @@ def local_size(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.n
         part = (r.x[: count * per][:, :, cols] @ beta).reshape(count, per, 12)
         local = np.sqrt((part**2).mean(axis=1))
         for c in np.flatnonzero(np.isfinite(noise)):
-            best = max(best, float(np.quantile(local[:, c], 0.9)) / noise[c])
+            best = max(best, float(np.quantile(local[:, c], quantile)) / noise[c])
     return best
 
 
@@ -195,6 +202,52 @@ def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: in
     return float(start * np.exp(found.x))
 
 
+def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Values and one-sigma of every parameter of the active terms that have nonlinear ones.
+
+    One Gauss-Newton step with the slopes of the nonlinear parameters as columns; a form without linear parameters
+    has its contribution at gain one.
+    """
+    active = [model.search.terms[k] for k in model.selection.active]
+    if not any(t.form.nonlinear for t in active):
+        return {}
+    values = dict(zip([t.key for t in active], [v for _, v in chosen(model)], strict=True))
+    terms = [t for t in model.terms if t.kind != "effect"]
+    fixed = []
+    for term in active:
+        at = tuple(float(v) for v in values[term.key])
+        if term.form.linear:
+            terms.append(replace(term, values=at))
+        else:
+            fixed.append(replace(term, values=at))
+        terms += [
+            Term(f"slope:{term.key}/{i}", "slope", term.effect, term.form, at, 1, (np.inf,), slope_of=i)
+            for i in term.form.nonlinear
+        ]
+    rows = assemble_rows(prepared, terms + fixed, segments, chosen(model))
+    width = sum(t.size for t in terms)
+    rows = [replace(r, y=r.y - r.x[:, :, width:].sum(axis=2), x=r.x[:, :, :width]) for r in rows]
+    rate = prepared.thinner.rate_hz
+    regression = build(
+        rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
+    )
+    fit = regression.fit([t.key for t in terms], jackknife=True)
+    out = {}
+    for term in active:
+        if not term.form.nonlinear:
+            continue
+        centre, sd = values[term.key].copy(), np.zeros(len(term.form.parameters))
+        if term.form.linear:
+            cols = regression.columns([term.key])
+            centre[list(term.form.linear)] = fit.beta[cols]
+            sd[list(term.form.linear)] = np.sqrt(np.diag(fit.covariance)[cols])
+        for i in term.form.nonlinear:
+            col = regression.columns([f"slope:{term.key}/{i}"])[0]
+            sd[i] = np.sqrt(fit.covariance[col, col])
+        out[term.key] = (centre, sd)
+    return out
+
+
 def profile_cost(prepared: Prepared, model: WrenchModel, terms: list[Term], segments, fixed_gain: bool) -> float:
     """Whitened training squares with the linear coefficients of `terms` free (the last at gain one if asked)."""
     training = [s for s in segments if s.run in prepared.split.training]
@@ -217,6 +270,108 @@ def profile_cost(prepared: Prepared, model: WrenchModel, terms: list[Term], segm
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     gram += np.diag(precision) + 1e-9 * np.diag(np.diag(gram)) + 1e-12 * np.eye(size)
     return square - float(cross @ np.linalg.solve(gram, cross))
+
+
+FEELS_THE_AIR = (
+    "rotor_drag",
+    "frame_drag",
+    "translational_lift",
+    "axial_inflow",
+    "flapping_moment",
+    "rotor_interference",
+)
+
+
+def in_wind(segments: list[Segment], wind: np.ndarray) -> list[Segment]:
+    """Segments whose air moves over ground by `wind` (north, east), m/s."""
+    air = np.array([wind[0], wind[1], 0.0])
+    return [replace(s, motion=replace(s.motion, wind=air)) for s in segments]
+
+
+def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
+    """The model with drag and lift built on airspeed, where a steady wind and drag were both found.
+
+    The wind is fitted by Gauss-Newton through every effect that feels the air (a linear wind column would leave
+    part of the drag and lift to other names); then the search is repeated in that wind.
+    """
+    active = model.selection.active
+    wind_key = next((k for k in active if k.startswith("steady_wind/")), None)
+    felt = [k for k in active if model.search.terms[k].effect in FEELS_THE_AIR]
+    if wind_key is None or not felt:
+        return model
+    wind = first_wind(model, wind_key)
+    if wind is None:
+        return model
+    kept = [t for t in terms if t.effect != "steady_wind"]
+    active = [k for k in active if k != wind_key]
+    always = [t for t in terms if t.kind != "effect"]
+    wind_term = Term("wind", "wind", "steady_wind", size=2, prior_sd=(np.inf, np.inf))
+    effects = [c for k, c in zip(model.selection.active, chosen(model), strict=True) if k != wind_key]
+    rate = prepared.thinner.rate_hz
+    for _ in range(4):
+        moved = in_wind(segments, wind)
+        own = [*always, *[model.search.terms[k] for k in active], wind_term]
+        rows = assemble_rows(prepared, own, moved, effects)
+        regression = build(
+            rows, own, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
+        )
+        fit = regression.fit([t.key for t in own], jackknife=True)
+        step = fit.beta[-2:]
+        wind = wind + np.clip(step, -3.0, 3.0)
+        at = len(fit.beta) - 2 - sum(model.search.terms[k].size for k in active)
+        updated = []
+        for k, (form, values) in zip(active, effects, strict=True):
+            size = model.search.terms[k].size
+            values = values.copy()
+            if form.linear:
+                values[list(form.linear)] = fit.beta[at : at + size]
+            updated.append((form, values))
+            at += size
+        effects = updated
+        if np.abs(step).max() < 0.01:
+            break
+    sd = np.sqrt(np.diag(fit.covariance)[-2:])
+    again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
+    if not any(again.search.terms[k].effect in FEELS_THE_AIR for k in again.selection.active):
+        return model
+    again.wind, again.wind_sd = wind, sd
+    return again
+
+
+def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
+    """Wind (north, east), m/s, from a linear wind column and the drag beside it; None without a drag to divide by."""
+    values = dict(zip(model.selection.active, chosen(model), strict=True))
+    form, force = values[wind_key]
+    drag = next((values[k] for k in values if k.startswith("rotor_drag/")), None)
+    speed = np.mean([r for s in model.prepared.segments for r in s.motion.rotor_speed.sum(axis=1)[::50]])
+    if form.name == "on the airframe":
+        force = force / speed
+    if drag is not None:
+        k_d = np.mean(drag[1]) if "independent" not in drag[0].name else drag[1][0] / speed
+        return force / k_d if k_d > 0 else None
+    return np.zeros(2) + 0.5 * np.sign(force)
+
+
+def after_residual(model: WrenchModel) -> list[np.ndarray]:
+    """Residual rows with the selected effects, (n, 12) per segment."""
+    full = model.regression.fit(model.search.always + model.selection.active)
+    return [r.y - r.x[:, :, full.columns] @ full.beta for r in model.rows]
+
+
+def with_gusts(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
+    """The model with gusts in the windows that its residual shows; the same model where there are none."""
+    if "force" not in prepared.groups or any(s.motion.rotation is None for s in segments):
+        return model
+    gusts = []
+    for rows, left, segment in zip(model.rows, after_residual(model), segments, strict=True):
+        index = np.searchsorted(segment.motion.time_s, rows.time_s).clip(0, segment.motion.size - 1)
+        found = windows(left[:, :3], segment.motion.rotation[index], rows.time_s)
+        gusts += gust_terms(segment.run, found)
+    if not gusts:
+        return model
+    again = wrench_model(prepared, terms + gusts, chosen(model), model.selection.active, segments, noisy)
+    again.wind, again.wind_sd = model.wind, model.wind_sd
+    return again
 
 
 def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:

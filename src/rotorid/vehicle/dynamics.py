@@ -13,7 +13,17 @@ from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.params import RigidBody
 from rotorid.vehicle.rigid_body import angular_acceleration
 
-ALWAYS_KNOWN = frozenset({"rotor_speed", "angular_velocity", "angular_acceleration", "specific_force"})
+ALWAYS_KNOWN = frozenset(
+    {
+        "rotor_speed",
+        "angular_velocity",
+        "angular_acceleration",
+        "specific_force",
+        # A simulated vehicle carries sensors that read the truth.
+        "accelerometer",
+        "gyroscope",
+    }
+)
 
 
 class Dynamics:
@@ -57,6 +67,8 @@ class Dynamics:
                 angular_velocity=rates,
                 angular_acceleration=self.last_acceleration,
                 specific_force=self.last_specific_force,
+                accelerometer=self.last_specific_force,
+                gyroscope=rates,
                 **surroundings,
             )
             for form, values in self.effects:

@@ -17,9 +17,7 @@ def wrench_matrix(vehicle: Vehicle) -> np.ndarray:
     thrust = vehicle.thrust_coefficients_n_s2()
     torque = vehicle.torque_coefficients_n_m_s2()
     # F_i acts along -z at r_i: r × (0, 0, -F) = (-y F, x F, 0).
-    return np.stack(
-        [thrust, -positions[:, 1] * thrust, positions[:, 0] * thrust, vehicle.yaw_signs() * torque]
-    )
+    return np.stack([thrust, -positions[:, 1] * thrust, positions[:, 0] * thrust, vehicle.yaw_signs() * torque])
 
 
 def allocation_matrix(vehicle: Vehicle) -> np.ndarray:

@@ -200,9 +200,7 @@ class _Flight:
                 f"expected ({len(self.time_s)}, {self.vehicle.rotor_count})"
             )
         acceleration = inputs.rotor_acceleration
-        if acceleration is None and any(
-            "rotor_acceleration" in form.requires for form, _ in self.dynamics.effects
-        ):
+        if acceleration is None and any("rotor_acceleration" in form.requires for form, _ in self.dynamics.effects):
             acceleration = np.gradient(inputs.rotor_speed, self.time_s, axis=0)
         wind = inputs.wind
         if wind is not None:
@@ -235,9 +233,7 @@ class _Flight:
     def _check_effects(self, effects) -> None:
         for form, _ in effects:
             if has_memory(form):
-                raise InputError(
-                    f"effect form {form.name!r} has a memory of its own: give its wrench in inputs.force"
-                )
+                raise InputError(f"effect form {form.name!r} has a memory of its own: give its wrench in inputs.force")
         known = {"rotation"} if self.attitude else set()
         known |= {"velocity"} if self.translation else set()
         known |= {"height"} if self.height_offset is not None else set()

@@ -92,9 +92,7 @@ def test_euler_rates_are_equation_4_14():
     still_quaternion = quaternion_from_euler(euler)
     turn = np.concatenate([[1.0], 0.5 * rates * dt])
     a, b = still_quaternion[0], still_quaternion[1:]
-    turned = np.concatenate(
-        [[a * turn[0] - b @ turn[1:]], a * turn[1:] + turn[0] * b + np.cross(b, turn[1:])]
-    )
+    turned = np.concatenate([[a * turn[0] - b @ turn[1:]], a * turn[1:] + turn[0] * b + np.cross(b, turn[1:])])
     change = (euler_from_quaternion(turned / np.linalg.norm(turned)) - euler) / dt
     np.testing.assert_allclose(change, rates_to_euler_rates(euler) @ rates, atol=1e-5)
 
@@ -108,9 +106,7 @@ def test_free_fall():
 def test_equation_4_17_in_a_tilted_climb():
     euler = np.array([[0.2, -0.3, 0.5]])
     speeds = np.full((1, 4), 1200.0)
-    trace = simulate(
-        thesis_vehicle(), Commands(np.array([0.0]), speeds), 0.001, 0.001, Start(euler_rad=euler)
-    )
+    trace = simulate(thesis_vehicle(), Commands(np.array([0.0]), speeds), 0.001, 0.001, Start(euler_rad=euler))
     thrust = 4 * CF * 1200.0**2
     phi, theta, psi = euler[0]
     c, s = np.cos, np.sin
@@ -156,9 +152,7 @@ def test_asymmetric_precession_agrees_with_jacobi_elliptic_functions():
 
     jx, jy, jz = 2.489e-3, 2.5743e-3, 4.6838e-3
     p0, r0 = 2.0, 5.0
-    trace = simulate(
-        thesis_vehicle(), still(), 5.0, 0.0005, Start(angular_velocity_rad_s=np.array([[p0, 0.0, r0]]))
-    )
+    trace = simulate(thesis_vehicle(), still(), 5.0, 0.0005, Start(angular_velocity_rad_s=np.array([[p0, 0.0, r0]])))
     # Spin about the largest axis; standard solution with q(0) = 0: p = p0 cn, q = q1 sn, r = r0 dn.
     two_t, h2 = jx * p0**2 + jz * r0**2, (jx * p0) ** 2 + (jz * r0) ** 2
     rate = np.sqrt((jz - jy) * (h2 - two_t * jx) / (jx * jy * jz))
@@ -195,9 +189,7 @@ def test_motor_lag_closed_form():
         Start(rotor_speed_rad_s=np.full((1, 4), 500.0)),
         Motors(0.05),
     )
-    np.testing.assert_allclose(
-        trace.rotor_speed[0, :, 0], 1000 - 500 * np.exp(-trace.time_s / 0.05), rtol=1e-7
-    )
+    np.testing.assert_allclose(trace.rotor_speed[0, :, 0], 1000 - 500 * np.exp(-trace.time_s / 0.05), rtol=1e-7)
 
 
 def wiggle(steps=1000, dt=0.001):
@@ -223,6 +215,25 @@ def test_compiled_flight_is_the_same_flight():
         np.testing.assert_allclose(states[v, :, 3:7], trace.quaternion[0], atol=1e-12)
         np.testing.assert_allclose(states[v, :, 10:13], trace.position[0], atol=1e-11)
         np.testing.assert_allclose(states[v, :, 13:], trace.rotor_speed[0], rtol=1e-12)
+
+
+def test_compiled_steps_and_array_code_fly_the_same():
+    """An effect of size zero sends the same flight through the array code."""
+    vehicle = thesis_vehicle()
+    drag = catalogue()["rotor_drag"].forms(vehicle)[0]
+    zero = [(drag, np.zeros(len(drag.parameters)))]
+    how = dict(motors=Motors(0.04, 0.02), disturbance=Disturbance(0.1, 1e-3, 0.1))
+    controller = AttitudePid(vehicle, training_reference())
+    start = Start(euler_rad=np.array([[0.1, 0.05, 0.3]]), velocity_m_s=np.array([[1.0, 0, 0]]))
+
+    def flown(effects):
+        rng = np.random.default_rng(4)
+        return simulate(vehicle, controller, 0.5, 0.002, start, effects=effects, rng=rng, **how)
+
+    fast, slow = flown([]), flown(zero)
+    for name in ("position", "quaternion", "angular_velocity", "angular_acceleration", "specific_force"):
+        np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(fast.rotor_speed, slow.rotor_speed, rtol=1e-10)
 
 
 def test_vehicles_of_a_batch_do_not_touch_each_other():
@@ -295,9 +306,7 @@ def test_trajectory_of_rotorpy(aero):
         wind=np.zeros(3),
         rotor_speeds=np.full(4, 1050.0),
     )
-    peer = Multirotor(
-        rotorpy_vehicle(), state, aero=aero, integrator_kwargs=dict(method="RK45", rtol=1e-9, atol=1e-9)
-    )
+    peer = Multirotor(rotorpy_vehicle(), state, aero=aero, integrator_kwargs=dict(method="RK45", rtol=1e-9, atol=1e-9))
     states = [state]
     for i in range(steps):
         states.append(peer.step(states[-1], dict(cmd_motor_speeds=commands[i]), dt))
@@ -310,9 +319,7 @@ def test_trajectory_of_rotorpy(aero):
             ("translational_lift", [3.4e-3]),
         ):
             form = next(
-                f
-                for f in catalogue()[name].forms(vehicle)
-                if len(f.parameters) == len(values) and "hub" in f.name
+                f for f in catalogue()[name].forms(vehicle) if len(f.parameters) == len(values) and "hub" in f.name
             )
             effects.append((form, values))
     start = Start(
@@ -320,9 +327,7 @@ def test_trajectory_of_rotorpy(aero):
         angular_velocity_rad_s=np.array([[0.3, -0.4, 0.5]]),
         rotor_speed_rad_s=np.full((1, 4), 1050.0),
     )
-    trace = simulate(
-        vehicle, Commands(dt * np.arange(steps), commands), 2.0, dt, start, Motors(0.03), effects
-    )
+    trace = simulate(vehicle, Commands(dt * np.arange(steps), commands), 2.0, dt, start, Motors(0.03), effects)
     peers = {key: np.array([s[key] for s in states]) for key in ("x", "v", "w", "q")}
     scale = np.abs(peers["x"]).max()
     assert scale > 2.0

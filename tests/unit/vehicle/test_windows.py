@@ -59,14 +59,10 @@ def reference(vehicle, speed_of, start, time, force_of):
         W, q, v = y[:3], y[3:7], y[7:10]
         F = cf * speed_of(t) ** 2
         Q = cq * speed_of(t) ** 2
-        tau = np.array(
-            [(-F[0] + F[1] + F[2] - F[3]) * d, (F[0] + F[1] - F[2] - F[3]) * d, Q[0] - Q[1] + Q[2] - Q[3]]
-        )
+        tau = np.array([(-F[0] + F[1] + F[2] - F[3]) * d, (F[0] + F[1] - F[2] - F[3]) * d, Q[0] - Q[1] + Q[2] - Q[3]])
         R = rotation_from_quaternion(q / np.linalg.norm(q))
         body = np.array([0, 0, -F.sum()]) + force_of(t, R, v, W)
-        o = np.array(
-            [[0, -W[0], -W[1], -W[2]], [W[0], 0, W[2], -W[1]], [W[1], -W[2], 0, W[0]], [W[2], W[1], -W[0], 0]]
-        )
+        o = np.array([[0, -W[0], -W[1], -W[2]], [W[0], 0, W[2], -W[1]], [W[1], -W[2], 0, W[0]], [W[2], W[1], -W[0], 0]])
         return np.concatenate(
             [np.linalg.solve(J, tau - np.cross(W, J @ W)), 0.5 * o @ q, R @ body / 0.652 + [0, 0, 9.81], v]
         )
@@ -81,9 +77,7 @@ def manoeuvre(n=501, rate=500.0):
     def speed_of(t):
         return HOVER * (1 + 0.05 * np.sin(2 * np.pi * 2 * t + phase))
 
-    start = np.concatenate(
-        [[0.3, -0.2, 0.5], quaternion_from_euler([0.2, -0.1, 1.0]), [4.0, -2.0, 0.5], [1.0, 2, -5]]
-    )
+    start = np.concatenate([[0.3, -0.2, 0.5], quaternion_from_euler([0.2, -0.1, 1.0]), [4.0, -2.0, 0.5], [1.0, 2, -5]])
     return time, speed_of, start
 
 
@@ -109,9 +103,7 @@ def test_matches_an_independent_integration_with_drag():
         ("velocity", slice(7, 10)),
         ("position", slice(10, 13)),
     ):
-        np.testing.assert_allclose(
-            getattr(found.predicted, name), truth[found.sample][..., columns], atol=3e-6
-        )
+        np.testing.assert_allclose(getattr(found.predicted, name), truth[found.sample][..., columns], atol=3e-6)
     plain = simulate_windows(vehicle, [], time, Inputs(speeds), recorded, step_s=0.002)
     assert np.abs(plain.predicted.velocity[:, -1] - truth[found.sample[:, -1], 7:10]).max() > 0.05
 
@@ -160,9 +152,7 @@ def test_long_steps_pass_over_samples():
 @pytest.mark.parametrize("spins, count", [(("ccw",), 1), (("ccw", "cw") * 3, 6)])
 def test_any_number_of_rotors(spins, count):
     angle = 2 * np.pi * np.arange(count) / count
-    rotors = [
-        dict(x_m=0.2 * np.cos(a), y_m=0.2 * np.sin(a), spin=s) for a, s in zip(angle, spins, strict=True)
-    ]
+    rotors = [dict(x_m=0.2 * np.cos(a), y_m=0.2 * np.sin(a), spin=s) for a, s in zip(angle, spins, strict=True)]
     vehicle = thesis_vehicle(rotors=rotors)
     found = simulate_windows(vehicle, [], np.arange(51) / 100, Inputs(np.full((51, count), 500.0)), rest(51))
     expected = (9.81 - count * 1.3877e-6 * 500.0**2 / 0.652) * 0.5
@@ -193,9 +183,7 @@ def test_every_wrench_form_of_the_catalogue_can_be_simulated():
 
 
 def test_effects_of_a_vehicle_file():
-    vehicle = thesis_vehicle(
-        effects=[dict(id="translational_lift", form="at the hubs", parameters={"k_h": 0.003})]
-    )
+    vehicle = thesis_vehicle(effects=[dict(id="translational_lift", form="at the hubs", parameters={"k_h": 0.003})])
     ((found, values),) = active_forms(vehicle)
     assert found.name == "at the hubs" and values == [0.003]
     for entry, message in (
@@ -208,3 +196,21 @@ def test_effects_of_a_vehicle_file():
     ):
         with pytest.raises(ValueError, match=message):
             active_forms(thesis_vehicle(effects=[entry]))
+
+
+def test_speed_effects_of_a_vehicle_file():
+    """A lag of 50 ms on a step: 1 - exp(-t/τ) by hand; the wrench effects are not touched."""
+    from rotorid.vehicle.improved import speeds_of_commands
+
+    vehicle = thesis_vehicle(
+        effects=[
+            dict(id="motor_lag", form="one constant", parameters={"tau": 0.05}),
+            dict(id="translational_lift", form="at the hubs", parameters={"k_h": 0.003}),
+        ]
+    )
+    time = np.arange(101) / 100
+    command = np.full((101, 4), 1000.0)
+    command[0] = 0.0
+    speed = speeds_of_commands(vehicle, command, time)
+    np.testing.assert_allclose(speed[1:, 0], 1000 * (1 - np.exp(-(time[1:] - 0.01) / 0.05)), atol=1e-9)
+    assert [f.name for f, _ in active_forms(vehicle)] == ["at the hubs"]
