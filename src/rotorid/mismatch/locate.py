@@ -42,6 +42,8 @@ MATTERS = 0.3
 ON_SHARE_OF_PEAK = 0.2
 ON_SHARE_OF_NOISE = 0.15
 LOST_AT_ENDS_S = 1.0
+SMALLEST_SHARE = 0.03
+"""Share of a run's mismatch energy below which an interval is not worth a line."""
 SHORTEST_GAP_S = 0.25
 LONGEST_GAP_S = 2.0
 THROUGHOUT = 0.7
@@ -58,6 +60,8 @@ HELD_BACK = 3.0
 REGIME_BLOCK_S = 0.5
 REGIME_BINS = 8
 REGIME_P = 1e-3
+CONTRAST = 2.0
+"""Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
 EXCESS_SHARE = 0.25
 """Bins with at least this share of the largest excess belong to the regime."""
 
@@ -220,7 +224,8 @@ def _tested(traces: Sequence[Trace], masks: Sequence[np.ndarray], count: int) ->
     noise, freedom = channel_noise(traces), _freedom_per_sample(traces)
     found = []
     for trace, mask in zip(traces, masks, strict=True):
-        spans = _spans(mask)
+        energy = np.concatenate([[0.0], np.cumsum(np.nan_to_num(mismatch_of(trace, True)) ** 2)])
+        spans = [(a, b) for a, b in _spans(mask) if energy[b] - energy[a] >= SMALLEST_SHARE * energy[-1]]
         for start, stop in spans:
             p = _energy_p(trace.before[start:stop], noise, freedom)
             if p < FAMILY_ERROR / max(len(spans) * count, 1):
@@ -473,6 +478,8 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     )
     means = np.array([energy[which == b].mean() for b in bins])
     floor = means.min()
+    if means.max() < CONTRAST * floor:
+        return None
     inside = means - floor >= EXCESS_SHARE * (means.max() - floor)
     first = last = int(np.argmax(means))
     while first > 0 and inside[first - 1]:

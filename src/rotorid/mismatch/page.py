@@ -47,6 +47,8 @@ WORDS = {
 MOST_LOCATIONS = 12
 MOST_RUNS_IN_STRIP = 8
 STRIP_CELLS = 400
+NARROWEST = 0.03
+"""Interval over plausible range below which the range is zoomed in."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -149,7 +151,7 @@ def ranges_html(rows: Sequence[Mapping]) -> Markup:
             ).format(at(first), wide, belief, at(row["value"]), pretty(number(low)), pretty(number(high)))
         out.append(
             Markup('<tr><td><em>{}</em></td><td class="text">{}</td><td class="text">{}</td><td>{}</td></tr>').format(
-                subscripts(row["symbol"]), row["meaning"], pretty(row["text"]), marks
+                subscripts(row["symbol"]), pretty(row["meaning"]), pretty(row["text"]), marks
             )
         )
     return Markup("").join([*out, Markup("</table>")])
@@ -414,9 +416,13 @@ def parameter_range(symbol, value, unit, low, high, plausible=None, meaning="", 
         points = [value - 2 * reach, value + 2 * reach, low, high]
         points += [believed] if believed is not None else [0.0]
         first, last = min(points), max(points)
-        if plausible is not None:
-            first = plausible[0] if math.isfinite(plausible[0]) else first
-            last = plausible[1] if math.isfinite(plausible[1]) else last
+        if plausible is not None and any(map(math.isfinite, plausible)):
+            ends = [b if math.isfinite(b) else e for b, e in zip(plausible, (first, last), strict=True)]
+            bounds = f"plausible: {_bounds(*plausible)}"
+            meaning = f"{meaning} ({bounds})" if meaning else bounds
+            # Bounds so wide that the interval would be a hairline are stated, not drawn.
+            if high - low > NARROWEST * (ends[1] - ends[0]):
+                first, last = ends
         scale = (first, last) if last > first else None
     return {
         "symbol": symbol,
@@ -427,6 +433,12 @@ def parameter_range(symbol, value, unit, low, high, plausible=None, meaning="", 
         "scale": scale,
         "believed": believed,
     }
+
+
+def _bounds(low: float, high: float) -> str:
+    if not math.isfinite(high):
+        return f"from {number(low)}"
+    return f"to {number(high)}" if not math.isfinite(low) else f"{number(low)} to {number(high)}"
 
 
 def value_range(name: str, believed: float, refitted: float, low: float, high: float) -> dict:

@@ -452,16 +452,21 @@ def _rest(analysis: Analysis, locations: Sequence[Location]) -> str:
 
 def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
     shown = [c for c in ("force_z", "force_x", "moment_x", "moment_z") if c in channels] or list(channels)
-    quoted = []
-    for name in shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]:
-        errors, where = _either_split(channels[name])
-        unit = channels[name].unit
-        quoted.append(
-            f"{where if not quoted else 'there'} the {channel_words(name)} is {number(errors.before)} {unit} off and "
-            f"the sensors' own noise is {number(channels[name].noise_floor)} {unit}"
-        )
-    tail = f": {listed(quoted)}" if quoted else ""
-    return f"The simulation agrees with the recordings to within the noise{tail}."
+    chosen = shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]
+    left = listed(
+        [
+            f"{number(_either_split(channels[c])[0].before)} {channels[c].unit} in the {channel_words(c)} "
+            f"(the sensors' own noise: {number(channels[c].noise_floor)})"
+            for c in chosen
+        ]
+    )
+    if not left:
+        return "Nothing was found that the believed vehicle leaves out."
+    where = _either_split(channels[chosen[0]])[1]
+    return (
+        f"The believed vehicle describes these recordings: the error that is left {where}, {left}, does not depend on "
+        "how it was flown."
+    )
 
 
 if __name__ == "__main__":
