@@ -30,7 +30,8 @@ def run(name: str, dash: bool = True) -> Run:
     """A level flight along x at 100 Hz: at rest but for a dash of 5 m/s, exactly consistent with drag K_D."""
     time = np.arange(int(LENGTH_S * 100)) / 100
     ramp = np.clip((time - DASH_S[0]) / 0.3, 0, 1) * np.clip((DASH_S[1] - time) / 0.3, 0, 1)
-    speed = SPEED_M_S * ramp * dash
+    # The ripple keeps the reader from taking a constant reading for a held one.
+    speed = SPEED_M_S * ramp * dash + 1e-6 * np.sin(17 * time)
     zero = np.zeros(len(time))
     acceleration = np.gradient(speed, time)
     columns = {"time_s": time}
