@@ -370,7 +370,7 @@ def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Chan
         return capital(off) + "."
     best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
     doubt = f" ({sure(best.p_value if best.p_value is not None else 1.0)})"
-    return f"{capital(_when(best, here, analysis))}{off}{doubt}."
+    return capital(f"{_when(best, here, analysis)}{off}{doubt}.")
 
 
 def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:

@@ -88,6 +88,13 @@ def test_the_sentence_says_where_what_and_how_much_better():
     assert "the sensor's own noise is 0.050 N" in sentence
 
 
+def test_a_mismatch_throughout_starts_with_what_is_off():
+    made = analysis(values={"mass_kg": (0.6, 0.652, 0.65, 0.654)}, findings=[drag_finding(status="absorbed")])
+    sentence = verdict_of(made).sentence
+    assert sentence[0].isupper()
+    assert "The mass is 0.6520 ± 0.0020 kg, not the 0.6000 kg believed." in sentence
+
+
 def test_an_ambiguous_class_is_named_in_full_with_what_would_settle_it():
     finding = drag_finding(status="ambiguous", alternatives=("frame_drag", "rotor_drag"))
     sentence = verdict_of(analysis(findings=[finding], next_manoeuvre="fly faster")).sentence
