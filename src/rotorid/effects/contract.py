@@ -205,7 +205,7 @@ class Effect:
     confusers: tuple[str, ...] = ()
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
-    kind: Literal["physics", "sensor"] = "physics"
+    kind: Literal["physics", "sensor", "mistake"] = "physics"
     speed_forms: tuple[SpeedForm, ...] = ()
     """Forms that act between command and rotor speed."""
 
