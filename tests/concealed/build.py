@@ -1,7 +1,8 @@
-"""Build concealed sets: `python -m tests.concealed.build --cases 'single/*/moderate/0' --out DIR --answers DIR2`.
+"""Build concealed sets.
 
-Sets go to DIR/<set>/ under names that say nothing; the truth goes to DIR2/<set>.json, which the stage under test must
-never read. What is already built is left alone, so an interrupted build goes on where it stopped.
+`python -m tests.concealed.build --cases 'single/*/moderate/0' --out DIR --answers DIR2`: sets go to DIR/<set>/
+under names that say nothing; the truth goes to DIR2/<set>.json, which the stage under test must never read.
+What is already built is left alone, so an interrupted build goes on where it stopped.
 """
 
 import argparse

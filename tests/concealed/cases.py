@@ -10,14 +10,14 @@ from fnmatch import fnmatch
 
 import numpy as np
 
-from .richsim.hidden import Hidden
+from .richsim.hidden import OUTSIDE, Hidden
 from .richsim.scene import Plan, Run
 from .richsim.sensors import Noise
 
 
 @dataclass(frozen=True)
 class Case:
-    """One concealed set. `truth` holds what is known before building: the ids and wrong values to be found."""
+    """One concealed set. `truth` is what is known before building: ids and wrong values to be found."""
 
     name: str
     seed: int
@@ -42,7 +42,7 @@ VEHICLES = ("thesis", "racer", "crazyflie", "hexarotor")
 
 @dataclass(frozen=True)
 class Recipe:
-    """How an effect is shown well: columns, three runs, forms, and amounts where noise does not set the size."""
+    """How an effect is shown well: columns, three runs, forms; amounts where noise does not set the size."""
 
     groups: tuple[str, ...]
     purposes: tuple[str, ...]
@@ -216,6 +216,217 @@ def wrong_values() -> list[Case]:
     return out
 
 
+MIXTURES = (
+    (SPEED, ("rotor_drag", "axial_inflow")),
+    (SPEED, ("rotor_drag", "translational_lift")),
+    (SPEED, ("rotor_drag", "com_offset")),
+    (SPEED, ("rotor_drag", "axial_inflow", "translational_lift")),
+    (SPEED, ("frame_drag", "com_offset")),
+    (BOTH, ("motor_lag", "rotor_drag")),
+    ((*BOTH, "battery"), ("motor_lag", "battery_sag")),
+    (SPEED, ("rotor_gyroscopic", "rotor_acceleration_torque")),
+    (SPEED, ("rotor_acceleration_torque", "inertia_products")),
+    (SPEED, ("unequal_rotors", "rotor_drag")),
+    (SPEED, ("thrust_tilt", "axial_inflow")),
+    ((*SPEED, "height"), ("ground_effect", "rotor_drag")),
+    (SPEED, ("gust", "rotor_drag", "com_offset")),
+    (SPEED, ("steady_wind", "rotor_drag", "translational_lift")),
+    (SPEED, ("imu_lever_arm", "rotor_drag")),
+    (SPEED, ("accelerometer_error", "com_offset")),
+    (SPEED, ("gyro_error", "rotor_drag")),
+    (THROTTLE, ("throttle_curve", "rotor_drag")),
+    (SPEED, ("rotational_damping", "com_offset", "rotor_drag")),
+    (SPEED, ("payload", "rotor_drag")),
+    (BOTH, ("motor_lag", "com_offset", "rotor_drag", "axial_inflow")),
+    (SPEED, ("delay", "rotor_drag")),
+    (SPEED, ("rotor_interference", "rotor_drag")),
+    (SPEED, ("thrust_curve", "rotor_drag")),
+    ((*COMMAND, "battery"), ("battery_sag", "rotor_drag")),
+    (SPEED, ("flapping_moment", "rotor_drag")),
+    (SPEED, ("rotor_drag", "frame_drag", "unequal_rotors")),
+    (SPEED, ("rotor_gyroscopic", "rotor_acceleration_torque", "rotor_drag", "com_offset")),
+)
+
+
+def mixtures() -> list[Case]:
+    """Two to four effects at once, each about one to three times the noise; a third with a wrong value too."""
+    out = []
+    for m, (groups, effects) in enumerate(MIXTURES):
+        for k in range(2):
+            name = f"mixture/{m:02d}/{k}"
+            rng = _draw(name, 0)
+            hidden = []
+            for effect in effects:
+                recipe = RECIPES[effect]
+                amount = float(rng.uniform(0.6, 1.5)) if recipe.amounts else 1.0
+                size = None if recipe.amounts else float(rng.uniform(1.0, 3.0))
+                form = "motor" if effect == "delay" else recipe.forms[0]
+                window = _window(rng) if effect == "gust" else None
+                hidden.append(Hidden(effect, size=size, amount=amount, form=form, window=window))
+            vertical = "low" if "ground_effect" in effects else "climbs"
+            purposes = ("fast", "excite", vertical, "turning" if k else "rich")
+            wrong = ()
+            if m % 3 == 0 and k == 1:
+                wrong = (
+                    (str(rng.choice(WRONG_NAMES)), 1 + float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.06))),
+                )
+            rate = {"rate_hz": 250.0} if "delay" in effects or "motor_lag" in effects else {}
+            plan = _dressed(
+                rng, groups=groups, runs=_runs(purposes, rng), hidden=tuple(hidden), wrong=wrong, **rate
+            )
+            out.append(Case(name, 5000 + 2 * m + k, "richsim", plan, (*effects, *(w for w, _ in wrong))))
+    # the blade-element rotor: not the catalogue's own formulas
+    blades = (("rotor_drag",), ("axial_inflow",), ("translational_lift",))
+    blades += (("rotor_drag", "axial_inflow", "translational_lift"),)
+    for m, effects in enumerate(blades):
+        for k in range(3):
+            name = f"blade/{'-'.join(effects)}/{k}"
+            rng = _draw(name, 0)
+            sizes = {e: (1.0, 0.5, 0.2)[k] * (3 if e == "rotor_drag" else 1) for e in effects}
+            hidden = tuple(Hidden(e, amount=sizes[e], form="blade") for e in effects)
+            plan = _dressed(
+                rng, groups=SPEED, runs=_runs(("fast", "climbs", "rich", "fast"), rng), hidden=hidden
+            )
+            out.append(Case(name, 5500 + 3 * m + k, "richsim", plan, effects))
+    return out
+
+
+IMU_ONLY = ("speed", "rates", "force")
+# (pair, form and columns and flights without, and with, the data that separate them)
+PAIRS = (
+    (
+        ("motor_lag", ""),
+        ("delay", "actuation"),
+        (COMMAND, ("gentle",) * 3),
+        (COMMAND, ("excite", "rich", "excite")),
+    ),
+    (
+        ("rotor_drag", "centre"),
+        ("frame_drag", ""),
+        (SPEED, ("one_way",) * 3),
+        (SPEED, ("fast", "rich", "fast")),
+    ),
+    (
+        ("com_offset", ""),
+        ("unequal_rotors", "plane"),
+        (COMMAND, ("calm",) * 3),
+        (SPEED, ("excite", "rich", "excite")),
+    ),
+    (
+        ("thrust_tilt", ""),
+        ("accelerometer_error", "turn"),
+        (IMU_ONLY, ("rich",) * 3),
+        (SPEED, ("rich", "turning", "rich")),
+    ),
+)
+
+
+def confusable() -> list[Case]:
+    """Pairs that imitate each other, flown and recorded so that they can be told apart, and so that they cannot."""
+    out = []
+    for p, (first, second, without, with_) in enumerate(PAIRS):
+        for effect, form in (first, second):
+            for telling, (groups, purposes) in (("without", without), ("with", with_)):
+                for k in range(2):
+                    name = f"confusable/{p}/{effect}/{telling}/{k}"
+                    rng = _draw(name, 0)
+                    size = (
+                        None if effect in ("motor_lag", "delay") else {"without": 0.7, "with": 2.0}[telling]
+                    )
+                    one_way = purposes[0] == "one_way"
+                    plan = _dressed(
+                        rng,
+                        rate_hz=250.0,
+                        vehicle=("thesis", "racer")[k],
+                        groups=groups,
+                        runs=_runs(purposes, rng),
+                        hidden=(Hidden(effect, size=size, form=form),),
+                        late_fraction=0.0,
+                        trim_s=5.0 if one_way else 0.0,
+                        equivalent=((first[0], second[0]),) if telling == "without" else (),
+                    )
+                    out.append(Case(name, 6000 + len(out), "richsim", plan, (effect,)))
+    return out
+
+
+POWER = ("rotor_drag", "translational_lift", "axial_inflow", "com_offset", "thrust_tilt", "ground_effect")
+POWER += ("rotor_gyroscopic", "rotor_acceleration_torque", "rotational_damping", "accelerometer_error")
+
+
+def power() -> list[Case]:
+    """The same effects from far below the noise to above it: the detection curve."""
+    out = []
+    for effect in POWER:
+        recipe = RECIPES[effect]
+        for size in (0.02, 0.05, 0.1, 0.2, 0.5, 1.0):
+            for k in range(2):
+                name = f"power/{effect}/{size}/{k}"
+                rng = _draw(name, 0)
+                plan = _dressed(
+                    rng,
+                    rate_hz=250.0,
+                    groups=recipe.groups,
+                    runs=_runs(recipe.purposes, rng),
+                    hidden=(Hidden(effect, size=size, form=recipe.forms[0]),),
+                )
+                out.append(Case(name, 7000 + len(out), "richsim", plan, (effect,)))
+    return out
+
+
+def partial() -> list[Case]:
+    """Effects that act in part of the flight only; the exact times are in the answers."""
+    out = []
+    settings = (
+        ("gust", SPEED, ("rich", "rich", "rich"), (1.5, 1.0, 0.6)),
+        ("ground_effect", (*SPEED, "height"), ("landing",) * 3, None),
+        ("command_saturation", BOTH, ("steps",) * 3, (1.5, 1.2, 0.9)),
+        ("sensor_dropout", SPEED, ("rich", "excite", "rich"), (1.0,) * 3),
+        ("vortex_ring", SPEED, ("descents",) * 3, None),
+    )
+    for effect, groups, purposes, amounts in settings:
+        for k in range(3):
+            name = f"part/{effect}/{k}"
+            rng = _draw(name, 0)
+            window = (12.0, 15.0) if effect == "gust" else _window(rng)
+            hidden = Hidden(
+                effect,
+                size=None if amounts else (4.0, 2.0, 1.0)[k],
+                amount=amounts[k] if amounts else 1.0,
+                form=RECIPES[effect].forms[k % len(RECIPES[effect].forms)],
+                window=window if effect in ("gust", "sensor_dropout") else None,
+                runs=(k % 2,) if effect == "sensor_dropout" else None,
+            )
+            plan = _dressed(rng, groups=groups, runs=_runs(purposes, rng), hidden=(hidden,))
+            out.append(Case(name, 8000 + len(out), "richsim", plan, (effect,)))
+    return out
+
+
+def outside() -> list[Case]:
+    """Causes that no id covers: the right answer is that none of the known ones explains it."""
+    out = []
+    for cause in OUTSIDE:
+        for k in range(4):
+            name = f"outside/{cause}/{k}"
+            rng = _draw(name, 0)
+            fixed = {"rate_hz": 500.0} if cause == "chipped_blade" else {}
+            amount = (2.0, 1.0, 1.0, 0.5)[k]
+            size = None if cause == "chipped_blade" else (5.0, 3.0, 2.0, 1.2)[k]
+            purposes = (
+                ("fast", "rich", "fast")
+                if cause in ("banner", "slosh", "sliding_battery")
+                else ("rich", "turning", "rich")
+            )
+            plan = _dressed(
+                rng,
+                groups=SPEED,
+                runs=_runs(purposes, rng),
+                hidden=(Hidden(cause, size=size, amount=amount),),
+                **fixed,
+            )
+            out.append(Case(name, 9000 + len(out), "richsim", plan, ()))
+    return out
+
+
 CLEAN_GROUPS = (
     SPEED,
     SPEED,
@@ -287,7 +498,8 @@ def mistakes() -> list[Case]:
 
 def all_cases() -> list[Case]:
     """Every case, in a fixed order; names are unique."""
-    out = [*singles(), *wrong_values(), *clean(), *mistakes()]
+    out = [*singles(), *mixtures(), *wrong_values(), *confusable(), *power(), *partial()]
+    out += [*outside(), *mistakes(), *clean()]
     names = [c.name for c in out]
     if len(set(names)) != len(names):
         raise ValueError("two cases carry the same name")

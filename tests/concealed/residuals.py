@@ -1,7 +1,8 @@
 """The mismatch of a recording with the plain rigid body, computed here only to size effects and to score.
 
-Both sides pass the same zero-phase low-pass (20 Hz, or 0.4 of the rate below 50 Hz). Channels: force and moment in body
-axes, rotor speed against command, and two kinematic ones (specific force against velocity, rates against attitude).
+Both sides pass the same zero-phase low-pass (20 Hz, or 0.4 of the rate below 50 Hz). Channels: force and
+moment in body axes, rotor speed against command, and two kinematic ones (specific force against velocity, rates
+against attitude).
 """
 
 import numpy as np

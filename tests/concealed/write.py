@@ -10,7 +10,7 @@ import yaml
 
 @dataclass(frozen=True)
 class Recording:
-    """A finished set: vehicle.yaml as a dict, one table a run (contract columns), and the held-out runs if named."""
+    """A finished set: vehicle.yaml as a dict, one contract table a run, the held-out runs if named."""
 
     vehicle: dict
     runs: dict[str, pd.DataFrame]

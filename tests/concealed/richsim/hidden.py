@@ -1,8 +1,8 @@
 """The hidden causes, one function each: what changes in the world for an `amount`, and the truth to be found.
 
-Amount 1 is a plausible size for the vehicle at hand; amounts outside `bounds` are not plausible. A cause changes a
-`World` in place and returns its true parameters as (symbol, value, unit). Directions and signs are drawn from the
-cause's own random stream, so that the same cause at another amount keeps its direction.
+Amount 1 is a plausible size for the vehicle at hand; amounts outside `bounds` are not plausible. A cause changes
+a `World` in place and returns its true parameters as (symbol, value, unit). Directions and signs are drawn from
+the cause's own random stream, so that the same cause at another amount keeps its direction.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Truth = list[tuple[str, float, str]]
 
 @dataclass
 class World:
-    """Everything that differs from a clean flight: physics, sensor errors, wind, and what is done to the files."""
+    """All that differs from a clean flight: physics, sensor errors, wind, what is done to the files."""
 
     airframe: Airframe
     values: dict
@@ -26,6 +26,7 @@ class World:
     winds: list[Callable[[np.ndarray], np.ndarray]] = field(default_factory=list)
     ring: bool = False
     believed_limit: float | None = None
+    discharge: float = 1.0  # how far the battery empties from run to run and within a run
     file_edits: list[dict] = field(default_factory=list)
 
     @classmethod
@@ -35,7 +36,7 @@ class World:
 
 @dataclass(frozen=True)
 class Hidden:
-    """One hidden cause: its id, the wanted rms over the noise (or a direct `amount`), its form and its time window."""
+    """One hidden cause: its id, the wanted rms over the noise (or a direct `amount`), form and time window."""
 
     id: str
     size: float | None = None
@@ -61,10 +62,33 @@ def _arm(a):
 
 def rotor_drag(w, x, h, rng) -> Truth:
     a = w.airframe
+    if h.form == "blade":
+        w.values["blade_sideforce"] = x
+        _blades(w)
+        v, s = 3.0, a.hover_speed_rad_s
+        k = x * physics.blade_forces(s, 0.0, v, physics.to_tuple(w.values))[1] / (s * v)
+        return [("k_d", k, "N/(rad/s m/s)")]
     k = 0.35 * a.mass_kg / (a.n * a.hover_speed_rad_s) * x
     w.values["drag_w"] = k
     w.values["drag_at_hubs"] = 0.0 if h.form == "centre" else 1.0
     return [("k_d", k, "N/(rad/s m/s)")]
+
+
+def _blades(w) -> None:
+    """Pitch the blades so that they carry the vehicle: thrust C_F w^2 in still air."""
+    a = w.airframe
+    s = a.hover_speed_rad_s
+    w.values["solidity"] = 0.37 * a.rotor_radius_m**2  # three blades, chord a fifth of the radius
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        w.values["blade_pitch"] = 0.5 * (low + high)
+        thrust, _ = physics.blade_forces(s, 0.0, 0.0, physics.to_tuple(w.values))
+        low, high = (
+            (w.values["blade_pitch"], high)
+            if thrust < a.thrust_coefficient * s * s
+            else (low, w.values["blade_pitch"])
+        )
+    w.values["solidity_thrust"] = a.thrust_coefficient
 
 
 def frame_drag(w, x, h, rng) -> Truth:
@@ -76,6 +100,12 @@ def frame_drag(w, x, h, rng) -> Truth:
 
 
 def translational_lift(w, x, h, rng) -> Truth:
+    if h.form == "blade":
+        w.values["blade_edge"] = x
+        _blades(w)
+        v, s = 5.0, w.airframe.hover_speed_rad_s
+        thrust, _ = physics.blade_forces(s, 0.0, v, physics.to_tuple(w.values))
+        return [("k_h", x * (thrust - w.airframe.thrust_coefficient * s * s) / v**2, "N/(m/s)^2")]
     k = 0.009 * w.airframe.mass_kg / w.airframe.n * x
     w.values["lift"] = k
     return [("k_h", k, "N/(m/s)^2")]
@@ -83,6 +113,13 @@ def translational_lift(w, x, h, rng) -> Truth:
 
 def axial_inflow(w, x, h, rng) -> Truth:
     a = w.airframe
+    if h.form == "blade":
+        w.values["blade_inflow"] = x
+        _blades(w)
+        v, s = 1.0, a.hover_speed_rad_s
+        values = physics.to_tuple(w.values)
+        rise = physics.blade_forces(s, v, 0.0, values)[0] - physics.blade_forces(s, -v, 0.0, values)[0]
+        return [("k_z", x * rise / (2 * v * s), "N/(rad/s m/s)")]
     k = 0.5 * a.mass_kg / (a.n * a.hover_speed_rad_s) * x
     w.values["inflow"] = k
     return [("k_z", k, "N/(rad/s m/s)")]
@@ -107,11 +144,14 @@ def motor_lag(w, x, h, rng) -> Truth:
 def battery_sag(w, x, h, rng) -> Truth:
     a = w.airframe
     power = a.n * a.torque_coefficient * a.hover_speed_rad_s**3 / 0.6
-    volts = w.values["voltage_reference_v"]
-    w.values["sag"] = x
-    w.values["resistance_ohm"] = 0.06 * volts * volts / power
-    w.values["capacity_as"] = power / volts * 180.0
-    return [("exponent", x, "-"), ("V_ref", volts, "V"), ("R_b", w.values["resistance_ohm"], "ohm")]
+    # speed is proportional to voltage; the amount sets how far the voltage moves
+    full = float(physics.open_circuit_v(0.9, float(a.cells)))
+    w.discharge = x
+    w.values["sag"] = 1.0
+    w.values["resistance_ohm"] = 0.05 * x * full * full / power
+    w.values["capacity_as"] = power / full * 180.0 / x
+    w.values["voltage_reference_v"] = full * (1 - 0.05 * x)
+    return [("V_ref", w.values["voltage_reference_v"], "V"), ("R_b", w.values["resistance_ohm"], "ohm")]
 
 
 def thrust_curve(w, x, h, rng) -> Truth:
@@ -156,6 +196,10 @@ def unequal_rotors(w, x, h, rng) -> Truth:
     if h.form == "one":
         d = np.zeros(n)
         d[rng.integers(n)] = -0.08 * x
+    elif h.form == "plane":
+        # a pattern whose moments are those of a shifted centre of mass, without yaw
+        place = np.array(w.airframe.positions_m)[:, :2] / _arm(w.airframe)
+        d = 0.04 * x * place @ _direction(rng)
     else:
         d = rng.standard_normal(n)
         d = 0.04 * x * (d - d.mean()) / d.std()

@@ -89,7 +89,10 @@ def build(segments, altitude_m, step_s, n_rotors, rng, warm_up_s=6.0, top_hz=8.0
             phase = _ramped_phase(t, s.duration_s, s.speed / s.size, 3.0)
             offset[:, :2] = s.size * np.sin(phase)[:, None] * ahead
         elif s.kind == "one_way":
-            offset[:, :2] = (_step(t, s.duration_s) * s.size)[:, None] * ahead
+            # speed up in 4 s, hold it within a tenth, slow down in 4 s
+            envelope = _step(t, 4.0) * _step(s.duration_s - t, 4.0)
+            speed = s.speed * envelope * (1 + 0.08 * np.sin(2 * np.pi * t / 7.0))
+            offset[:, :2] = (np.cumsum(speed) * step_s)[:, None] * ahead
         elif s.kind == "vertical":
             phase = _ramped_phase(t, s.duration_s, s.speed / s.size, 2.0)
             offset[:, 2] = -s.size * np.sin(phase)

@@ -9,7 +9,7 @@ from .vehicles import Airframe
 def programme(
     purpose: str, duration_s: float, airframe: Airframe, rng: np.random.Generator, slow: bool
 ) -> tuple[list[Segment], float]:
-    """Segments that fill `duration_s`, and the starting altitude in m; `slow` halves speeds for low recording rates."""
+    """Segments that fill `duration_s`, and the starting altitude in m; `slow` flies gently, for low rates."""
     f = 0.6 if slow else 1.0
     heading = rng.uniform(0, 2 * np.pi)
     u = rng.uniform
@@ -108,5 +108,6 @@ def programme(
             Segment("yaw", 0.2 * d, 0.6),
         ], 5.0
     if purpose == "one_way":
-        return [Segment("one_way", d, size=6.0 * f * d * 0.5, heading_rad=0.0)], 10.0
+        # forwards only, always about the same speed
+        return [Segment("one_way", d, speed=6.0 * f, heading_rad=0.0)], 10.0
     raise ValueError(f"unknown purpose {purpose!r}")

@@ -1,4 +1,4 @@
-"""From a plan to a recording set and its truth: fly every run, hide the causes, size them against the noise."""
+"""From a plan to a recording set and its truth: fly every run, hide the causes, size them by the noise."""
 
 import zlib
 from dataclasses import asdict, dataclass, field, replace
@@ -34,6 +34,7 @@ class Plan:
     wrong: tuple[tuple[str, float], ...] = ()  # name of vehicle.yaml, believed over true
     late_fraction: float = 0.0  # motor columns late by this part of a sample: a nuisance, not a finding
     jitter_s: float = 0.0
+    trim_s: float = 0.0  # left out at both ends of a flight
     pose_every: int = 1
     held_out: bool = False
     form: str = "csv"
@@ -85,7 +86,7 @@ def _fly(plan: Plan, airframe: Airframe, world: World, reference, i: int, seed: 
         ring = sensors.lfilter([1 - a], [1, -a], ring, axis=0)
         ring /= ring.std()
     values = flying.tuned(world.values, plan.rate_hz)
-    charge = 0.95 - 0.18 * i - 0.02 * _rng(seed, "charge", i).random()
+    charge = 0.9 - world.discharge * (0.16 * i + 0.02 * _rng(seed, "charge", i).random())
     return flying.fly(airframe, values, reference, wind, ring, charge)
 
 
@@ -180,7 +181,9 @@ def _believed(plan: Plan, airframe: Airframe, world: World) -> tuple[dict, dict]
 def _record(plan, airframe, world, flight, i, seed, start_s=0.0):
     late = world.errors.get("late_motor_s", 0.0) + plan.late_fraction / plan.rate_hz
     errors = sensors.Errors(**(world.errors | {"late_motor_s": late}))
-    layout = sensors.Layout(plan.rate_hz, plan.groups, start_s, plan.jitter_s, plan.pose_every)
+    layout = sensors.Layout(
+        plan.rate_hz, plan.groups, start_s, plan.jitter_s, plan.pose_every, 0.15 + plan.trim_s
+    )
     ideal, written = sensors.record(
         flight, layout, plan.noise, errors, airframe.max_speed_rad_s, _rng(seed, "noise", i)
     )
@@ -338,11 +341,16 @@ def make(plan: Plan, seed: int) -> tuple[Recording, dict, dict[str, pd.DataFrame
             }
         )
     outside = [
-        {"id": h.id, "acceptable": list(CAUSES[h.id].acceptable), "size_over_noise": sizes[k]["size"], "main_channel": sizes[k]["channel"],
-         "parameters": [{"symbol": s, "value": v, "unit": u} for s, v, u in parameters[k]]}
+        {
+            "id": h.id,
+            "acceptable": list(CAUSES[h.id].acceptable),
+            "size_over_noise": sizes[k]["size"],
+            "main_channel": sizes[k]["channel"],
+            "parameters": [{"symbol": s, "value": v, "unit": u} for s, v, u in parameters[k]],
+        }
         for k, h in enumerate(plan.hidden)
         if h.id in OUTSIDE
-    ]  # fmt: skip
+    ]
     if outside:
         verdict = ["partly_explained", "unexplained"]
     elif effects or wrong:

@@ -1,7 +1,7 @@
-"""Turn a flight into recorded columns: sampling, clocks, latency, sensor errors, coloured noise, quantisation.
+"""Turn a flight into recorded columns: sampling, clocks, latency, errors, coloured noise, quantisation.
 
-`record` returns two tables of the same rows: as an ideal logger would have written it (errors that are effects
-included, noise not), and as written.
+`record` returns two tables of the same rows: as an ideal logger would have written it (errors that are
+effects included, noise not), and as written.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Noise:
-    """One-sigma noise of each sensor per sample, the share of its variance that is coloured, and its memory."""
+    """One-sigma noise of each sensor per sample, the coloured share of its variance, and its memory."""
 
     specific_force_m_s2: float = 0.15
     angular_velocity_rad_s: float = 0.015
@@ -64,6 +64,7 @@ class Layout:
     start_s: float = 0.0
     jitter_s: float = 0.0
     pose_every: int = 1
+    margin_s: float = 0.15
 
 
 def _coloured(rng, shape, noise: Noise, rate_hz):
@@ -90,8 +91,7 @@ def record(
     flight: Flight, layout: Layout, noise: Noise, errors: Errors, max_speed: float, rng: np.random.Generator
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """(ideal, written) tables with contract columns."""
-    margin = 0.15
-    t0, t1 = flight.time_s[0] + margin, flight.time_s[-1] - margin
+    t0, t1 = flight.time_s[0] + layout.margin_s, flight.time_s[-1] - layout.margin_s
     k = int((t1 - t0) * layout.rate_hz)
     t = t0 + np.arange(k) / layout.rate_hz
     if layout.jitter_s > 0:
