@@ -1,8 +1,9 @@
 """Build concealed sets.
 
-`python -m tests.concealed.build --cases 'single/*/moderate/0' --out DIR --answers DIR2`: sets go to DIR/<set>/
-under names that say nothing; the truth goes to DIR2/<set>.json, which the stage under test must never read.
-What is already built is left alone, so an interrupted build goes on where it stopped.
+    python -m tests.concealed.build --cases 'single/*/moderate/0' --out DIR --answers DIR2
+
+Sets go to DIR/<set>/ under names that say nothing; the truth goes to DIR2/<set>.json, which the stage under
+test must never read. What is already built is left alone: an interrupted build goes on where it stopped.
 """
 
 import argparse
@@ -12,14 +13,15 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from . import cases
+from . import cases, rotorpy_cases
 from .richsim import scene
 from .write import write_set
 
 
 def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> Path:
     """Write one set and its answer; with `signals` also the noise-free tables beside the answer."""
-    recording, truth, ideals = scene.make(case.settings, case.seed)
+    make = {"richsim": scene.make, "rotorpy": rotorpy_cases.make}[case.generator]
+    recording, truth, ideals = make(case.settings, case.seed)
     write_set(recording, out / case.set_name)
     answers.mkdir(parents=True, exist_ok=True)
     if signals:

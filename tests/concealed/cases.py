@@ -13,6 +13,7 @@ import numpy as np
 from .richsim.hidden import OUTSIDE, Hidden
 from .richsim.scene import Plan, Run
 from .richsim.sensors import Noise
+from .rotorpy_cases import RotorpyPlan
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Case:
     name: str
     seed: int
     generator: str
-    settings: Plan
+    settings: Plan | RotorpyPlan
     truth: tuple[str, ...]
 
     @property
@@ -249,7 +250,7 @@ MIXTURES = (
 
 
 def mixtures() -> list[Case]:
-    """Two to four effects at once, each about one to three times the noise; a third with a wrong value too."""
+    """Two to four effects at once, each one to three times the noise; some with a wrong value too."""
     out = []
     for m, (groups, effects) in enumerate(MIXTURES):
         for k in range(2):
@@ -322,7 +323,7 @@ PAIRS = (
 
 
 def confusable() -> list[Case]:
-    """Pairs that imitate each other, flown and recorded so that they can be told apart, and so that they cannot."""
+    """Pairs that imitate each other, recorded so that they can be told apart, and so that they cannot."""
     out = []
     for p, (first, second, without, with_) in enumerate(PAIRS):
         for effect, form in (first, second):
@@ -496,10 +497,51 @@ def mistakes() -> list[Case]:
     return out
 
 
+ROTORPY = (
+    ("clean", {}, SPEED),
+    ("rotor_drag", {"k_d": 1.0}, SPEED),
+    ("axial_inflow", {"k_z": 1.0}, SPEED),
+    ("translational_lift", {"k_h": 1.0}, SPEED),
+    ("frame_drag", {"c_D": 1.0}, SPEED),
+    ("flapping_moment", {"k_flap": 1.0}, SPEED),
+    ("inertia_products", {"I": 1.0}, SPEED),
+    ("motor_lag", {"tau_m": 1.0}, BOTH),
+    ("steady_wind", {"k_d": 1.0, "wind": 1.0}, SPEED),
+    ("gust", {"k_d": 1.0, "gust": 1.0}, SPEED),
+    ("as_published", {"k_d": 1.0, "k_z": 1.0, "k_h": 1.0, "c_D": 1.0}, SPEED),
+    ("as_published_with_lag", {"k_d": 1.0, "k_z": 1.0, "k_h": 1.0, "c_D": 1.0, "tau_m": 1.0}, BOTH),
+    ("wrong_mass", {"mass_kg": 1.05}, SPEED),
+    ("wrong_inertia", {"inertia_xx_kg_m2": 0.93}, SPEED),
+)
+
+
+def rotorpy() -> list[Case]:
+    """Recordings by RotorPy, an independent simulator; its published coefficients whole, and a quarter of them."""
+    out = []
+    for label, switches, groups in ROTORPY:
+        for vehicle in ("hummingbird", "crazyflie"):
+            for k in range(5 if label == "clean" else 2):
+                name = f"rotorpy/{label}/{vehicle}/{k}"
+                rng = _draw(name, 0)
+                whole = k == 0 or label.startswith(("clean", "wrong"))
+                scaled = {s: v if whole else v / 4 for s, v in switches.items()}
+                plan = RotorpyPlan(
+                    vehicle=vehicle,
+                    switches=tuple(scaled.items()),
+                    rate_hz=float(rng.choice([125.0, 250.0])),
+                    groups=groups,
+                    runs=_runs(("rich", "fast", "climbs"), rng, 20.0),
+                    noise=_noise(rng),
+                    form=str(rng.choice(["csv", "csv.gz", "parquet"])),
+                )
+                out.append(Case(name, 10000 + len(out), "rotorpy", plan, plan.ids()))
+    return out
+
+
 def all_cases() -> list[Case]:
     """Every case, in a fixed order; names are unique."""
     out = [*singles(), *mixtures(), *wrong_values(), *confusable(), *power(), *partial()]
-    out += [*outside(), *mistakes(), *clean()]
+    out += [*outside(), *mistakes(), *rotorpy(), *clean()]
     names = [c.name for c in out]
     if len(set(names)) != len(names):
         raise ValueError("two cases carry the same name")

@@ -1,12 +1,13 @@
 """The mismatch of a recording with the plain rigid body, computed here only to size effects and to score.
 
 Both sides pass the same zero-phase low-pass (20 Hz, or 0.4 of the rate below 50 Hz). Channels: force and
-moment in body axes, rotor speed against command, and two kinematic ones (specific force against velocity, rates
-against attitude).
+moment in body axes, rotor speed against command, and two kinematic ones (specific force against velocity,
+rates against attitude).
 """
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 CUTOFF_HZ = 20.0
@@ -40,7 +41,7 @@ def residuals(table: pd.DataFrame, vehicle: dict) -> dict[str, np.ndarray]:
         return sosfiltfilt(sos, x, axis=0)
 
     def slope(x):
-        return np.gradient(x, 1 / rate, axis=0)
+        return CubicSpline(np.arange(len(x)) / rate, x, axis=0)(np.arange(len(x)) / rate, 1)
 
     n = len(vehicle["rotors"])
     mass, g = vehicle["mass_kg"], vehicle.get("gravity_m_s2", 9.81)

@@ -11,7 +11,7 @@ from .vehicles import Airframe
 
 @dataclass(frozen=True)
 class Flight:
-    """Truth on the simulator's own grid (k steps, n rotors); position and velocity are of the body's origin."""
+    """Truth on the simulator's own grid (k steps, n rotors); position and velocity of the body's origin."""
 
     time_s: np.ndarray  # (k,)
     position_m: np.ndarray  # (k, 3) world

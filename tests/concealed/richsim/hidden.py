@@ -1,8 +1,8 @@
 """The hidden causes, one function each: what changes in the world for an `amount`, and the truth to be found.
 
-Amount 1 is a plausible size for the vehicle at hand; amounts outside `bounds` are not plausible. A cause changes
-a `World` in place and returns its true parameters as (symbol, value, unit). Directions and signs are drawn from
-the cause's own random stream, so that the same cause at another amount keeps its direction.
+Amount 1 is a plausible size for the vehicle at hand; amounts outside `bounds` are not plausible. A cause
+changes a `World` in place and returns its true parameters as (symbol, value, unit). Directions and signs are
+drawn from the cause's own random stream, so that the same cause at another amount keeps its direction.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ class World:
 
 @dataclass(frozen=True)
 class Hidden:
-    """One hidden cause: its id, the wanted rms over the noise (or a direct `amount`), form and time window."""
+    """One hidden cause: id, wanted rms over the noise (or a direct `amount`), form and time window."""
 
     id: str
     size: float | None = None

@@ -1,9 +1,9 @@
 """Equations of motion of a multirotor with every hidden effect as a switch, integrated by RK4.
 
-World: north, east, down. Body: forward, right, down. Rotor i pushes along its axis e_i (nominally -z); `spin` is
-+1 for counter-clockwise seen from above, whose reaction on the airframe is a positive yaw moment. All effects are
-zero by default: then the vehicle is a rigid body with F = C_F w^2, Q = C_Q w^2 and rotor speed equal to the
-command at once.
+World: north, east, down. Body: forward, right, down. Rotor i pushes along its axis e_i (nominally -z); `spin`
+is +1 for counter-clockwise seen from above, whose reaction on the airframe is a positive yaw moment. All
+effects are zero by default: then the vehicle is a rigid body with F = C_F w^2, Q = C_Q w^2 and rotor speed
+equal to the command at once.
 """
 
 from collections import namedtuple
