@@ -516,7 +516,7 @@ ROTORPY = (
 
 
 def rotorpy() -> list[Case]:
-    """Recordings by RotorPy, an independent simulator; its published coefficients whole, and a quarter of them."""
+    """Recordings by RotorPy, an independent simulator: its published coefficients, and a quarter of them."""
     out = []
     for label, switches, groups in ROTORPY:
         for vehicle in ("hummingbird", "crazyflie"):

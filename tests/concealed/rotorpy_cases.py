@@ -1,8 +1,8 @@
 """Recordings flown by RotorPy (Folk, Paulos, Kumar 2023; PyPI `rotorpy`), turned into the contract's axes.
 
-RotorPy's world is z up (taken as north-west-up) and its body forward-left-up, so both turn by half a turn about
-x: (x, y, z) -> (x, -y, -z). Its `rotor_directions` +1 pushes the airframe counter-clockwise seen from above: that
-rotor spins clockwise. Aerodynamic coefficients are zero unless a case switches them on.
+RotorPy's world is z up (taken as north-west-up) and its body forward-left-up, so both turn by half a turn
+about x: (x, y, z) -> (x, -y, -z). Its `rotor_directions` +1 pushes the airframe counter-clockwise seen from
+above: that rotor spins clockwise. Aerodynamic coefficients are zero unless a case switches them on.
 """
 
 import importlib
@@ -121,7 +121,7 @@ def _airframe(p: dict, name: str) -> Airframe:
 
 
 def fly(parameters: dict, airframe: Airframe, reference: manoeuvres.Reference, wind) -> Flight:
-    """Fly a reference with RotorPy's vehicle, controller and wind; both reference and flight in contract axes."""
+    """Fly a reference with RotorPy's vehicle, controller and wind; reference and flight in contract axes."""
     from rotorpy.controllers.quadrotor_control import SE3Control
     from rotorpy.vehicles.multirotor import Multirotor
 

@@ -471,7 +471,12 @@ def fly(P, h, pref, vref, aref, yawref, att, frac, wind, ring, charge0, out):
         want = acc.copy()
         want[2] = min(max(want[2], -15.0), 6.5) - P.gravity
         down = -want / np.sqrt(want[0] ** 2 + want[1] ** 2 + want[2] ** 2)
-        heading = np.array([np.cos(yawref[k]), np.sin(yawref[k]), 0.0])
+        # a far turn is taken in steps, so that it does not spoil the tilt
+        yaw = np.arctan2(R[1, 0], R[0, 0])
+        turn_by = (yawref[k] - yaw + np.pi) % (2 * np.pi) - np.pi
+        aim = yaw + min(max(turn_by, -0.5), 0.5)
+        yaw_rate = (yawref[min(k + 1, steps - 1)] - yawref[k]) / h
+        heading = np.array([np.cos(aim), np.sin(aim), 0.0])
         right = _cross(down, heading)
         right /= np.sqrt(right[0] ** 2 + right[1] ** 2 + right[2] ** 2)
         ahead = _cross(right, down)
@@ -486,7 +491,7 @@ def fly(P, h, pref, vref, aref, yawref, att, frac, wind, ring, charge0, out):
         for a in range(3):
             r = rate if a < 2 else 0.5 * rate
             moment_sum[a] += J[a, a] * r**3 * 0.15 * err[a] * h
-            turn[a] = J[a, a] * (r * r * err[a] - 1.7 * r * om[a]) + moment_sum[a]
+            turn[a] = J[a, a] * (r * r * err[a] - 1.7 * r * (om[a] - yaw_rate * R[2, a])) + moment_sum[a]
         turn += _cross(om, J @ om)
         authority = 0.25 * P.cq[0] / P.cf[0] * max(thrust, 0.2 * P.believed_mass * P.gravity)
         turn[2] = min(max(turn[2], -authority), authority)
