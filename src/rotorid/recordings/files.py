@@ -127,8 +127,7 @@ def check_table(table: pd.DataFrame, where: str) -> pd.DataFrame:
     if (steps <= 0).any():
         row = int(np.flatnonzero(steps <= 0)[0]) + 1
         raise InputError(
-            f"{where}, line {row + 2}: {c.TIME} must increase strictly, "
-            f"found {time[row]:.9g} after {time[row - 1]:.9g}"
+            f"{where}, line {row + 2}: {c.TIME} must increase strictly, found {time[row]:.9g} after {time[row - 1]:.9g}"
         )
     return table
 
@@ -175,9 +174,7 @@ def read_set(folder: Path) -> RecordingSet:
         for column in run.table.columns:
             found = c.rotor_number(column)
             if found and vehicle.kind != "bench" and not 1 <= found[1] <= vehicle.rotor_count:
-                raise InputError(
-                    f"{path}, column {column}: vehicle.yaml lists {vehicle.rotor_count} rotors only"
-                )
+                raise InputError(f"{path}, column {column}: vehicle.yaml lists {vehicle.rotor_count} rotors only")
     held_out = None
     if (folder / "split.yaml").exists():
         split = read_yaml(folder / "split.yaml")
@@ -187,9 +184,7 @@ def read_set(folder: Path) -> RecordingSet:
         held_out = tuple(str(n) for n in split.get("held_out") or ())
         for name in held_out:
             if name not in names:
-                raise InputError(
-                    f"{folder / 'split.yaml'}: held_out names run {name}, which is not in the set"
-                )
+                raise InputError(f"{folder / 'split.yaml'}: held_out names run {name}, which is not in the set")
         if len(held_out) == len(names):
             raise InputError(f"{folder / 'split.yaml'}: every run is held out, none is left to fit")
     return RecordingSet(folder.name, vehicle, runs, held_out)
@@ -208,9 +203,7 @@ def write_set(recordings: RecordingSet, parent: Path, suffix: str = ".parquet") 
             compression = {"method": "gzip", "mtime": 0} if suffix.endswith(".gz") else None
             run.table.to_csv(path, index=False, compression=compression)
     if recordings.held_out is not None:
-        (folder / "split.yaml").write_text(
-            yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8"
-        )
+        (folder / "split.yaml").write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
     return folder
 
 

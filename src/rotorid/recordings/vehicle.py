@@ -29,9 +29,7 @@ class Inertia(_Strict):
 
     def matrix(self) -> np.ndarray:
         """Inertia matrix, shape (3, 3), kg m2, body axes."""
-        return np.array(
-            [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]]
-        )
+        return np.array([[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]])
 
 
 class Rotor(_Strict):
