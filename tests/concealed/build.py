@@ -28,13 +28,9 @@ def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> 
         for run, table in ideals.items():
             (answers / case.set_name).mkdir(exist_ok=True)
             table.to_parquet(answers / case.set_name / f"{run}.parquet", index=False)
-    answer = {
-        "set": case.set_name,
-        "case": case.name,
-        "generator": case.generator,
-        "expected": list(case.truth),
-        **truth,
-    }
+    # what a hidden cause needs to show (a wind needs drag) is to be found as well
+    expected = sorted({*case.truth, *(e["id"] for e in truth["effects"])})
+    answer = {"set": case.set_name, "case": case.name, "generator": case.generator, "expected": expected, **truth}
     path = answers / f"{case.set_name}.json"
     path.write_text(json.dumps(answer, indent=1))
     return path
@@ -56,9 +52,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, help="folder for recording sets")
     parser.add_argument("--answers", type=Path, required=True, help="another folder, for the truth")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument(
-        "--signals", action="store_true", help="keep the noise-free tables beside the answers"
-    )
+    parser.add_argument("--signals", action="store_true", help="keep the noise-free tables beside the answers")
     parser.add_argument("--list", action="store_true", help="only list the cases")
     args = parser.parse_args(argv)
     chosen = cases.matching(args.cases)
@@ -68,9 +62,7 @@ def main(argv: list[str] | None = None) -> int:
     if args.answers.resolve().is_relative_to(args.out.resolve()):
         parser.error("--answers must lie outside --out")
     todo = [
-        (c, args.out, args.answers, args.signals)
-        for c in chosen
-        if not (args.answers / f"{c.set_name}.json").exists()
+        (c, args.out, args.answers, args.signals) for c in chosen if not (args.answers / f"{c.set_name}.json").exists()
     ]
     print(f"{len(chosen)} cases, {len(chosen) - len(todo)} already built", file=sys.stderr)
     failed = 0

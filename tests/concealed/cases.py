@@ -268,13 +268,9 @@ def mixtures() -> list[Case]:
             purposes = ("fast", "excite", vertical, "turning" if k else "rich")
             wrong = ()
             if m % 3 == 0 and k == 1:
-                wrong = (
-                    (str(rng.choice(WRONG_NAMES)), 1 + float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.06))),
-                )
+                wrong = ((str(rng.choice(WRONG_NAMES)), 1 + float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.06))),)
             rate = {"rate_hz": 250.0} if "delay" in effects or "motor_lag" in effects else {}
-            plan = _dressed(
-                rng, groups=groups, runs=_runs(purposes, rng), hidden=tuple(hidden), wrong=wrong, **rate
-            )
+            plan = _dressed(rng, groups=groups, runs=_runs(purposes, rng), hidden=tuple(hidden), wrong=wrong, **rate)
             out.append(Case(name, 5000 + 2 * m + k, "richsim", plan, (*effects, *(w for w, _ in wrong))))
     # the blade-element rotor: not the catalogue's own formulas
     blades = (("rotor_drag",), ("axial_inflow",), ("translational_lift",))
@@ -285,9 +281,7 @@ def mixtures() -> list[Case]:
             rng = _draw(name, 0)
             sizes = {e: (1.0, 0.5, 0.2)[k] * (3 if e == "rotor_drag" else 1) for e in effects}
             hidden = tuple(Hidden(e, amount=sizes[e], form="blade") for e in effects)
-            plan = _dressed(
-                rng, groups=SPEED, runs=_runs(("fast", "climbs", "rich", "fast"), rng), hidden=hidden
-            )
+            plan = _dressed(rng, groups=SPEED, runs=_runs(("fast", "climbs", "rich", "fast"), rng), hidden=hidden)
             out.append(Case(name, 5500 + 3 * m + k, "richsim", plan, effects))
     return out
 
@@ -331,9 +325,7 @@ def confusable() -> list[Case]:
                 for k in range(2):
                     name = f"confusable/{p}/{effect}/{telling}/{k}"
                     rng = _draw(name, 0)
-                    size = (
-                        None if effect in ("motor_lag", "delay") else {"without": 0.7, "with": 2.0}[telling]
-                    )
+                    size = None if effect in ("motor_lag", "delay") else {"without": 0.7, "with": 2.0}[telling]
                     one_way = purposes[0] == "one_way"
                     plan = _dressed(
                         rng,

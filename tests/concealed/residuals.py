@@ -58,8 +58,7 @@ def residuals(table: pd.DataFrame, vehicle: dict) -> dict[str, np.ndarray]:
         command = table[[f"rotor_command_{i + 1}_rad_s" for i in range(n)]].to_numpy(float)
     elif "throttle_1" in table:
         command = (
-            table[[f"throttle_{i + 1}" for i in range(n)]].to_numpy(float)
-            * vehicle["rotor_speed_limits_rad_s"][1]
+            table[[f"throttle_{i + 1}" for i in range(n)]].to_numpy(float) * vehicle["rotor_speed_limits_rad_s"][1]
         )
     w = speed if speed is not None else command
     out = {}

@@ -159,9 +159,7 @@ def fly(parameters: dict, airframe: Airframe, reference: manoeuvres.Reference, w
         }
         control = controller.update(t, state, flat)
         rates = vehicle.statedot(state, control, STEP_S)
-        command = np.clip(
-            control["cmd_motor_speeds"], parameters["rotor_speed_min"], parameters["rotor_speed_max"]
-        )
+        command = np.clip(control["cmd_motor_speeds"], parameters["rotor_speed_min"], parameters["rotor_speed_max"])
         body = Rotation.from_quat(state["q"]).inv().apply(rates["vdot"] + np.array([0, 0, g]))
         parts = (
             state["x"],
@@ -177,10 +175,7 @@ def fly(parameters: dict, airframe: Airframe, reference: manoeuvres.Reference, w
         state = vehicle.step(state, control, STEP_S)
     keep = reference.time_s >= -1e-9
     out = np.array(rows)[keep]
-    if (
-        np.linalg.norm(out[:, 0:3] * TURN - reference.position_m[keep], axis=1).max() > 15
-        or not np.isfinite(out).all()
-    ):
+    if np.linalg.norm(out[:, 0:3] * TURN - reference.position_m[keep], axis=1).max() > 15 or not np.isfinite(out).all():
         raise RuntimeError("RotorPy's vehicle was lost")
     x, y, z, w = out[:, 6:10].T
     flips = np.cumprod(np.where((out[1:, 6:10] * out[:-1, 6:10]).sum(1) < 0, -1.0, 1.0))

@@ -34,9 +34,7 @@ class Flight:
         """Specific force (k, 3) felt at a body point."""
         arm = np.asarray(point_m) - self.centre_m
         w = self.rates_rad_s
-        return (
-            self.centre_specific_force + np.cross(self.rate_derivative, arm) + np.cross(w, np.cross(w, arm))
-        )
+        return self.centre_specific_force + np.cross(self.rate_derivative, arm) + np.cross(w, np.cross(w, arm))
 
 
 def rotations(q: np.ndarray) -> np.ndarray:
@@ -93,9 +91,7 @@ def fly(
     )
     lost = np.linalg.norm(out[:done, 0:3] - reference.position_m[:done], axis=1).max() > 15.0
     if done < k or lost:
-        raise RuntimeError(
-            f"the vehicle was lost after {done * airframe.step_s:.1f} s of {k * airframe.step_s:.1f} s"
-        )
+        raise RuntimeError(f"the vehicle was lost after {done * airframe.step_s:.1f} s of {k * airframe.step_s:.1f} s")
     keep = reference.time_s >= -1e-9
     out = out[keep]
     aux = out[:, size:]

@@ -84,9 +84,7 @@ def _blades(w) -> None:
         w.values["blade_pitch"] = 0.5 * (low + high)
         thrust, _ = physics.blade_forces(s, 0.0, 0.0, physics.to_tuple(w.values))
         low, high = (
-            (w.values["blade_pitch"], high)
-            if thrust < a.thrust_coefficient * s * s
-            else (low, w.values["blade_pitch"])
+            (w.values["blade_pitch"], high) if thrust < a.thrust_coefficient * s * s else (low, w.values["blade_pitch"])
         )
     w.values["solidity_thrust"] = a.thrust_coefficient
 
@@ -329,9 +327,7 @@ def delay(w, x, h, rng) -> Truth:
         late = w.values["dead_time_s"]
     else:
         w.errors[
-            {"": "late_motor_s", "motor": "late_motor_s", "imu": "late_inertial_s", "pose": "late_pose_s"}[
-                h.form
-            ]
+            {"": "late_motor_s", "motor": "late_motor_s", "imu": "late_inertial_s", "pose": "late_pose_s"}[h.form]
         ] = late
     return [("T_d", late, "s")]
 

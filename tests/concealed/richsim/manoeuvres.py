@@ -77,14 +77,10 @@ def build(segments, altitude_m, step_s, n_rotors, rng, warm_up_s=6.0, top_hz=8.0
         side = np.array([-ahead[1], ahead[0]])
         if s.kind == "eight":
             phase = _ramped_phase(t, s.duration_s, s.speed / s.size / np.sqrt(2), 3.0)
-            offset[:, :2] = (
-                s.size * np.sin(phase)[:, None] * ahead + s.size / 2 * np.sin(2 * phase)[:, None] * side
-            )
+            offset[:, :2] = s.size * np.sin(phase)[:, None] * ahead + s.size / 2 * np.sin(2 * phase)[:, None] * side
         elif s.kind == "circle":
             phase = _ramped_phase(t, s.duration_s, s.speed / s.size, 3.0)
-            offset[:, :2] = (
-                s.size * np.sin(phase)[:, None] * ahead + s.size * (1 - np.cos(phase))[:, None] * side
-            )
+            offset[:, :2] = s.size * np.sin(phase)[:, None] * ahead + s.size * (1 - np.cos(phase))[:, None] * side
         elif s.kind == "sweep":
             phase = _ramped_phase(t, s.duration_s, s.speed / s.size, 3.0)
             offset[:, :2] = s.size * np.sin(phase)[:, None] * ahead

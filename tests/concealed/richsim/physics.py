@@ -496,12 +496,7 @@ def fly(P, h, pref, vref, aref, yawref, att, frac, wind, ring, charge0, out):
         authority = 0.25 * P.cq[0] / P.cf[0] * max(thrust, 0.2 * P.believed_mass * P.gravity)
         turn[2] = min(max(turn[2], -authority), authority)
         for i in range(n):
-            s = (
-                P.mixer[i, 0] * thrust
-                + P.mixer[i, 1] * turn[0]
-                + P.mixer[i, 2] * turn[1]
-                + P.mixer[i, 3] * turn[2]
-            )
+            s = P.mixer[i, 0] * thrust + P.mixer[i, 1] * turn[0] + P.mixer[i, 2] * turn[1] + P.mixer[i, 3] * turn[2]
             target[i] = np.sqrt(min(max(s, wmin2), wmax2)) * (1 + frac[k, i])
         if dead > 0:
             history[k % (dead + 1)] = target
@@ -527,9 +522,7 @@ def fly(P, h, pref, vref, aref, yawref, att, frac, wind, ring, charge0, out):
 
 def to_tuple(values: dict) -> Physics:
     """Freeze a parameter dict for the compiled code."""
-    return Physics(
-        **{k: np.ascontiguousarray(x, float) if np.ndim(x) else float(x) for k, x in values.items()}
-    )
+    return Physics(**{k: np.ascontiguousarray(x, float) if np.ndim(x) else float(x) for k, x in values.items()})
 
 
 def state_size(n: int) -> int:

@@ -108,9 +108,7 @@ def _edit(table: pd.DataFrame, edits, run_index: int, start_s: float, n: int) ->
             inside = (t >= e["windows"][0]) & (t <= e["windows"][1])
             rotor = 1 + e["draw"] % n
             column = [
-                c
-                for c in (f"rotor_speed_{rotor}_rad_s", "specific_force_x_m_s2", "velocity_x_m_s")
-                if c in table
+                c for c in (f"rotor_speed_{rotor}_rad_s", "specific_force_x_m_s2", "velocity_x_m_s") if c in table
             ][0]
             if e["form"] == "zero":
                 table.loc[inside, column] = 0.0
@@ -181,9 +179,7 @@ def _believed(plan: Plan, airframe: Airframe, world: World) -> tuple[dict, dict]
 def _record(plan, airframe, world, flight, i, seed, start_s=0.0):
     late = world.errors.get("late_motor_s", 0.0) + plan.late_fraction / plan.rate_hz
     errors = sensors.Errors(**(world.errors | {"late_motor_s": late}))
-    layout = sensors.Layout(
-        plan.rate_hz, plan.groups, start_s, plan.jitter_s, plan.pose_every, 0.15 + plan.trim_s
-    )
+    layout = sensors.Layout(plan.rate_hz, plan.groups, start_s, plan.jitter_s, plan.pose_every, 0.15 + plan.trim_s)
     ideal, written = sensors.record(
         flight, layout, plan.noise, errors, airframe.max_speed_rad_s, _rng(seed, "noise", i)
     )
@@ -191,58 +187,66 @@ def _record(plan, airframe, world, flight, i, seed, start_s=0.0):
     return tuple(_edit(x, edits, i, start_s, airframe.n) for x in (ideal, written))
 
 
-def _ratio(plan, airframe, hidden, base, amount, reference, seed, noise_rms) -> tuple[float, str]:
-    """Effect over noise in its main channel, both below the cutoff, of one run without noise."""
-    tables = []
-    for causes, amounts in (
-        ((*base, hidden), (*(1.0 for _ in base), amount)),
-        (base, tuple(1.0 for _ in base)),
-    ):
-        world, _ = _world(airframe, causes, amounts, seed)
-        vehicle, _ = _believed(replace(plan, wrong=()), airframe, world)
-        flight = _fly(plan, airframe, world, reference, 0, seed)
-        clean_plan = replace(plan, wrong=(), late_fraction=0.0, jitter_s=0.0)
-        tables.append(residuals(_record(clean_plan, airframe, world, flight, 0, seed)[0], vehicle))
-    with_, without = tables
-    ratios = {c: rms(with_[c] - without[c]) / noise_rms[c] for c in noise_rms if noise_rms[c] > 0}
-    main = max(ratios, key=ratios.get)
-    return ratios[main], main
+def _silent(plan, airframe, causes, amounts, reference, seed) -> dict[str, np.ndarray]:
+    """Residuals of the first run without noise, wrong values or clock trouble."""
+    plain_plan = replace(plan, wrong=(), late_fraction=0.0, jitter_s=0.0)
+    world, _ = _world(airframe, causes, amounts, seed)
+    vehicle, _ = _believed(plain_plan, airframe, world)
+    flight = _fly(plan, airframe, world, reference, 0, seed)
+    return residuals(_record(plain_plan, airframe, world, flight, 0, seed)[0], vehicle)
+
+
+def _noise_rms(plan, airframe, reference, seed) -> dict[str, float]:
+    """What noise alone leaves in each channel of the first run, nothing hidden."""
+    plain_plan = replace(plan, wrong=(), late_fraction=0.0, jitter_s=0.0)
+    world = World.clean(airframe)
+    vehicle, _ = _believed(plain_plan, airframe, world)
+    flight = _fly(plan, airframe, world, reference, 0, seed)
+    ideal, written = (residuals(x, vehicle) for x in _record(plain_plan, airframe, world, flight, 0, seed))
+    return {c: rms(written[c] - ideal[c]) for c in ideal}
 
 
 def _sized(plan, airframe, references, seed) -> list[dict]:
-    """The amount of each hidden cause: as asked, or such that it stands at the wanted size over the noise."""
-    world = World.clean(airframe)
-    vehicle, _ = _believed(replace(plan, wrong=()), airframe, world)
-    flight = _fly(plan, airframe, world, references[0], 0, seed)
-    ideal, written = _record(
-        replace(plan, wrong=(), late_fraction=0.0, jitter_s=0.0), airframe, world, flight, 0, seed
-    )
-    a, b = residuals(ideal, vehicle), residuals(written, vehicle)
-    noise_rms = {c: rms(a[c] - b[c]) for c in a}
+    """The amount of each hidden cause: as asked, or such that it stands at the wanted size over the noise.
+
+    The size is the effect's rms over the noise's in the channel where that ratio is largest, both below the cutoff.
+    """
+    noise = _noise_rms(plan, airframe, references[0], seed)
     out = []
     for h in plan.hidden:
-        low, high = CAUSES[h.id].bounds
-        base = _needs((h,))
-        amount = h.amount
         if h.id in MISTAKES or h.id == "sensor_dropout":
             out.append({"amount": 1.0, "size": None, "channel": None})
             continue
-        if h.size is not None:
-            for _ in range(4):
-                try:
-                    ratio, main = _ratio(plan, airframe, h, base, amount, references[0], seed, noise_rms)
-                except RuntimeError:  # too much to fly with: less of it
-                    amount = max(low, amount / 4)
-                    continue
-                if abs(np.log(max(ratio, 1e-9) / h.size)) < 0.1:
-                    break
-                new = float(
-                    np.clip(amount * h.size / max(ratio, 1e-6), max(low, amount / 8), min(high, amount * 8))
-                )
-                if new == amount:
-                    break
-                amount = new
-        ratio, main = _ratio(plan, airframe, h, base, amount, references[0], seed, noise_rms)
+        low, high = CAUSES[h.id].bounds
+        base = _needs((h,))
+        ones = tuple(1.0 for _ in base)
+        without = _silent(plan, airframe, base, ones, references[0], seed)
+
+        def over_noise(amount, h=h, base=base, ones=ones, without=without):
+            found = _silent(plan, airframe, (*base, h), (*ones, amount), references[0], seed)
+            ratios = {c: rms(found[c] - without[c]) / noise[c] for c in noise if noise[c] > 0}
+            main = max(ratios, key=ratios.get)
+            return ratios[main], main
+
+        amount = h.amount
+        ratio, main = np.nan, None
+        for _ in range(5):
+            try:
+                ratio, main = over_noise(amount)
+            except RuntimeError:  # too much to fly with: less of it
+                if h.size is None:
+                    raise
+                amount = max(low, amount / 4)
+                continue
+            if h.size is None or abs(np.log(max(ratio, 1e-9) / h.size)) < 0.1:
+                break
+            step = h.size / max(ratio, 1e-6)
+            new = float(np.clip(amount * step, max(low, amount / 8), min(high, amount * 8)))
+            if new == amount:
+                break
+            amount = new
+        else:
+            ratio, main = over_noise(amount)
         out.append({"amount": amount, "size": ratio, "channel": main})
     return out
 
@@ -250,9 +254,7 @@ def _sized(plan, airframe, references, seed) -> list[dict]:
 def _intervals(mask, time_s, start_s, join_s=0.5) -> list[tuple[float, float]]:
     """Spans of time in which `mask` holds, gaps below `join_s` closed."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    spans = [
-        [time_s[a] + start_s, time_s[min(b, len(time_s) - 1)] + start_s] for a, b in edges.reshape(-1, 2)
-    ]
+    spans = [[time_s[a] + start_s, time_s[min(b, len(time_s) - 1)] + start_s] for a, b in edges.reshape(-1, 2)]
     joined: list[list[float]] = []
     for s in spans:
         if joined and s[0] - joined[-1][1] < join_s:
@@ -284,8 +286,7 @@ def _locations(hidden, flights, names, starts) -> list[dict]:
             }.get(h.id)
             if mask is not None:
                 out += [
-                    {"id": h.id, "run": name, "start_s": a, "stop_s": b}
-                    for a, b in _intervals(mask, f.time_s, start)
+                    {"id": h.id, "run": name, "start_s": a, "stop_s": b} for a, b in _intervals(mask, f.time_s, start)
                 ]
     return out
 
@@ -335,9 +336,7 @@ def make(plan: Plan, seed: int) -> tuple[Recording, dict, dict[str, pd.DataFrame
                 "size_over_noise": size["size"],
                 "main_channel": size["channel"],
                 "amount": size["amount"],
-                "equivalent": sorted(
-                    {x for group in plan.equivalent if h.id in group for x in group if x != h.id}
-                ),
+                "equivalent": sorted({x for group in plan.equivalent if h.id in group for x in group if x != h.id}),
             }
         )
     outside = [

@@ -73,9 +73,7 @@ def _coloured(rng, shape, noise: Noise, rate_hz):
     if noise.coloured_share <= 0:
         return white
     a = np.exp(-1 / (rate_hz * noise.memory_s))
-    slow = lfilter([np.sqrt(1 - a * a)], [1, -a], rng.standard_normal((shape[0] + 200, *shape[1:])), axis=0)[
-        200:
-    ]
+    slow = lfilter([np.sqrt(1 - a * a)], [1, -a], rng.standard_normal((shape[0] + 200, *shape[1:])), axis=0)[200:]
     return np.sqrt(1 - noise.coloured_share) * white + np.sqrt(noise.coloured_share) * slow
 
 
@@ -152,9 +150,7 @@ def record(
             ideal[f"quaternion_{a}"] = np.where(keep, q[:, j], np.nan)
             written[f"quaternion_{a}"] = np.where(keep, noisy[:, j], np.nan)
     if "rates" in groups:
-        w = at(flight.rates_rad_s, t_inertial) * (1 + np.array(errors.rate_scale)) + np.array(
-            errors.rate_bias
-        )
+        w = at(flight.rates_rad_s, t_inertial) * (1 + np.array(errors.rate_scale)) + np.array(errors.rate_bias)
         put(_names("angular_velocity", "rad_s"), w, noise.angular_velocity_rad_s, noise.quantum_rate_rad_s)
     if "force" in groups:
         f = at(flight.specific_force_at(errors.sensor_point_m), t_inertial)
