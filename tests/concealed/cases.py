@@ -261,11 +261,14 @@ def mixtures() -> list[Case]:
                 recipe = RECIPES[effect]
                 amount = float(rng.uniform(0.6, 1.5)) if recipe.amounts else 1.0
                 size = None if recipe.amounts else float(rng.uniform(1.0, 3.0))
+                if effect == "rotor_drag" and {"gust", "steady_wind"} & set(effects):
+                    size = None  # a plausible drag: the wind acts through it
                 form = "motor" if effect == "delay" else recipe.forms[0]
                 window = _window(rng) if effect == "gust" else None
                 hidden.append(Hidden(effect, size=size, amount=amount, form=form, window=window))
-            vertical = "low" if "ground_effect" in effects else "climbs"
-            purposes = ("fast", "excite", vertical, "turning" if k else "rich")
+            # sizes are taken from the first run, which must excite what is hidden
+            first = "low" if "ground_effect" in effects else "fast"
+            purposes = (first, "excite", "climbs", "turning" if k else "rich")
             wrong = ()
             if m % 3 == 0 and k == 1:
                 wrong = ((str(rng.choice(WRONG_NAMES)), 1 + float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.06))),)

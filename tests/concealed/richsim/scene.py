@@ -212,18 +212,21 @@ def _sized(plan, airframe, references, seed) -> list[dict]:
     The size is the effect's rms over the noise's in the channel where that ratio is largest, both below the cutoff.
     """
     noise = _noise_rms(plan, airframe, references[0], seed)
-    out = []
-    for h in plan.hidden:
+    out: dict[str, dict] = {}
+    # what others need comes first, so that a wind is sized with the drag through which it acts
+    for h in sorted(plan.hidden, key=lambda h: len(CAUSES[h.id].needs)):
         if h.id in MISTAKES or h.id == "sensor_dropout":
-            out.append({"amount": 1.0, "size": None, "channel": None})
+            out[h.id] = {"amount": 1.0, "size": None, "channel": None}
             continue
         low, high = CAUSES[h.id].bounds
-        base = _needs((h,))
-        ones = tuple(1.0 for _ in base)
-        without = _silent(plan, airframe, base, ones, references[0], seed)
+        needs = CAUSES[h.id].needs
+        through = [x for x in plan.hidden if needs and x.id in out and x.id in (*needs, "frame_drag")]
+        base = tuple(through) or _needs((h,))
+        amounts = tuple(out[b.id]["amount"] if b.id in out else 1.0 for b in base)
+        without = _silent(plan, airframe, base, amounts, references[0], seed)
 
-        def over_noise(amount, h=h, base=base, ones=ones, without=without):
-            found = _silent(plan, airframe, (*base, h), (*ones, amount), references[0], seed)
+        def over_noise(amount, h=h, base=base, amounts=amounts, without=without):
+            found = _silent(plan, airframe, (*base, h), (*amounts, amount), references[0], seed)
             ratios = {c: rms(found[c] - without[c]) / noise[c] for c in noise if noise[c] > 0}
             main = max(ratios, key=ratios.get)
             return ratios[main], main
@@ -247,8 +250,8 @@ def _sized(plan, airframe, references, seed) -> list[dict]:
             amount = new
         else:
             ratio, main = over_noise(amount)
-        out.append({"amount": amount, "size": ratio, "channel": main})
-    return out
+        out[h.id] = {"amount": amount, "size": ratio, "channel": main}
+    return [out[h.id] for h in plan.hidden]
 
 
 def _intervals(mask, time_s, start_s, join_s=0.5) -> list[tuple[float, float]]:
