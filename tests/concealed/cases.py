@@ -262,7 +262,7 @@ def mixtures() -> list[Case]:
                 amount = float(rng.uniform(0.6, 1.5)) if recipe.amounts else 1.0
                 size = None if recipe.amounts else float(rng.uniform(1.0, 3.0))
                 if effect == "rotor_drag" and {"gust", "steady_wind"} & set(effects):
-                    size = None  # a plausible drag: the wind acts through it
+                    size, amount = None, 0.3  # a plausible drag: the wind acts through it
                 form = "motor" if effect == "delay" else recipe.forms[0]
                 window = _window(rng) if effect == "gust" else None
                 hidden.append(Hidden(effect, size=size, amount=amount, form=form, window=window))
@@ -295,7 +295,7 @@ PAIRS = (
     (
         ("motor_lag", ""),
         ("delay", "actuation"),
-        (COMMAND, ("gentle",) * 3),
+        (COMMAND, ("heave",) * 3),
         (COMMAND, ("excite", "rich", "excite")),
     ),
     (

@@ -482,10 +482,10 @@ class Cause:
 
 
 CAUSES: dict[str, Cause] = {
-    "rotor_drag": Cause(rotor_drag, (0.002, 4)),
+    "rotor_drag": Cause(rotor_drag, (0.0005, 4)),
     "frame_drag": Cause(frame_drag, (0.002, 5)),
     "translational_lift": Cause(translational_lift, (0.002, 6)),
-    "axial_inflow": Cause(axial_inflow, (0.002, 4)),
+    "axial_inflow": Cause(axial_inflow, (0.0005, 4)),
     "flapping_moment": Cause(flapping_moment, (0.002, 6)),
     "motor_lag": Cause(motor_lag, (0.25, 3)),
     "battery_sag": Cause(battery_sag, (0.01, 1.3)),
@@ -494,11 +494,11 @@ CAUSES: dict[str, Cause] = {
     "com_offset": Cause(com_offset, (0.002, 5)),
     "unequal_rotors": Cause(unequal_rotors, (0.002, 4)),
     "thrust_tilt": Cause(thrust_tilt, (0.002, 5)),
-    "rotor_gyroscopic": Cause(rotor_gyroscopic, (0.02, 5)),
-    "rotor_acceleration_torque": Cause(rotor_acceleration_torque, (0.02, 5)),
+    "rotor_gyroscopic": Cause(rotor_gyroscopic, (0.001, 5)),
+    "rotor_acceleration_torque": Cause(rotor_acceleration_torque, (0.0005, 5)),
     "inertia_products": Cause(inertia_products, (0.005, 5)),
     "rotational_damping": Cause(rotational_damping, (0.002, 6)),
-    "ground_effect": Cause(ground_effect, (0.02, 4)),
+    "ground_effect": Cause(ground_effect, (0.001, 4)),
     "rotor_interference": Cause(rotor_interference, (0.01, 3)),
     "vortex_ring": Cause(vortex_ring, (0.02, 4)),
     "steady_wind": Cause(steady_wind, (0.02, 2.5), needs=("rotor_drag",)),

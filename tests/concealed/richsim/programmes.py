@@ -101,12 +101,14 @@ def programme(
             Segment("hover", 0.3 * d),
         ], 5.0
     if purpose == "gentle":
-        # slow content only: a lag and a delay look alike here
         return [
             Segment("circle", 0.5 * d, 1.0, 2.5),
             Segment("vertical", 0.3 * d, 0.5, 0.8),
             Segment("yaw", 0.2 * d, 0.6),
         ], 5.0
+    if purpose == "heave":
+        # one slow frequency, enough force to show a lag or a delay but not which
+        return [Segment("vertical", 0.8 * d, 1.2, 0.9), Segment("hover", 0.2 * d)], 5.0
     if purpose == "one_way":
         # forwards only, always about the same speed
         return [Segment("one_way", d, speed=6.0 * f, heading_rad=0.0)], 10.0
