@@ -327,7 +327,7 @@ def test_every_class_of_case_is_there():
 @pytest.mark.parametrize("vehicle", ["hummingbird", "crazyflie"])
 def test_rotorpy_with_everything_off_is_the_contracts_rigid_body(vehicle):
 
-    plan = rotorpy_cases.RotorpyPlan(vehicle=vehicle, runs=(Run("rich", 3.0),))
+    plan = rotorpy_cases.RotorpyPlan(vehicle=vehicle, runs=(Run("calm", 4.0),))
     recording, truth, ideal = rotorpy_cases.make(plan, 1)
     for channel, numbers in truth["oracle"]["runs"]["run01"].items():
         assert numbers["mismatch_rms"] < 0.1 * numbers["noise_rms"], channel

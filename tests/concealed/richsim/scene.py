@@ -355,6 +355,8 @@ def make(plan: Plan, seed: int) -> tuple[Recording, dict, dict[str, pd.DataFrame
     ]
     if outside:
         verdict = ["partly_explained", "unexplained"]
+        if all((x["size_over_noise"] or 0) < 0.3 for x in outside):  # once a revolution: above the cutoff
+            verdict += ["no_mismatch", "explained"]
     elif effects or wrong:
         verdict = ["explained"]
         shown = [
