@@ -454,16 +454,16 @@ def run_campaign(
     truth: Truth | None = None,
     say: Callable[[str], None] = print,
 ) -> list[Session]:
-    """Record all parts into `raw/campaign` (written anew), the index, and the sealed truth. Returns
+    """Record parts into `raw/campaign/<part>` (written anew), the index, and the sealed truth. Returns
     the recordings. The sealed file must lie outside `raw`; raises ValueError otherwise."""
     if sealed.resolve().is_relative_to(raw.resolve()):
         raise ValueError(f"{sealed}: the truth must lie outside {raw}, or it is not concealed")
     campaign = Campaign(raw, truth or draw_truth(seed), seed)
-    shutil.rmtree(raw / "campaign", ignore_errors=True)
     for name in parts:
+        shutil.rmtree(raw / "campaign" / name, ignore_errors=True)
+        campaign.date = FIRST_DAY + timedelta(days=list(PARTS).index(name))  # a day each, whichever are made
         PARTS[name](campaign)
         say(f"{name}: {sum(s.setup.kind == name for s in campaign.recordings)} recordings")
-        campaign.date = datetime.combine(campaign.date.date() + timedelta(days=1), FIRST_DAY.timetz())
     write_index(raw)
     write_truth(campaign.truth, sealed, seed)
     return campaign.recordings
