@@ -148,6 +148,7 @@ def start_programme(recorder: Recorder, letter: str, programme: quadrotor.Progra
     recorder.command(letter, programme.pack())
     recorder.begin_stream()
     recorder.resume = None
+    recorder.ends_by_itself = True
     recorder.phase = quadrotor.DYNAMICS[letter]
     recorder.wanted = round((programme.duration_s + 0.5) * 1e6 / recorder.instrument.interval_us)
 
@@ -165,7 +166,7 @@ def experiment(
     _together(sensor, rest_s / interval_s, vehicle)
     start_programme(vehicle, letter, programme)
     sensor.phase = vehicle.phase
-    while vehicle.ended is None:
+    while not vehicle.over:
         vehicle.pump()
         sensor.pump()
         vehicle.drop_rows()

@@ -145,6 +145,8 @@ class WireHalf:
 
     def _end(self, reason: int) -> None:
         self.due_s = None
+        if self._faults.lose_end:
+            return
         self._emit(self._frame(END, wire.EndRecord(self._sent, 0, reason).pack()))
 
     def _frame(self, kind: int, payload: bytes) -> bytes:

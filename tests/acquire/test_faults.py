@@ -30,6 +30,7 @@ from acquire.transport import SerialTransport
 from rotorid.io.logs import read_log
 from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
+from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
 
 SAMPLES = 300
@@ -248,6 +249,17 @@ def test_sensor_that_resets_is_powered_and_initialised_again(plugged, recorder_o
     assert log.resets == 1 and log.session.ended == Ended.FINISHED
     after = log.table[log.table.segment == 1]
     np.testing.assert_allclose(np.diff(after.time_s), 0.005, atol=2e-6)
+
+
+def test_a_programme_whose_end_record_is_lost_still_ends(plugged, recorder_on):
+    port = plugged("quadrotor", Faults(lose_end=True)).names[0]
+    programme = Programme(TRAPEZOID, (0.1, 0.1, 0.1, 0.1), 0.5, 1.0, 0.0)
+    with recorder_on("quadrotor", port, replace(QUICK, silence_s=0.05)) as recorder:
+        procedures.fly_programme(recorder, "h", programme)
+    log = read_log(recorder.log_path)
+    assert log.end is None and log.table.throttle_1.max() == pytest.approx(0.1)
+    assert log.table.throttle_1.iloc[-1] == 0 and log.session.ended == Ended.FINISHED
+    assert [event.what for event in log.session.events] == ["silence", "end_lost"]
 
 
 def test_disk_full(plugged, recorder_on):
