@@ -28,6 +28,9 @@ class SteadyRule:
     tolerance: float = 2e-7
 
 
+STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)  # in N: the reference sensor is noisy
+
+
 def stream(recorder: Recorder, samples: int | None, interval_s: float = 0.0) -> None:
     """Record `samples` samples, or until interrupted."""
     recorder.start(interval_s)

@@ -366,7 +366,9 @@ class Recorder:
             if self._first is not None:
                 self._restart_device_s += self._latest.time_s - self._first.time_s
             self._first, self._first_host_ns = row, now_ns
-        self._latest, self._latest_host_ns = row, now_ns
+            self._latest, self._latest_host_ns = row, now_ns
+        elif row.time_s > self._latest.time_s:
+            self._latest, self._latest_host_ns = row, now_ns
 
     def _send(self, letter: str, arguments: bytes) -> None:
         payload = letter.encode() + arguments

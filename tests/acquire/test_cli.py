@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 from typer.testing import CliRunner
@@ -13,7 +14,7 @@ from typer.testing import CliRunner
 from acquire import procedures
 from acquire.cli import app
 from acquire.geometry import GF_N, body_forces, cell_forces
-from acquire.view import Plot, braille, panel, watch
+from acquire.view import Plot, bench_forces, braille, panel, watch
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
 
@@ -160,6 +161,49 @@ def test_mistakes_get_one_clear_sentence(arguments, sentence, tmp_path, monkeypa
 def test_ports_lists_or_says_what_to_do():
     result = CliRunner().invoke(app, ["ports"])
     assert result.exit_code == 0 and result.output.strip()
+
+
+def test_torque_test_with_tester_and_sensor(emulator, tmp_path):
+    ports = emulator("torque", "ttyROTOR", "ttyWRENCH", more=("--speed", "20"))
+    done = run(
+        *("torque", "--throttle", "0.4", "--rotor-port", ports[0], "--wrench-port", ports[1]),
+        *("--out", str(tmp_path), "--id", "q"),
+    )
+    assert done.returncode == 0, done.stderr
+    tester, sensor = read_log(tmp_path / "q-rotor.rlog").table, read_log(tmp_path / "q-wrench.rlog").table
+    speed = tester.speed_rpm.max() * np.pi / 30
+    moment = sensor.moment_z_n_m
+    torque = moment[sensor.time_s.between(4, 7)].mean() - moment[sensor.time_s < 1.5].mean()
+    assert torque == pytest.approx(1.8558e-8 * speed**2, rel=0.05)
+
+
+def test_reference_sensor_on_the_bench_command(emulator, tmp_path):
+    (port,) = emulator("jr3", "ttyJR3", more=("--load", "z:957.5475@3", "--speed", "20"))
+    done = run(
+        *("bench", "--platform", "jr3", "--port", port, "--test", "static", "--place-s", "4"),
+        *("--out", str(tmp_path), "--id", "j"),
+    )
+    assert done.returncode == 0, done.stderr
+    log = read_log(tmp_path / "j.rlog")
+    table, marks = log.table.set_index("index"), log.session.marks
+    read = (
+        table.force_z_n.loc[marks["read_start"] : marks["read_stop"]].mean() - log.session.tare["force_z_n"]
+    )
+    assert read == pytest.approx(-957.5475 * GF_N, abs=0.3)
+
+
+def test_forces_are_shown_once_the_bench_is_tared(loopback):
+    world, recorder = loopback("bench")
+
+    def prompt(text):
+        world.physics.place_load("z", 500.0)
+        return lambda: True
+
+    assert bench_forces(recorder) is None
+    with recorder:
+        procedures.static_test(recorder, prompt)
+    shown = bench_forces(recorder).plain
+    assert float(shown.split("z")[1]) == pytest.approx(-500 * GF_N, rel=0.005)
 
 
 def test_live_view_in_a_terminal(plugged, recorder_on):
