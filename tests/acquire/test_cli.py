@@ -173,7 +173,8 @@ def test_torque_test_with_tester_and_sensor(emulator, tmp_path):
     tester, sensor = read_log(tmp_path / "q-rotor.rlog").table, read_log(tmp_path / "q-wrench.rlog").table
     speed = tester.speed_rpm.max() * np.pi / 30
     moment = sensor.moment_z_n_m
-    torque = moment[sensor.time_s.between(4, 7)].mean() - moment[sensor.time_s < 1.5].mean()
+    # the throttle comes when the host gets to it, at twenty times the speed of life: look for it
+    torque = moment[moment > 0.02].median() - moment.iloc[:50].mean()
     assert torque == pytest.approx(1.8558e-8 * speed**2, rel=0.05)
 
 
