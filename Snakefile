@@ -1,0 +1,27 @@
+"""From raw logs to the report. One screen: the stages are in workflow/rules, one file each."""
+
+from snakemake.utils import min_version
+
+min_version("9.27")
+
+
+configfile: "config.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/public.smk"
+include: "workflow/rules/check.smk"
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/rotor.smk"
+include: "workflow/rules/neurobem.smk"
+include: "workflow/rules/mismatch.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    """Everything: the report and all it needs."""
+    default_target: True
+    message:
+        "All results are up to date"
+    input:
+        rules.report.input,

@@ -1,0 +1,165 @@
+"""The configuration: one typed model of `config.yaml`, checked before the first job.
+
+Every value is written out in `config.yaml`; the model holds no defaults, so what the file says is what runs.
+A stage that needs settings adds one class here and one field to `Config`; the JSON schema in
+`workflow/schemas/config.schema.json` is generated from it (`python -m rotorid.config --write-schema`).
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from rotorid.errors import InputError
+
+SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
+
+
+class ConfigError(InputError):
+    """A configuration that cannot be used; its text is one sentence for each wrong key."""
+
+
+class Section(BaseModel):
+    """A group of keys: frozen, no key unknown, no value converted from another type."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+Text = Annotated[str, Field(min_length=1)]
+
+
+class Report(Section):
+    """What the report is called and which chapters it has, in their order."""
+
+    title: Text = Field(description="Title on the first page [text].")
+    subtitle: Text = Field(description="Line under the title [text].")
+    chapters: list[Name] = Field(
+        min_length=1,
+        description="Chapters in reading order; each has notebooks/<name>.ipynb, notebooks/<name>.md and a "
+        "rule chapter_<name> [names].",
+    )
+
+    @model_validator(mode="after")
+    def _no_chapter_twice(self) -> Report:
+        twice = {name for name in self.chapters if self.chapters.count(name) > 1}
+        if twice:
+            raise ValueError(f"chapters must not name a chapter twice, but {', '.join(sorted(twice))} is")
+        return self
+
+
+class RotorSettings(Section):
+    """Thrust coefficients from stand runs."""
+
+    speed_noise_relative: float = Field(
+        ge=0, lt=0.2, description="One-sigma noise of a rotor-speed reading, as a share of it [1]."
+    )
+    outlying_above: float = Field(gt=0, description="Modified z-score beyond which a motor is called outlying [1].")
+
+
+class Residuals(Section):
+    """Rigid-body residuals of the NeuroBEM flights."""
+
+    cutoff_hz: float = Field(gt=0, lt=190, description="Low-pass of both sides of the residual [Hz].")
+    airspeed_bin_m_s: float = Field(gt=0, description="Width of a bin of airspeed [m/s].")
+    block_s: float = Field(gt=0, description="Length of the blocks that the bootstrap draws [s].")
+    seed: int = Field(ge=0, description="Seed of the bootstrap [1].")
+
+
+class Config(Section):
+    """The whole of `config.yaml`."""
+
+    recordings: Text = Field(description="Folder that holds the recording sets, one folder each [path].")
+    rotor: RotorSettings = Field(description="Thrust coefficients from stand runs.")
+    residuals: Residuals = Field(description="Rigid-body residuals of the NeuroBEM flights.")
+    report: Report = Field(description="The report.")
+
+
+def check(values: Mapping[str, Any], source: str = "config.yaml") -> Config:
+    """Turn parsed YAML into a `Config`.
+
+    Parameters
+    ----------
+    values
+        The parsed file, as Snakemake holds it.
+    source
+        Name of the file for the message.
+
+    Raises
+    ------
+    ConfigError
+        One sentence for each unknown key, missing key, wrong type or impossible value.
+    """
+    try:
+        return Config.model_validate(dict(values))
+    except ValidationError as error:
+        sentences = [_sentence(entry, source) for entry in error.errors()]
+        raise ConfigError("\n".join(sentences)) from None
+
+
+def _sentence(entry: Mapping[str, Any], source: str) -> str:
+    """One sentence that names the key, from one entry of a pydantic error."""
+    key = _dotted(entry["loc"])
+    given, kind = entry.get("input"), entry["type"]
+    if kind == "extra_forbidden":
+        known = _keys_beside(entry["loc"])
+        close = difflib.get_close_matches(str(entry["loc"][-1]), known, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"known here are {', '.join(sorted(known))}."
+        return f"{source}: {key} is not a known key; {hint}"
+    if kind == "missing":
+        return f"{source}: {key} is missing."
+    if kind == "value_error":
+        return f"{source}: {key + ': ' if key else ''}{entry['ctx']['error']}."
+    wanted = entry["msg"].removeprefix("Input should be ").removeprefix("a valid ").rstrip(".")
+    sentence = f"{source}: {key} is {given!r}, but it must be {wanted}."
+    if isinstance(given, str) and "number" in wanted and _reads_as_number(given):
+        sentence += " (YAML takes a number with an exponent only with a point and a sign: 1.0e-3.)"
+    return sentence
+
+
+def _reads_as_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _dotted(location: tuple[str | int, ...]) -> str:
+    """`("report", "chapters", 0)` as `report.chapters[0]`."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+
+
+def _keys_beside(location: tuple[str | int, ...]) -> list[str]:
+    """The keys that the model knows in the section where `location` lies."""
+    section: type[BaseModel] = Config
+    for part in location[:-1]:
+        if isinstance(part, str) and part in section.model_fields:
+            section = next(_sections_in(section.model_fields[part].annotation), section)
+    return list(section.model_fields)
+
+
+def _sections_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """The section classes inside a type such as `dict[str, Filter]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _sections_in(inner)
+
+
+def schema_text() -> str:
+    """The JSON schema of `config.yaml` as text."""
+    return json.dumps(Config.model_json_schema(), indent=1, sort_keys=True) + "\n"
+
+
+if __name__ == "__main__":
+    if "--write-schema" in sys.argv:
+        SCHEMA_PATH.write_text(schema_text())
+    else:
+        print(schema_text(), end="")

@@ -1,0 +1,1 @@
+"""Omitted physics, one effect a file."""

@@ -1,0 +1,55 @@
+"""Axial inflow: a climbing rotor loses thrust, and so damps rolling and pitching at its hub."""
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+
+
+def at_the_hubs(motion, vehicle, values):
+    """T_i += k_z ω_i w_i, w_i the hub's velocity along body z (down) through the air."""
+    positions = vehicle.rotor_positions_m()
+    hub = motion.hub_velocity(positions)
+    forces = np.zeros_like(hub)
+    forces[:, :, 2] = -values[0] * motion.rotor_speed * hub[:, :, 2]
+    return at_hubs(forces, positions)
+
+
+def at_the_centre(motion, vehicle, values):
+    """T += k_z Σω w at the centre of mass: no damping moment."""
+    force = np.zeros_like(motion.air_velocity)
+    force[:, 2] = -values[0] * motion.rotor_speed.sum(axis=1) * motion.air_velocity[:, 2]
+    return Contribution(force=force)
+
+
+def independent_of_speed(motion, vehicle, values):
+    """F_z = -d_z w at the centre of mass."""
+    force = np.zeros_like(motion.air_velocity)
+    force[:, 2] = -values[0] * motion.air_velocity[:, 2]
+    return Contribution(force=force)
+
+
+def forms(vehicle):
+    k_z = Parameter("k_z", "N s2/(rad m)", 0.0, meaning="thrust lost per rotor speed and climb speed")
+    needs = ("velocity", "rotor_speed")
+    return (
+        Form("at the hubs", "T_i −= k_z ω_i v_z,i (climbing)", (k_z,), at_the_hubs, needs),
+        Form("at the centre of mass", "T −= k_z Σω v_z (climbing)", (k_z,), at_the_centre, needs),
+        Form(
+            "independent of rotor speed",
+            "F_z = −d_z v_z",
+            (Parameter("d_z", "N s/m", 0.0),),
+            independent_of_speed,
+            ("velocity",),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="axial_inflow",
+    name="axial inflow",
+    sentence="thrust falls when climbing and grows when sinking",
+    forms=forms,
+    source="physics.md F9; Hoffmann et al., 2007",
+    confusers=("frame_drag", "motor_lag", "rotational_damping"),
+    separating_manoeuvre="fly steady climbs and descents",
+)

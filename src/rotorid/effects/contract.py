@@ -1,0 +1,238 @@
+"""What every effect of the catalogue states, and the flight data it is evaluated on.
+
+An effect is one physical, sensor or logging cause that the rigid-body baseline leaves out. It may have
+several forms that compete inside its id (drag at the hubs or at the centre of mass). A form is a function from
+the flight (`Motion`), the vehicle and parameter values to what it adds (`Contribution`); the contribution is
+linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds.
+
+Frames: world north-east-down, body forward-right-down. All functions take n instants at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from rotorid.recordings.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Flight at n instants; a field is None where the recording cannot give it.
+
+    Shapes: vectors (n, 3), per rotor (n, k), scalars (n,). Units SI.
+    """
+
+    time_s: np.ndarray
+    rotor_speed: np.ndarray
+    """Rotor speeds, (n, k), rad/s."""
+    rotor_acceleration: np.ndarray | None = None
+    """Time derivative of the rotor speeds, (n, k), rad/s2."""
+    angular_velocity: np.ndarray | None = None
+    """Body rates, (n, 3), rad/s, body axes."""
+    angular_acceleration: np.ndarray | None = None
+    """Derivative of the body rates, (n, 3), rad/s2, body axes."""
+    specific_force: np.ndarray | None = None
+    """Acceleration without gravity, (n, 3), m/s2, body axes: measured, else derived from velocity or position."""
+    accelerometer: np.ndarray | None = None
+    """The same as an accelerometer read it, None where none is recorded."""
+    gyroscope: np.ndarray | None = None
+    """Body rates as a gyroscope read them beside a recorded attitude, None where there is only one source."""
+    rotation: np.ndarray | None = None
+    """Rotation of body vectors into the world, (n, 3, 3)."""
+    velocity: np.ndarray | None = None
+    """Velocity over ground, (n, 3), m/s, body axes."""
+    wind: np.ndarray | None = None
+    """Velocity of the air over ground, (3,) or (n, 3), m/s, world axes; None for still air."""
+    height: np.ndarray | None = None
+    """Height of the centre of mass above ground, (n,), m."""
+    voltage: np.ndarray | None = None
+    """Battery voltage, (n,), V."""
+    tilt_gravity: np.ndarray | None = None
+    """Gravity on a stand, (n, 3), m/s2, sensor axes (kind `stand` only)."""
+
+    @property
+    def size(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def air_velocity(self) -> np.ndarray:
+        """Velocity through the air, (n, 3), m/s, body axes."""
+        if self.wind is None:
+            return self.velocity
+        wind = np.broadcast_to(self.wind, self.velocity.shape)
+        return self.velocity - np.einsum("nji,nj->ni", self.rotation, wind)
+
+    def hub_velocity(self, positions_m: np.ndarray) -> np.ndarray:
+        """Velocity of each hub through the air, v + Ω × r_i, shape (n, k, 3), m/s, body axes."""
+        rate = self.angular_velocity if self.angular_velocity is not None else np.zeros((self.size, 3))
+        return self.air_velocity[:, None, :] + np.cross(rate[:, None, :], positions_m[None, :, :])
+
+    def has(self, names: tuple[str, ...]) -> bool:
+        """Whether every named field is there."""
+        return all(getattr(self, name) is not None for name in names)
+
+    def at(self, index) -> Motion:
+        """The same flight at selected instants."""
+        picked = {}
+        for name, value in self.__dict__.items():
+            keep = value is None or (name == "wind" and value.ndim == 1)
+            picked[name] = value if keep else value[index]
+        return replace(self, **picked)
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What a form adds, each (n, 3) in body axes, None for nothing."""
+
+    force: np.ndarray | None = None
+    """Force on the airframe, N."""
+    moment: np.ndarray | None = None
+    """Moment about the believed centre of mass, N m."""
+    specific_force: np.ndarray | None = None
+    """Error of the accelerometer's reading, m/s2."""
+    angular_velocity: np.ndarray | None = None
+    """Error of the gyroscope's reading, rad/s."""
+    angular_acceleration: np.ndarray | None = None
+    """Time derivative of that error, rad/s2 (stated apart: differentiating a noisy reading would bias it)."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a form.
+
+    `low` and `high` are hard physical bounds in the given unit. `nonlinear` parameters carry the starting
+    values for their fit in `starts`.
+    """
+
+    symbol: str
+    unit: str
+    low: float = -np.inf
+    high: float = np.inf
+    nonlinear: bool = False
+    starts: tuple[float, ...] = ()
+    meaning: str = ""
+
+
+Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]
+
+
+@dataclass(frozen=True)
+class Form:
+    """One way an effect may act: its parameters and its contribution.
+
+    `contribution(motion, vehicle, values)` takes the parameter values in order, shape (p,).
+    """
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    contribution: Wrench
+    requires: tuple[str, ...] = ()
+    """Fields of `Motion` that must be there."""
+    vehicle_requires: tuple[str, ...] = ()
+    """Keys of vehicle.yaml that must be stated."""
+    minimum_rotors: int = 1
+
+    @property
+    def linear(self) -> tuple[int, ...]:
+        return tuple(i for i, p in enumerate(self.parameters) if not p.nonlinear)
+
+    @property
+    def nonlinear(self) -> tuple[int, ...]:
+        return tuple(i for i, p in enumerate(self.parameters) if p.nonlinear)
+
+
+FormsFor = Callable[[Vehicle], tuple[Form, ...]]
+
+
+@dataclass(frozen=True)
+class SpeedPath:
+    """What lies between command and rotor speed, at n even instants."""
+
+    speed: np.ndarray
+    """Speed so far along the path, (n, k), rad/s."""
+    time_s: np.ndarray
+    full_speed: float
+    """Upper limit of the rotor speed (or its largest command), rad/s; scales the parameters."""
+    voltage: np.ndarray | None = None
+    """Battery voltage, (n,), V."""
+    full_voltage: float | None = None
+    """Largest battery voltage of the set, V."""
+
+    @property
+    def dt_s(self) -> float:
+        return float(self.time_s[1] - self.time_s[0])
+
+
+@dataclass(frozen=True)
+class SpeedForm:
+    """One way in which rotor speed differs from its command; `apply(path, values)` gives the new speed (n, k).
+
+    `stage` orders the path: 0 static map, 1 supply, 2 limits, 3 delay, 4 lag. `neutral` are the parameter values
+    that change nothing.
+    """
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    stage: int
+    apply: Callable[[SpeedPath, np.ndarray], np.ndarray]
+    neutral: tuple[float, ...]
+    requires: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One id of the catalogue."""
+
+    id: str
+    name: str
+    """What a pilot would call it, fits into "… was left out"."""
+    sentence: str
+    """How it shows, one plain clause."""
+    forms: FormsFor
+    """The forms for a vehicle (their parameters may depend on its number of rotors)."""
+    source: str
+    confusers: tuple[str, ...] = ()
+    """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
+    separating_manoeuvre: str = ""
+    kind: Literal["physics", "sensor"] = "physics"
+    speed_forms: tuple[SpeedForm, ...] = ()
+    """Forms that act between command and rotor speed."""
+
+
+LACK = {
+    "velocity": "no velocity or position recorded",
+    "rotation": "no attitude recorded",
+    "height": "no height above ground",
+    "voltage": "no battery voltage",
+    "angular_velocity": "no body rates or attitude recorded",
+    "angular_acceleration": "no body rates or attitude recorded",
+    "rotor_acceleration": "no rotor speeds recorded",
+    "specific_force": "no acceleration, velocity or position recorded",
+    "accelerometer": "no accelerometer recorded",
+    "gyroscope": "no gyroscope and attitude recorded together",
+    "rotor_speed": "no rotor speeds, commands or throttle recorded",
+}
+
+
+def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | None:
+    """Why a form cannot be tested on this flight, None if it can."""
+    for name in form.requires:
+        if getattr(motion, name) is None:
+            return LACK.get(name, f"no {name.replace('_', ' ')}")
+    for key in form.vehicle_requires:
+        if getattr(vehicle, key) in (None, ()):
+            return f"vehicle.yaml states no {key}"
+    if vehicle.rotor_count < form.minimum_rotors:
+        return f"needs at least {form.minimum_rotors} rotors"
+    return None
+
+
+def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
+    """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
+    return Contribution(force=forces.sum(axis=1), moment=np.cross(positions_m[None, :, :], forces).sum(axis=1))

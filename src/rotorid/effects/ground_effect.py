@@ -1,0 +1,94 @@
+"""Ground effect: more thrust close to the ground."""
+
+import numpy as np
+
+from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
+
+CLOSEST_RADII = 0.3
+"""Heights below this many rotor radii are held there: the closed forms diverge and no rotor gets closer."""
+
+
+def hub_heights_m(motion, vehicle):
+    """Height of each hub above ground, (n, k), m; tilted by the attitude where it is known."""
+    positions = vehicle.rotor_positions_m()
+    if motion.rotation is None:
+        drop = np.broadcast_to(positions[:, 2], (motion.size, len(positions)))
+    else:
+        drop = np.einsum("nj,kj->nk", motion.rotation[:, 2, :], positions)
+    return np.maximum(motion.height[:, None] - drop, CLOSEST_RADII * vehicle.rotor_radius_m)
+
+
+def _along_thrust(gain, motion, vehicle):
+    thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
+    forces = np.zeros((*thrust.shape, 3))
+    forces[:, :, 2] = -gain * thrust
+    return at_hubs(forces, vehicle.rotor_positions_m())
+
+
+def image(motion, vehicle, values):
+    """T/T_∞ = 1 / (1 - c (R/4z)²), z the hub's height (Cheeseman and Bennett: c = 1)."""
+    ratio = values[0] * (vehicle.rotor_radius_m / (4 * hub_heights_m(motion, vehicle))) ** 2
+    return _along_thrust(1.0 / (1.0 - np.minimum(ratio, 0.8)) - 1.0, motion, vehicle)
+
+
+def inverse_square(motion, vehicle, values):
+    """T/T_∞ = 1 + c (R/4z)²."""
+    ratio = (vehicle.rotor_radius_m / (4 * hub_heights_m(motion, vehicle))) ** 2
+    return _along_thrust(values[0] * ratio, motion, vehicle)
+
+
+def exponential(motion, vehicle, values):
+    """T/T_∞ = 1 + a exp(-b z)."""
+    return _along_thrust(values[0] * np.exp(-values[1] * hub_heights_m(motion, vehicle)), motion, vehicle)
+
+
+def forms(vehicle):
+    needs = ("height", "rotor_speed")
+    radius = vehicle.rotor_radius_m or 0.1
+    return (
+        Form(
+            "image rotor",
+            "T/T_∞ = 1/(1 − c (R/4z)²)",
+            (Parameter("c", "1", 0.0, 40.0, nonlinear=True, starts=(1.0, 4.0, 10.0)),),
+            image,
+            needs,
+            ("rotor_radius_m",),
+        ),
+        Form(
+            "inverse square",
+            "T/T_∞ = 1 + c (R/4z)²",
+            (Parameter("c", "1", 0.0, 60.0),),
+            inverse_square,
+            needs,
+            ("rotor_radius_m",),
+        ),
+        Form(
+            "exponential",
+            "T/T_∞ = 1 + a exp(−b z)",
+            (
+                Parameter("a", "1", 0.0, 3.0),
+                Parameter(
+                    "b",
+                    "1/m",
+                    0.02 / radius,
+                    10.0 / radius,
+                    nonlinear=True,
+                    starts=(0.3 / radius, 1.0 / radius),
+                ),
+            ),
+            exponential,
+            needs,
+            ("rotor_radius_m",),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="ground_effect",
+    name="ground effect",
+    sentence="thrust grows within a few rotor radii of the ground",
+    forms=forms,
+    source="Cheeseman and Bennett, 1955; physics.md F10",
+    confusers=("translational_lift", "axial_inflow"),
+    separating_manoeuvre="hover at a ladder of heights from half to ten rotor radii",
+)

@@ -1,0 +1,36 @@
+"""Accelerometer away from where the user believes it sits."""
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+
+
+def lever_arm(motion, vehicle, values):
+    """a_m = a + dΩ × r + Ω × (Ω × r), r beyond the believed position."""
+    arm = np.asarray(values, float)[None, :]
+    rate = motion.angular_velocity
+    return Contribution(specific_force=np.cross(motion.angular_acceleration, arm) + np.cross(rate, np.cross(rate, arm)))
+
+
+def forms(vehicle):
+    return (
+        Form(
+            "lever arm",
+            "a_m = a + dΩ × r + Ω × (Ω × r)",
+            tuple(Parameter(f"r_{a}", "m", -0.5, 0.5) for a in "xyz"),
+            lever_arm,
+            ("accelerometer", "angular_velocity", "angular_acceleration"),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="imu_lever_arm",
+    name="a lever arm of the accelerometer",
+    sentence="the accelerometer feels rotation: it does not sit where it is believed",
+    forms=forms,
+    source="physics.md F22",
+    confusers=("com_offset",),
+    separating_manoeuvre="excite roll, pitch and yaw by doublets",
+    kind="sensor",
+)

@@ -1,0 +1,40 @@
+"""Off-diagonal entries of the inertia matrix."""
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+
+PAIRS = (("J_xy", 0, 1), ("J_xz", 0, 2), ("J_yz", 1, 2))
+
+
+def products(motion, vehicle, values):
+    """M = -(E dΩ + Ω × E Ω), E the symmetric matrix of J_xy, J_xz, J_yz to be added."""
+    extra = np.zeros((3, 3))
+    for value, (_, i, j) in zip(values, PAIRS, strict=True):
+        extra[i, j] = extra[j, i] = value
+    rate = motion.angular_velocity
+    return Contribution(moment=-(motion.angular_acceleration @ extra + np.cross(rate, rate @ extra)))
+
+
+def forms(vehicle):
+    bound = 1.0 if vehicle.inertia_kg_m2 is None else vehicle.inertia_kg_m2.zz
+    return (
+        Form(
+            "products",
+            "M = −(E dΩ/dt + Ω × E Ω)",
+            tuple(Parameter(name, "kg m2", -bound, bound) for name, _, _ in PAIRS),
+            products,
+            ("angular_velocity", "angular_acceleration"),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="inertia_products",
+    name="products of inertia",
+    sentence="a moment about one axis follows the angular acceleration about another",
+    forms=forms,
+    source="physics.md F18; Euler's equations with a full inertia matrix",
+    confusers=("gyro_error", "rotor_gyroscopic"),
+    separating_manoeuvre="excite roll, pitch and yaw one after the other by doublets",
+)

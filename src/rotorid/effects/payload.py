@@ -1,0 +1,73 @@
+"""A payload that the user did not count: fixed to the frame, or slung below."""
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+
+
+def slung(motion, vehicle, values):
+    """F = m_p g θ in world axes, θ'' + 2 ζ ω θ' + ω² θ = -a_h / L, ω² = g/L (small angles), ζ = 0.05.
+
+    The pendulum hangs at the centre of mass; `values` are m_p (kg) and L (m). Needs many instants in a row.
+    """
+    mass_kg, length_m = values
+    gravity = vehicle.gravity_m_s2
+    omega = np.sqrt(gravity / length_m)
+    force_body = motion.specific_force
+    world = np.einsum("nij,nj->ni", motion.rotation, force_body)
+    horizontal = world[:, :2]
+    dt = float(np.median(np.diff(motion.time_s))) if motion.size > 1 else 0.01
+    system = ([-1.0 / length_m], [1.0, 2 * 0.05 * omega, omega**2])
+    numerator, denominator, _ = cont2discrete(system, dt, method="bilinear")
+    angle = lfilter(numerator.ravel(), denominator, horizontal, axis=0)
+    # The cable pulls along its direction: sideways by the angle, down by the payload's weight.
+    pull = np.zeros_like(world)
+    pull[:, :2] = mass_kg * gravity * angle
+    pull[:, 2] = mass_kg * gravity
+    return Contribution(force=np.einsum("nji,nj->ni", motion.rotation, pull))
+
+
+def rigid(motion, vehicle, values):
+    """F = -m_p a, M = -(m_p r) × a: added mass m_p at (x, y) carried along; a the specific force."""
+    mass_kg, moment_x, moment_y = values
+    lever = np.array([moment_x, moment_y, 0.0])
+    return Contribution(force=-mass_kg * motion.specific_force, moment=-np.cross(lever, motion.specific_force))
+
+
+def forms(vehicle):
+    mass = vehicle.mass_kg or 1.0
+    return (
+        Form(
+            "rigid",
+            "F = −m_p a, M = −m_p r × a",
+            (
+                Parameter("m_p", "kg", 0.0, 2 * mass),
+                Parameter("m_p x", "kg m"),
+                Parameter("m_p y", "kg m"),
+            ),
+            rigid,
+            ("specific_force",),
+        ),
+        Form(
+            "slung",
+            "F = m_p g θ, θ'' + 2ζωθ' + ω²θ = −a_h/L",
+            (
+                Parameter("m_p", "kg", 0.0, 2 * mass),
+                Parameter("L", "m", 0.15, 6.0, nonlinear=True, starts=(0.3, 0.6, 1.2, 2.4)),
+            ),
+            slung,
+            ("specific_force", "rotation"),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="payload",
+    name="a payload",
+    sentence="the vehicle is heavier than believed, off its centre, or carries a pendulum",
+    forms=forms,
+    source="contract; physics.md (payload)",
+    confusers=("com_offset",),
+    separating_manoeuvre="weigh the vehicle; stop sharply from forward flight and hover",
+)

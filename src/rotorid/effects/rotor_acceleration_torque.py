@@ -1,0 +1,35 @@
+"""Reaction torque of rotors that speed up or slow down."""
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+
+
+def reaction(motion, vehicle, values):
+    """M_z = J_r Σ y_i dω_i/dt, y_i = +1 for ccw (reaction opposes the spin, as the drag torque does)."""
+    moment = np.zeros((motion.size, 3))
+    moment[:, 2] = values[0] * (motion.rotor_acceleration * vehicle.yaw_signs()).sum(axis=1)
+    return Contribution(moment=moment)
+
+
+def forms(vehicle):
+    return (
+        Form(
+            "reaction",
+            "M_z = J_r Σ y_i dω_i/dt",
+            (Parameter("J_r", "kg m2", 0.0, meaning="inertia of one rotor"),),
+            reaction,
+            ("rotor_acceleration",),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="rotor_acceleration_torque",
+    name="the reaction torque of accelerating rotors",
+    sentence="a yaw moment while rotors speed up or slow down",
+    forms=forms,
+    source="physics.md F13",
+    confusers=("motor_lag", "delay"),
+    separating_manoeuvre="excite yaw on both sides of 1 Hz",
+)

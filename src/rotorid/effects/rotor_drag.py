@@ -1,0 +1,65 @@
+"""In-plane drag of the rotors (H-force), with the force part of blade flapping: one class, never split."""
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+
+IN_PLANE = np.array([1.0, 1.0, 0.0])
+
+
+def at_the_hubs(motion, vehicle, values):
+    """F_i = -k_d ω_i P v_i, at each hub; v_i = v + Ω × r_i through the air, P drops the thrust axis."""
+    positions = vehicle.rotor_positions_m()
+    hub = motion.hub_velocity(positions) * IN_PLANE
+    return at_hubs(-values[0] * motion.rotor_speed[:, :, None] * hub, positions)
+
+
+def at_the_centre(motion, vehicle, values):
+    """F = -k_d Σω P v at the centre of mass: no moment."""
+    total = motion.rotor_speed.sum(axis=1, keepdims=True)
+    return Contribution(force=-values[0] * total * motion.air_velocity * IN_PLANE)
+
+
+def per_axis(motion, vehicle, values):
+    """F = -(k_x v_x, k_y v_y, 0) Σω: the airframe shades the rotors differently in x and y."""
+    total = motion.rotor_speed.sum(axis=1, keepdims=True)
+    return Contribution(force=-total * motion.air_velocity * np.array([values[0], values[1], 0.0]))
+
+
+def linear_in_speed(motion, vehicle, values):
+    """F = -d P v at the centre of mass, not growing with rotor speed."""
+    return Contribution(force=-values[0] * motion.air_velocity * IN_PLANE)
+
+
+def forms(vehicle):
+    needs = ("velocity", "rotor_speed")
+    k_d = Parameter("k_d", "N s2/(rad m)", 0.0, np.inf, meaning="in-plane drag per rotor speed and airspeed")
+    return (
+        Form("at the hubs", "F_i = −k_d ω_i v_i,⊥", (k_d,), at_the_hubs, needs),
+        Form("at the centre of mass", "F = −k_d Σω v_⊥", (k_d,), at_the_centre, needs),
+        Form(
+            "per axis",
+            "F = −Σω (k_d,x v_x, k_d,y v_y, 0)",
+            (Parameter("k_d_x", k_d.unit, 0.0), Parameter("k_d_y", k_d.unit, 0.0)),
+            per_axis,
+            needs,
+        ),
+        Form(
+            "independent of rotor speed",
+            "F = −d v_⊥",
+            (Parameter("d", "N s/m", 0.0, meaning="linear drag"),),
+            linear_in_speed,
+            ("velocity",),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="rotor_drag",
+    name="rotor drag",
+    sentence="the sideways force grows with airspeed times rotor speed",
+    forms=forms,
+    source="Faessler et al., RA-L 2018; physics.md F5 and F6",
+    confusers=("frame_drag", "steady_wind", "thrust_tilt"),
+    separating_manoeuvre="fly a speed sweep beyond 10 m/s in both directions, once light and once loaded",
+)

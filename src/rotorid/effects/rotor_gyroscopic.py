@@ -1,0 +1,40 @@
+"""Gyroscopic moment of the spinning rotors."""
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+
+
+def spin_vector(vehicle):
+    """Sense of each rotor's angular momentum along body z (down): cw seen from above is +z."""
+    return -vehicle.yaw_signs()
+
+
+def gyroscopic(motion, vehicle, values):
+    """M = -Ω × (J_r Σ s_i ω_i e3), s_i = +1 for clockwise seen from above (momentum along body +z)."""
+    momentum = np.zeros((motion.size, 3))
+    momentum[:, 2] = values[0] * (motion.rotor_speed * spin_vector(vehicle)).sum(axis=1)
+    return Contribution(moment=-np.cross(motion.angular_velocity, momentum))
+
+
+def forms(vehicle):
+    return (
+        Form(
+            "gyroscopic",
+            "M = −Ω × J_r Σ s_i ω_i e3",
+            (Parameter("J_r", "kg m2", 0.0, meaning="inertia of one rotor"),),
+            gyroscopic,
+            ("angular_velocity", "rotor_speed"),
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="rotor_gyroscopic",
+    name="the gyroscopic moment of the rotors",
+    sentence="a moment proportional to body rate times the rotors' net spin",
+    forms=forms,
+    source="physics.md F12; thesis eqs 4.12-4.19",
+    confusers=("inertia_products",),
+    separating_manoeuvre="roll and pitch quickly while yawing, so that the rotors' net spin is large",
+)

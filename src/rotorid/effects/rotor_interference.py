@@ -1,0 +1,77 @@
+"""Rear rotors work in the wake of the front ones in forward flight."""
+
+import numpy as np
+
+from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
+
+
+def _rear_weight(motion, vehicle):
+    """How far to the rear of the flight direction each rotor sits, (n, k), 0 (front) to 1 (rear)."""
+    positions = vehicle.rotor_positions_m()[:, :2]
+    reach = np.linalg.norm(positions, axis=1).max() or 1.0
+    plane = motion.air_velocity[:, :2]
+    direction = plane / np.maximum(np.linalg.norm(plane, axis=1, keepdims=True), 1e-6)
+    return np.clip(-(direction @ positions.T) / reach, 0.0, 1.0)
+
+
+def _loss(fraction, motion, vehicle):
+    thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
+    forces = np.zeros((*thrust.shape, 3))
+    forces[:, :, 2] = fraction * thrust
+    return at_hubs(forces, vehicle.rotor_positions_m())
+
+
+def growing(motion, vehicle, values):
+    """T_rear = T (1 - e v_h): the loss grows with in-plane airspeed."""
+    speed = np.linalg.norm(motion.air_velocity[:, :2], axis=1)[:, None]
+    return _loss(values[0] * speed * _rear_weight(motion, vehicle), motion, vehicle)
+
+
+def saturating(motion, vehicle, values):
+    """T_rear = T (1 - e v_h / (v_h + v_i)), v_i the hover inflow."""
+    speed = np.linalg.norm(motion.air_velocity[:, :2], axis=1)[:, None]
+    inflow = hover_inflow_m_s(vehicle)
+    return _loss(values[0] * speed / (speed + inflow) * _rear_weight(motion, vehicle), motion, vehicle)
+
+
+def hover_inflow_m_s(vehicle, density_kg_m3: float = 1.2):
+    """Momentum theory: v_h = sqrt(T / (2 ρ π R²)) of one rotor in hover, m/s; 5 m/s without a radius."""
+    if vehicle.rotor_radius_m is None or vehicle.mass_kg is None:
+        return 5.0
+    thrust = vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.rotor_count
+    return float(np.sqrt(thrust / (2 * density_kg_m3 * np.pi * vehicle.rotor_radius_m**2)))
+
+
+def forms(vehicle):
+    needs = ("velocity", "rotor_speed")
+    return (
+        Form(
+            "growing with airspeed",
+            "T_rear = T (1 − e v_h)",
+            (Parameter("e", "s/m", 0.0, 0.2),),
+            growing,
+            needs,
+            (),
+            3,
+        ),
+        Form(
+            "saturating",
+            "T_rear = T (1 − ε v_h/(v_h + v_i))",
+            (Parameter("eps", "1", 0.0, 0.6),),
+            saturating,
+            needs,
+            (),
+            3,
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="rotor_interference",
+    name="interference between front and rear rotors",
+    sentence="the rear rotors lose thrust in forward flight",
+    forms=forms,
+    source="physics.md F14",
+    confusers=("flapping_moment", "rotor_drag"),
+    separating_manoeuvre="fly forward and backward at several speeds and heights of the rotor plane",
+)

@@ -1,0 +1,97 @@
+"""What the analysis of a recording set found, before it is put into words, figures and files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from rotorid.effects.contract import Form
+from rotorid.recordings import RecordingSet, Split, Vehicle
+
+Status = Literal["established", "ambiguous", "absorbed", "not_established"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted number with its 95 % interval."""
+
+    symbol: str
+    value: float
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One id of the catalogue (physics, sensor, mistake) and what the data say of it."""
+
+    id: str
+    status: Status
+    form: Form | None = None
+    """The form that fits best (None for mistakes and effects that are no wrench, such as `sensor_dropout`)."""
+    values: tuple[float, ...] = ()
+    """Parameter values of `form`, in its order."""
+    equation: str = ""
+    sentence: str = ""
+    parameters: tuple[Estimate, ...] = ()
+    p_value: float = 1.0
+    channels: tuple[str, ...] = ()
+    """Channels it shows in, the strongest first (`force_x` … `moment_z`, `rotor_speed_i`)."""
+    alternatives: tuple[str, ...] = ()
+    """For `ambiguous`: the whole class, itself included."""
+    gain: tuple[float, float, float] | None = None
+    """Held-out rmse ratio (with / without the effect) and its 95 % interval, block bootstrap."""
+    windows: tuple[tuple[str, float, float], ...] = ()
+    """(run, start_s, stop_s) where it acts, for effects in part of the flight; empty for always."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Residual of one channel of one run, thinned, before refitting, after refitting and with the effects."""
+
+    run: str
+    channel: str
+    unit: str
+    time_s: np.ndarray
+    before: np.ndarray
+    refitted: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything that the verdict, its page and the improved vehicle are made from."""
+
+    recordings: RecordingSet
+    """The set as analysed (mistakes with overwhelming evidence already corrected)."""
+    split: Split
+    believed: Vehicle
+    refitted: Vehicle
+    """Believed values re-estimated without new physics."""
+    improved: Vehicle
+    """Values re-estimated together with the established effects (which `findings` hold)."""
+    findings: tuple[Finding, ...]
+    values: dict[str, tuple[float, float, float, float]]
+    """Wrong values: contract name to (believed, refitted, low, high)."""
+    not_testable: dict[str, str]
+    traces: tuple[Trace, ...]
+    noise_floor: dict[str, float]
+    """Measured noise of each channel, its own unit, in the band of the traces."""
+    p_values: dict[str, tuple[float, float]]
+    """Channel to p-value that the residual does not depend on the inputs, before and after."""
+    regimes: dict[str, dict[str, np.ndarray]]
+    """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
+    unexplained_share: float = 0.0
+    """Share of the residual's energy above the noise floor that the findings leave (0 where nothing was off)."""
+    unexplained_channels: tuple[str, ...] = ()
+    unexplained_depends_on: tuple[str, ...] = ()
+    unexplained_description: str = ""
+    next_manoeuvre: str = ""
+    next_separates: tuple[str, ...] = ()
+    next_sigma: float = 0.0
+    force_source: str = "accelerometer"
+    notes: tuple[str, ...] = field(default_factory=tuple)
+    """Things a reader must know (what was derived, what was corrected)."""

@@ -1,0 +1,304 @@
+"""From a recording set to what the analysis works on: split, segments, sensor noise, terms and rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.signal import welch
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Form, not_testable_reason
+from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments
+from rotorid.mismatch.rows import (
+    OFFSETS,
+    PARAMETER_NAMES,
+    Rows,
+    Term,
+    Thinner,
+    assemble,
+    baseline_wrench,
+    form_columns,
+    offset_columns,
+    project,
+    slope_column,
+    value_columns,
+)
+from rotorid.mismatch.rows import (
+    measured_moment as moment_of,
+)
+from rotorid.recordings import RecordingSet, Run, Split, Vehicle
+from rotorid.recordings import columns as c
+
+HELD_OUT_SHARE = 1 / 3
+GAP_S = 2.0
+"""Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
+DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
+"""Relative one-sigma belief where `trust` states none."""
+ACTIVE = "active"
+
+
+def split_runs(recordings: RecordingSet) -> Split:
+    """Training and held-out runs: as `split.yaml` says, else about a third held out, spread evenly in time.
+
+    A single run is named on both sides: its last third is held out.
+    """
+    names = [run.name for run in recordings.runs]
+    if recordings.held_out is not None:
+        held = [n for n in names if n in recordings.held_out]
+    elif len(names) == 1:
+        return Split((names[0],), (names[0],))
+    else:
+        count = max(1, round(len(names) * HELD_OUT_SHARE))
+        held = [names[int((k + 0.5) * len(names) / count)] for k in range(count)]
+    return Split(tuple(n for n in names if n not in held), tuple(held))
+
+
+def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float], bool | None]:
+    """Whether a block is fitted (True), held out (False) or in the gap between (None).
+
+    Whole runs where there are several; of a single run the last third, after a gap of GAP_S.
+    """
+    if split.held_out != split.training:
+        return lambda run, time_s: run in split.training
+    start = min(s.motion.time_s[0] for s in segments)
+    stop = max(s.motion.time_s[-1] for s in segments)
+    border = start + (stop - start) * (1 - HELD_OUT_SHARE)
+
+    def rule(run: str, time_s: float) -> bool | None:
+        if abs(time_s - border) < GAP_S / 2:
+            return None
+        return time_s < border
+
+    return rule
+
+
+def white_level(values: np.ndarray) -> float:
+    """One-sigma of the white part of an evenly sampled signal: the lowest level of its spectrum, as if flat."""
+    values = values[np.isfinite(values)]
+    if len(values) < 64:
+        return 0.0
+    _, density = welch(values, fs=1.0, nperseg=min(256, len(values) // 2), detrend="linear")
+    smooth = np.convolve(density[2:], np.ones(9) / 9, mode="valid")
+    return float(np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
+
+
+def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle) -> dict[str, float]:
+    """White noise per sample of each sensor, one sigma in the columns' own unit, from the data themselves."""
+    groups = {
+        "rotors": c.rotor_columns("rotor_speed", vehicle.rotor_count),
+        "gyroscope": c.ANGULAR_VELOCITY,
+        "accelerometer": c.SPECIFIC_FORCE,
+        "velocity": c.VELOCITY,
+        "position": c.POSITION,
+        "attitude": c.QUATERNION,
+    }
+    levels = {}
+    for key, names in groups.items():
+        found = []
+        for run in runs:
+            if names and run.has(*names):
+                found += [white_level(run.column(n)) for n in names]
+        if found:
+            levels[key] = float(np.median(found))
+    return levels
+
+
+@dataclass
+class Prepared:
+    """A set ready for analysis."""
+
+    recordings: RecordingSet
+    vehicle: Vehicle
+    split: Split
+    segments: list[Segment]
+    noisy_segments: list[Segment]
+    thinner: Thinner
+    noise: dict[str, float]
+    terms: list[Term]
+    not_testable: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Channel groups that every segment has."""
+        from rotorid.mismatch.rows import residual
+
+        found = [set(residual(s, self.vehicle)) for s in self.segments]
+        common = set.intersection(*found) if found else set()
+        return tuple(g for g in ("force", "moment", "accelerometer", "gyroscope") if g in common)
+
+
+def prior_of(key: str, vehicle: Vehicle) -> float:
+    """Relative one-sigma of a believed value."""
+    name = PARAMETER_NAMES[key]
+    for candidate in (name, name.split("_kg_m2")[0], "inertia_kg_m2" if key.startswith("inertia") else name):
+        if candidate in vehicle.trust:
+            return max(vehicle.trust[candidate], 1e-6)
+    return DEFAULT_TRUST["inertia" if key.startswith("inertia") else key]
+
+
+def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[Term], dict[str, str]]:
+    """Every term that this set can test, and the ids that it cannot, with the reason."""
+    terms, reasons = [], {}
+    values = []
+    if "force" in groups:
+        values += ["thrust", "mass"]
+    if "moment" in groups:
+        values += ["thrust", "torque", "inertia_xx", "inertia_yy", "inertia_zz", "arm"]
+    for key in PARAMETER_NAMES:
+        if key in values:
+            terms.append(Term(key, "value", prior_sd=(prior_of(key, vehicle),)))
+    longest_sample = max(1.0 / s.rate_hz for s in segments)
+    partner = {
+        "offset:rotors-accelerometer": "force",
+        "offset:rotors-gyroscope": "moment",
+        "offset:accelerometer-velocity": "accelerometer",
+        "offset:gyroscope-attitude": "gyroscope",
+    }
+    for key in OFFSETS:
+        if partner[key] in groups:
+            terms.append(Term(key, "nuisance", prior_sd=(0.5 * longest_sample,)))
+    for effect in catalogue().values():
+        found, why = [], None
+        for form in effect.forms(vehicle):
+            reason = next((r for s in segments if (r := not_testable_reason(form, s.motion, vehicle))), None)
+            if reason:
+                why = why or reason
+                continue
+            found += form_terms(effect.id, form)
+        terms += found
+        if not found:
+            reasons[effect.id] = why or "no column of the recording shows it"
+    return terms, reasons
+
+
+def form_terms(effect_id: str, form: Form) -> list[Term]:
+    """One term per starting point of a form's nonlinear parameters."""
+    starts = [()]
+    for index in form.nonlinear:
+        starts = [s + (v,) for s in starts for v in form.parameters[index].starts]
+    terms = []
+    for number, start in enumerate(starts):
+        values = np.zeros(len(form.parameters))
+        values[list(form.nonlinear)] = start
+        suffix = f"#{number}" if len(starts) > 1 else ""
+        terms.append(
+            Term(
+                f"{effect_id}/{form.name}{suffix}",
+                "effect",
+                effect_id,
+                form,
+                tuple(values),
+                max(1, len(form.linear)),
+                (np.inf,) * max(1, len(form.linear)),
+            )
+        )
+    return terms
+
+
+def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str, float] | None = None) -> Prepared:
+    """Segments, noise and terms of a set."""
+    vehicle, split = recordings.vehicle, split_runs(recordings)
+    rate_hz, cutoff = analysis_rate_hz(recordings.runs, vehicle, cutoff_hz)
+    noise = sensor_noise(recordings.runs, vehicle)
+    rng = np.random.default_rng(0)
+    segments, noisy = [], []
+    for run in recordings.runs:
+        segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s)
+        noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng)
+    noisy = noisy if len(noisy) == len(segments) else []
+    prepared = Prepared(recordings, vehicle, split, segments, noisy, Thinner(rate_hz, cutoff), noise, [])
+    terms, reasons = make_terms(vehicle, segments, prepared.groups)
+    return replace(prepared, terms=terms, not_testable=reasons)
+
+
+def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, np.ndarray]]):
+    """Force and moment of the baseline plus effects, native rate, for the value columns."""
+    force, arm, torque = baseline_wrench(segment.motion, vehicle)
+    total = {"force": force, "moment": arm + torque}
+    for form, values in effects:
+        part = form.contribution(segment.motion, vehicle, values)
+        if part.force is not None:
+            total["force"] = total["force"] + part.force
+        if part.moment is not None:
+            total["moment"] = total["moment"] + part.moment
+    return total
+
+
+def with_predictions(segment: Segment, vehicle: Vehicle, model: dict[str, np.ndarray]) -> Segment:
+    """The segment with the accelerations that the model predicts, for use in regressors.
+
+    The measured ones are the response itself: a column s·a beside a response m·a fits anything perfectly, and
+    the noise of a differentiated body rate would bias every coefficient that multiplies it.
+    """
+    motion, changed = segment.motion, {}
+    if motion.specific_force is not None:
+        changed["specific_force"] = model["force"] / vehicle.mass_kg
+        if motion.accelerometer is not None:
+            changed["accelerometer"] = changed["specific_force"]
+    if motion.angular_acceleration is not None:
+        inertia, rate = vehicle.inertia_kg_m2.matrix(), motion.angular_velocity
+        changed["angular_acceleration"] = (model["moment"] - np.cross(rate, rate @ inertia)) @ np.linalg.inv(inertia)
+    return replace(segment, motion=replace(motion, **changed))
+
+
+def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[dict[str, np.ndarray]]:
+    """What one metre a second more wind from each of north and east adds through the effects that feel the air."""
+    wind = np.zeros(3) if segment.motion.wind is None else segment.motion.wind
+    columns = []
+    for axis in range(2):
+        parts = []
+        for sign in (0.5, -0.5):
+            step = np.zeros(3)
+            step[axis] = sign
+            moved = replace(segment.motion, wind=wind + step)
+            total: dict[str, np.ndarray] = {}
+            for form, values in effects:
+                for name, part in project(form.contribution(moved, vehicle, values), segment, vehicle, groups).items():
+                    total[name] = total.get(name, 0.0) + part
+            parts.append(total)
+        columns.append({k: parts[0][k] - parts[1][k] for k in parts[0]})
+    return columns
+
+
+def assemble_rows(
+    prepared: Prepared,
+    terms: list[Term],
+    segments: list[Segment] | None = None,
+    effects: list[tuple[Form, np.ndarray]] | None = None,
+    measured_moment: bool = False,
+) -> list[Rows]:
+    """Rows of every segment for the given terms; `effects` only shape the value columns.
+
+    `measured_moment` puts the measured moments into the value columns in place of the predicted ones.
+    """
+    vehicle, groups = prepared.vehicle, prepared.groups
+
+    def source(segment):
+        columns = []
+        model, reverse = {}, None
+        if measured_moment and "moment" in groups:
+            reverse = moment_of(segment, vehicle)
+        if segment.motion.rotor_speed is not None:
+            model = model_wrench(segment, vehicle, effects or [])
+            segment = with_predictions(segment, vehicle, model)
+        for term in terms:
+            if term.run and term.run != segment.run:
+                columns += [{}] * term.size
+            elif term.kind == "wind":
+                columns += wind_columns(segment, vehicle, groups, effects or [])
+            elif term.kind == "slope":
+                columns.append(slope_column(term, segment, vehicle, groups))
+            elif term.kind == "effect":
+                columns += form_columns(term.form, term.values, segment, vehicle, groups)
+            elif term.kind == "value":
+                columns.append(value_columns(term.key, segment, vehicle, groups, model, reverse))
+            else:
+                columns.append(offset_columns(term.key, segment, vehicle, groups))
+        return columns
+
+    return [assemble(s, vehicle, prepared.thinner, [source]) for s in segments or prepared.segments]
+
+
+__all__ = ["Prepared", "assemble_rows", "prepare", "project", "split_runs"]

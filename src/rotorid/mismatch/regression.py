@@ -1,0 +1,303 @@
+"""Joint generalised least squares over blocks of time, with intervals that hold for coloured residuals.
+
+Each channel is whitened by an autoregressive filter estimated from the residual of the fullest model; then all
+rows are reduced to Gram matrices of short blocks. Fits, tests, leave-run-out scores and cluster-robust
+covariances of any subset of terms follow from those matrices alone, so the cost of a search over the catalogue
+does not depend on the number of samples.
+
+Noisy regressors: `bias_gram` and `bias_cross` hold what the sensors' own noise adds to XᵀX and Xᵀy (learnt by
+adding the same noise once more); they are subtracted, which removes the attenuation (corrected least squares,
+Fuller, Measurement Error Models, 1987, ch. 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+from scipy.stats import chi2, f
+
+from rotorid.mismatch.rows import Rows, Term
+
+HIGHEST_AR_ORDER = 12
+WHITE_SHARE = 0.01
+"""White part assumed in every residual, as a share of its variance: recordings smoothed before they were stored
+have almost no energy at high frequency, and whitening must not make that corner decide."""
+AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
+"""Two instruments that agree to within this (m/s2, rad/s; one sigma) are called equal."""
+MOST_ATTENUATION = 0.3
+"""Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
+DOUBT_OF_CORRECTION = 0.5
+NOISE_SAFETY = 2.0
+"""Sensor noise is often more than its white part; energies of it are taken this much larger when they exclude."""
+
+
+def autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
+    """Pooled autocovariance at lags 0 to `order` of stretches that do not touch each other."""
+    total = sum(len(p) for p in parts)
+    return np.array([sum(float(p[k:] @ p[: len(p) - k]) for p in parts if len(p) > k) for k in range(order + 1)]) / max(
+        total, 1
+    )
+
+
+def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
+    """Whitening filter (1, -a_1, …, -a_p)/σ of a coloured residual; the order by Akaike's criterion.
+
+    `floor` is the one-sigma of white noise assumed on top.
+    """
+    total = sum(len(p) for p in parts)
+    highest = int(min(HIGHEST_AR_ORDER, max(1, total // 50)))
+    covariance = autocovariance(parts, highest)
+    if covariance[0] <= 0:
+        return np.array([1.0])
+    covariance[0] += WHITE_SHARE * covariance[0] + floor**2
+    best = (np.inf, np.array([1.0 / np.sqrt(covariance[0])]))
+    for order in range(0, highest + 1):
+        a = solve_toeplitz(covariance[:order], covariance[1 : order + 1]) if order else np.zeros(0)
+        variance = covariance[0] - a @ covariance[1 : order + 1]
+        if variance <= 0:
+            break
+        criterion = total * np.log(variance) + 2 * order
+        if criterion < best[0]:
+            best = (criterion, np.concatenate([[1.0], -a]) / np.sqrt(variance))
+    return best[1]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fit of some terms: coefficients, covariance and what is left."""
+
+    columns: np.ndarray
+    beta: np.ndarray
+    covariance: np.ndarray
+    """Cluster-robust covariance, never below the model's own, shape (k, k)."""
+    residual_square: np.ndarray
+    """Whitened squared residual of every block (training and held out), shape (blocks,)."""
+    gain: float
+    """Whitened squares explained on the training blocks."""
+
+
+@dataclass
+class Regression:
+    """Gram matrices of all terms over blocks of time."""
+
+    terms: list[Term]
+    start: dict[str, int]
+    gram: np.ndarray
+    """(blocks, K, K)."""
+    cross: np.ndarray
+    """(blocks, K)."""
+    square: np.ndarray
+    """(blocks,)."""
+    run: np.ndarray
+    """Run number of each block."""
+    training: np.ndarray
+    """Mask of the blocks to fit."""
+    held_out: np.ndarray
+    """Mask of the blocks held out (some blocks between the two may be in neither)."""
+    precision: np.ndarray
+    """Prior precision of every column, (K,)."""
+    bias_gram: np.ndarray
+    bias_cross: np.ndarray
+    filters: dict[int, np.ndarray]
+    """Whitening filter of each channel."""
+
+    def columns(self, keys: Iterable[str]) -> np.ndarray:
+        """Column numbers of terms, in the order given."""
+        sizes = {t.key: t.size for t in self.terms}
+        parts = [np.arange(self.start[k], self.start[k] + sizes[k]) for k in keys]
+        return np.concatenate(parts).astype(int) if parts else np.zeros(0, int)
+
+    def _normal(self, cols: np.ndarray, mask: np.ndarray):
+        share = mask.sum() / len(mask)
+        grid = np.ix_(cols, cols)
+        gram = self.gram[mask].sum(axis=0)[grid]
+        cross = self.cross[mask].sum(axis=0)[cols]
+        bias = limited_bias(gram, self.bias_gram[grid] * share)
+        return gram, cross, bias, self.bias_cross[cols] * share
+
+    def fit(self, keys: Iterable[str], mask: np.ndarray | None = None, jackknife: bool = False) -> Fit:
+        """Fit terms on the masked blocks (training by default)."""
+        mask = self.training if mask is None else mask
+        cols = self.columns(keys)
+        gram, cross, bias, bias_cross = self._normal(cols, mask)
+        prior = np.diag(self.precision[cols])
+        inverse = ridge_inverse(gram - bias + prior)
+        beta = inverse @ (cross - bias_cross)
+        count = int(mask.sum())
+        grid = np.ix_(cols, cols)
+        blocks = self.gram[mask][:, grid[0], grid[1]]
+        scores = self.cross[mask][:, cols] - bias_cross / count - (blocks - bias / count) @ beta
+        if jackknife:
+            eye = np.eye(len(cols))
+            scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
+        spread = scores.T @ scores * count / max(count - 1, 1)
+        robust = inverse @ spread @ inverse
+        plain = inverse @ (gram + prior) @ inverse
+        # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
+        shift = DOUBT_OF_CORRECTION * (beta - ridge_inverse(gram + prior) @ cross)
+        covariance = at_least(robust, plain) + np.outer(shift, shift)
+        all_blocks = self.gram[:, grid[0], grid[1]]
+        rss = self.square - 2 * self.cross[:, cols] @ beta + np.einsum("bij,i,j->b", all_blocks, beta, beta)
+        gain = float(self.square[mask].sum() - rss[mask].sum())
+        return Fit(cols, beta, covariance, rss, gain)
+
+    def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
+        """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
+        others = self.columns([k for k in keys if k != key])
+        own = self.columns([key])
+        cols = np.concatenate([others, own])
+        gram = self.gram[self.training].sum(axis=0)
+        bias = self.bias_gram * self.training.mean()
+        inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
+        direction = np.concatenate([-inner @ gram[np.ix_(others, own)] @ beta, beta])
+        energy = direction @ gram[np.ix_(cols, cols)] @ direction
+        noise = direction @ bias[np.ix_(cols, cols)] @ direction
+        return float(NOISE_SAFETY * noise / max(energy, 1e-300))
+
+    def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
+        """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
+        where = np.searchsorted(np.sort(fit.columns), cols)
+        where = np.argsort(fit.columns)[where]
+        b = fit.beta[where]
+        cov = fit.covariance[np.ix_(where, where)]
+        statistic = float(b @ np.linalg.pinv(cov, hermitian=True) @ b)
+        q = len(b)
+        if count - q < 2:
+            return 1.0
+        return float(f.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
+
+
+def inverse_root(diagonal: np.ndarray) -> np.ndarray:
+    """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
+    dead = diagonal <= 1e-24
+    return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+
+
+def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric normal matrix, scaled to unit diagonal, with a trace of ridge."""
+    scale = inverse_root(np.diag(matrix))
+    scaled = matrix * np.outer(scale, scale) + 1e-10 * np.eye(len(matrix))
+    return np.linalg.inv(scaled) * np.outer(scale, scale)
+
+
+def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """The noise's Gram matrix, held to MOST_ATTENUATION of the energy in every direction."""
+    if not len(gram):
+        return bias
+    scale = inverse_root(np.diag(gram))
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram)))
+    values = np.maximum(values, 1e-9)
+    back = vectors / np.sqrt(values)
+    inner = back.T @ (bias * np.outer(scale, scale)) @ back
+    share, turn = np.linalg.eigh((inner + inner.T) / 2)
+    if share[-1] <= MOST_ATTENUATION:
+        return bias
+    root = (vectors * np.sqrt(values)) @ turn
+    unscale = np.where(scale > 0, 1.0 / np.where(scale > 0, scale, 1.0), 0.0)
+    return (root * np.minimum(share, MOST_ATTENUATION)) @ root.T * np.outer(unscale, unscale)
+
+
+def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
+    """A covariance that is in no direction smaller than the plain one."""
+    values, vectors = np.linalg.eigh((plain + plain.T) / 2)
+    values = np.maximum(values, values[-1] * 1e-14 if len(values) else 0)
+    root = vectors * np.sqrt(values)
+    back = vectors / np.sqrt(values)
+    inner = back.T @ robust @ back
+    v, u = np.linalg.eigh((inner + inner.T) / 2)
+    return root @ (u * np.maximum(v, 1.0)) @ u.T @ root.T
+
+
+def whiten(rows: Rows, filters: np.ndarray | dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened y (n, 12) and x (n, 12, K), the filters' start-up dropped; absent channels become zero."""
+    longest = max(len(f) for f in filters.values()) - 1
+    y = np.zeros_like(rows.y)
+    x = np.zeros_like(rows.x)
+    for channel, taps in filters.items():
+        y[:, channel] = lfilter(taps, [1.0], rows.y[:, channel])
+        x[:, channel] = lfilter(taps, [1.0], rows.x[:, channel], axis=0)
+    return y[longest:], x[longest:]
+
+
+def full_fit_residuals(rows: list[Rows], precision: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """Residuals (n, 12) of every term fitted at once, channels weighted by their own spread (two rounds)."""
+    channels = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
+    weight = {c: 1.0 / (np.concatenate([r.y[:, c] for r in rows]).std() + 1e-12) for c in channels}
+    size = rows[0].x.shape[2]
+    beta = np.zeros(size)
+    for _ in range(2):
+        gram, cross = np.zeros((size, size)), np.zeros(size)
+        for r in rows:
+            for c in channels:
+                x = r.x[:, c] * weight[c]
+                gram += x.T @ x
+                cross += x.T @ (r.y[:, c] * weight[c])
+        gram += np.diag(precision)
+        scale = inverse_root(np.diag(gram))
+        beta = scale * np.linalg.solve(gram * np.outer(scale, scale) + 1e-7 * np.eye(size), cross * scale)
+        left = [r.y - r.x @ beta for r in rows]
+        weight = {c: 1.0 / (np.concatenate([r[:, c] for r in left]).std() + 1e-12) for c in channels}
+    return left, beta
+
+
+def build(
+    rows: list[Rows],
+    terms: list[Term],
+    filters: dict[int, np.ndarray],
+    in_training,
+    block_s: float,
+    rate_hz: float,
+    noisy: list[Rows] | None = None,
+) -> Regression:
+    """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
+
+    `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap.
+    """
+    start, at = {}, 0
+    for term in terms:
+        start[term.key] = at
+        at += term.size
+    per_block = max(2, int(round(block_s * rate_hz)))
+    grams, crosses, squares, runs, training = [], [], [], [], []
+    bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
+    names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
+    for k, r in enumerate(rows):
+        y, x = whiten(r, filters)
+        if noisy is not None:
+            y2, x2 = whiten(noisy[k], filters)
+            flat = (x2 - x).reshape(-1, at)
+            bias_gram += flat.T @ flat
+            bias_cross += flat.T @ (y2 - y).reshape(-1)
+        count = max(1, len(y) // per_block)
+        for part in np.array_split(np.arange(len(y)), count):
+            flat, target = x[part].reshape(-1, at), y[part].reshape(-1)
+            grams.append(flat.T @ flat)
+            crosses.append(flat.T @ target)
+            squares.append(float(target @ target))
+            runs.append(names[r.run])
+            middle = r.time_s[min(len(r.time_s) - 1, len(r.time_s) - len(y) + int(part.mean()))]
+            training.append(in_training(r.run, float(middle)))
+    precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
+    return Regression(
+        terms,
+        start,
+        np.array(grams),
+        np.array(crosses),
+        np.array(squares),
+        np.array(runs),
+        np.array([t is True for t in training]),
+        np.array([t is False for t in training]),
+        precision,
+        bias_gram,
+        bias_cross,
+        filters,
+    )
+
+
+def chi2_p(statistic: float, degrees: int) -> float:
+    """Upper tail of χ²."""
+    return float(chi2.sf(statistic, degrees))

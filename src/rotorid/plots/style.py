@@ -1,0 +1,147 @@
+"""One look for every figure: sizes, fonts, a colour per quantity, and the same bytes in every run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TEXT_WIDTH_IN = 6.3
+"""Width of the report's text [in]; a figure of this width is printed at its own size."""
+
+# Okabe and Ito's palette, legible to colour-blind readers.
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
+    "#000000",
+    "#e69f00",
+    "#56b4e9",
+    "#009e73",
+    "#f0e442",
+    "#0072b2",
+    "#d55e00",
+    "#cc79a7",
+)
+GREY = "#7f7f7f"
+
+COLOUR = {
+    "measured": BLACK,
+    "model": RED,
+    "before": RED,
+    "refitted": ORANGE,
+    "after": BLUE,
+    "noise": GREY,
+    "reference": GREEN,
+    "x": BLUE,
+    "y": ORANGE,
+    "z": GREEN,
+}
+"""Colour of a quantity, the same in every figure."""
+
+CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK, YELLOW)
+"""Colours in order for things without a fixed one (cells, motors, flights)."""
+
+_RC = {
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 110,
+    "savefig.dpi": 220,
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9.5,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.5,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.1,
+    "lines.markersize": 4,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "axes.unicode_minus": True,
+    "svg.hashsalt": "rotorid",
+    "svg.fonttype": "path",
+}
+
+
+def use() -> None:
+    """Make this look the default of matplotlib for the running program."""
+    import matplotlib
+    from cycler import cycler
+
+    matplotlib.rcParams.update(_RC)
+    matplotlib.rcParams["axes.prop_cycle"] = cycler(color=CYCLE)
+
+
+def figure(height_in: float, rows: int = 1, columns: int = 1, **subplots: Any) -> tuple[Figure, Any]:
+    """A figure as wide as the text with its axes, in the project's look.
+
+    Parameters
+    ----------
+    height_in
+        Height [in].
+    rows, columns
+        Number of axes down and across.
+    subplots
+        Passed on to `matplotlib.pyplot.subplots` (`sharex`, `squeeze`, ...).
+    """
+    import matplotlib.pyplot as plt
+
+    use()
+    return plt.subplots(rows, columns, figsize=(TEXT_WIDTH_IN, height_in), **subplots)
+
+
+def save(fig: Figure, path: str | Path) -> None:
+    """Write a figure without the date, so that the same data give the same bytes, and close it."""
+    import matplotlib.pyplot as plt
+
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    fig.savefig(path, metadata=dated.get(path.suffix))
+    plt.close(fig)
+
+
+def placeholder(path: str | Path, reason: str) -> None:
+    """Write a small figure that says why there is nothing to show."""
+    fig, axes = figure(0.8)
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, reason, ha="center", va="center", color=GREY, transform=axes.transAxes)
+    save(fig, path)
+
+
+def thin(values: np.ndarray, samples: int) -> np.ndarray:
+    """Indices of about `samples` points that keep the envelope of a trace.
+
+    Parameters
+    ----------
+    values
+        Trace, any unit, shape (n,).
+    samples
+        About how many points to keep; a trace no longer than this is kept whole.
+
+    Returns
+    -------
+    Sorted indices, shape (k,): the smallest and the largest value of each of `samples / 2` equal stretches.
+    """
+    values = np.asarray(values)
+    if len(values) <= samples:
+        return np.arange(len(values))
+    edges = np.linspace(0, len(values), samples // 2 + 1).astype(int)
+    kept = set()
+    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        stretch = values[start:stop]
+        if np.all(np.isnan(stretch)):
+            kept.add(int(start))
+        else:
+            kept.update((start + int(np.nanargmin(stretch)), start + int(np.nanargmax(stretch))))
+    return np.array(sorted(kept))

@@ -1,0 +1,205 @@
+"""A chapter's text: Jinja2 over pandoc markdown, with every number read from a result file.
+
+A chapter's files are known in its text by the names that its rule gives them. A `.json` file is the object in
+it, a `.csv` file the list of its rows, a figure is placed with `figure("name", "caption")` and a table with
+`table("name", "caption", columns)`. A name that no file gives is an error, so no number goes missing quietly.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from rotorid.errors import InputError
+
+FIGURES = {".svg", ".png"}
+WIDEST = 40
+"""A column longer than this many characters gets no more room in a table."""
+
+
+class ProseError(InputError):
+    """A chapter's text that cannot be rendered; says which file, which line and why."""
+
+
+def render(path: str | Path, files: Mapping[str, str]) -> str:
+    """The chapter's markdown with numbers, figures and tables in place.
+
+    Parameters
+    ----------
+    path
+        The chapter's text, `notebooks/<chapter>.md`.
+    files
+        Paths by the names under which the text knows them.
+
+    Raises
+    ------
+    ProseError
+        The text names what no file gives, or is not valid Jinja2.
+    """
+    path = Path(path)
+    environment = jinja2.Environment(
+        undefined=jinja2.StrictUndefined,
+        # Pandoc writes identifiers as {#name}, which Jinja2 would read as a comment.
+        comment_start_string="<#",
+        comment_end_string="#>",
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters.update({form.__name__: _defined(form) for form in (fix, sci, interval, text, percent)})
+    known: dict[str, Any] = {name: _read(Path(file)) for name, file in files.items()}
+
+    def figure(name: str, caption: str, width: str = "100%") -> str:
+        if name not in files or Path(files[name]).suffix not in FIGURES:
+            raise ProseError(f"{path}: there is no figure called {name}.")
+        label = f"fig:{path.stem}-{name}".replace("_", "-")
+        return f"![{caption}]({files[name]}){{#{label} width={width}}}"
+
+    def table(name: str, caption: str, columns: Sequence[Sequence[str]]) -> str:
+        rows = known.get(name)
+        if not isinstance(rows, list):
+            raise ProseError(f"{path}: there is no table called {name}.")
+        label = f"tbl:{path.stem}-{name}".replace("_", "-")
+        try:
+            return table_of(rows, caption, columns, label)
+        except KeyError as missing:
+            raise ProseError(f"{path}: the table {name} has no column {missing}.") from None
+
+    try:
+        template = environment.from_string(path.read_text(encoding="utf-8"))
+        return template.render(**known, figure=figure, table=table)
+    except jinja2.TemplateSyntaxError as error:
+        raise ProseError(f"{path}, line {error.lineno}: {error.message}.") from None
+    except (jinja2.UndefinedError, TypeError, ValueError) as error:
+        if isinstance(error, ProseError):
+            raise
+        raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
+
+
+def _defined(form: Callable[..., str]) -> Callable[..., str]:
+    """`form`, but naming the value where it is undefined."""
+
+    def checked(value: Any, *rest: Any) -> str:
+        if isinstance(value, jinja2.Undefined):
+            str(value)  # raises Jinja2's own error, with the name
+        return form(value, *rest)
+
+    return checked
+
+
+def _line_of(error: BaseException) -> int | str:
+    """Line of the text where rendering stopped, from the traceback (Jinja2 keeps the text's own lines)."""
+    line: int | str = "?"
+    trace = error.__traceback__
+    while trace:
+        if trace.tb_frame.f_code.co_filename == "<template>":
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
+
+
+def _read(path: Path) -> Any:
+    if path.suffix == ".json":
+        return json.loads(path.read_text(encoding="utf-8"))
+    if path.suffix == ".csv":
+        with path.open(newline="", encoding="utf-8") as lines:
+            return [{key: _value(cell) for key, cell in row.items()} for row in csv.DictReader(lines)]
+    return str(path)
+
+
+def _value(cell: str) -> float | str | None:
+    """A cell as a number where it is one, nothing where it is empty."""
+    if cell == "":
+        return None
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
+
+
+def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[Sequence[str]], label: str) -> str:
+    """A pandoc pipe table.
+
+    Parameters
+    ----------
+    rows
+        One mapping a row.
+    caption
+        Text above the table, markdown.
+    columns
+        `(key, heading)` or `(key, heading, form)`; `form` is `text`, or `fixN`, `sciN` or `percentN` with N
+        decimals.
+    label
+        Identifier for references.
+    """
+    headings = [column[1] for column in columns]
+    forms = [column[2] if len(column) > 2 else "text" for column in columns]
+    cells = [[_formatted(row[column[0]], form) for column, form in zip(columns, forms, strict=True)] for row in rows]
+    # Where a table is too wide for one line a cell, pandoc takes the columns' shares from these dashes.
+    longest_words = [max(map(len, heading.split())) for heading in headings]
+    widths = [
+        max(3, word, *(min(len(line[place]), WIDEST) for line in cells)) for place, word in enumerate(longest_words)
+    ]
+    rules = [
+        ":" + "-" * width if form == "text" else "-" * width + ":" for width, form in zip(widths, forms, strict=True)
+    ]
+    lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
+    return "\n".join(lines) + f"\n\n: {caption} {{#{label}}}\n"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _formatted(value: Any, form: str) -> str:
+    name, decimals = form.rstrip("0123456789"), form[len(form.rstrip("0123456789")) :]
+    if name == "text":
+        return text(value)
+    if name not in ("fix", "sci", "percent") or not decimals:
+        raise ValueError(f"{form} is not a form of a number; forms are text, fixN, sciN and percentN")
+    return {"fix": fix, "sci": sci, "percent": percent}[name](value, int(decimals))
+
+
+def fix(value: float | None, decimals: int) -> str:
+    """A number with so many decimals and a true minus sign; a dash where there is none."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    shown = f"{value:.{decimals}f}"
+    if float(shown) == 0:
+        shown = shown.lstrip("-")
+    return shown.replace("-", "−")
+
+
+def sci(value: float | None, decimals: int) -> str:
+    """A number as mantissa and power of ten, for text: `1.3877 × 10^−6^` in pandoc's markdown."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    mantissa, exponent = f"{value:.{decimals}e}".split("e")
+    # No-break spaces: a number stays in one piece.
+    return f"{mantissa.replace('-', '−')}\u00a0×\u00a010^{str(int(exponent)).replace('-', '−')}^"
+
+
+def percent(value: float | None, decimals: int) -> str:
+    """A share in per cent, without the sign: 0.021 is `2.1`."""
+    return fix(None if value is None else 100 * value, decimals)
+
+
+def interval(ends: Sequence[float], decimals: int, form: str = "fix") -> str:
+    """Both ends of an interval: `39.75 to 39.76`."""
+    shown = {"fix": fix, "sci": sci}[form]
+    return f"{shown(ends[0], decimals)} to {shown(ends[1], decimals)}"
+
+
+def text(value: Any) -> str:
+    """A result's text with markdown's own signs made harmless; a whole number without its decimals."""
+    if value is None:
+        return "–"
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    return "".join("\\" + sign if sign in "\\`*_{}[]<>#|$^~@" else sign for sign in str(value))

@@ -1,0 +1,65 @@
+"""Where a report came from: versions, commit, configuration, hashes of raw files, date."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import re
+import subprocess
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+
+def gather(raw: Sequence[str | Path], lock: str | Path, config: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything needed to make the same report again.
+
+    Parameters
+    ----------
+    raw
+        Files that instruments wrote.
+    lock
+        The lock file; the installed version of each package in it is recorded.
+    config
+        The configuration that the run used.
+    """
+    lock = Path(lock)
+    return {
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "commit": commit(lock.parent),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "packages": installed_versions(lock.read_text(encoding="utf-8")),
+        "lock_sha256": sha256(lock),
+        "config": dict(config),
+        "raw_sha256": {str(path): sha256(path) for path in raw},
+    }
+
+
+def commit(folder: str | Path) -> str:
+    """The commit of the working tree, with `-dirty` where files differ; says so where there is none."""
+    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown: not a git checkout"
+    return done.stdout.strip()
+
+
+def installed_versions(lock: str) -> dict[str, str]:
+    """Installed version of each package that a lock file's text names."""
+    found = {}
+    for name in re.findall(r"^([A-Za-z0-9][A-Za-z0-9._-]*)==", lock, flags=re.MULTILINE):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:  # locked for another platform or Python
+            continue
+    return found
+
+
+def sha256(path: str | Path) -> str:
+    """SHA-256 of a file of any size, in hexadecimal digits."""
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

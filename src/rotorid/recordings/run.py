@@ -1,0 +1,71 @@
+"""A run (one recording) and a recording set (one vehicle with its runs)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from rotorid.recordings import columns as c
+from rotorid.recordings.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Run:
+    """One recording: a name and a table of float columns in the contract's names and units.
+
+    `table` has `time_s` strictly increasing; empty cells are NaN. Treat it as read-only.
+    """
+
+    name: str
+    table: pd.DataFrame
+
+    @cached_property
+    def time_s(self) -> np.ndarray:
+        """Time stamps, shape (n,), s."""
+        return self.table[c.TIME].to_numpy(float)
+
+    def has(self, *names: str) -> bool:
+        """Whether every named column is there with at least one value."""
+        return all(n in self.table.columns and self.table[n].notna().any() for n in names)
+
+    def array(self, names: tuple[str, ...]) -> np.ndarray:
+        """Named columns as an array, shape (n, len(names)); NaN where missing."""
+        return self.table.reindex(columns=list(names)).to_numpy(float)
+
+    def column(self, name: str) -> np.ndarray:
+        """One column, shape (n,); NaN where missing."""
+        return self.array((name,))[:, 0]
+
+    @property
+    def unknown_columns(self) -> tuple[str, ...]:
+        """Columns without a meaning in the contract, kept as candidate regime variables."""
+        return tuple(n for n in self.table.columns if not c.is_known(n))
+
+
+@dataclass(frozen=True)
+class Split:
+    """Names of the runs to fit and of the runs held out."""
+
+    training: tuple[str, ...]
+    held_out: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RecordingSet:
+    """One vehicle (or stand, or bench) with its runs in the order of time (of their names)."""
+
+    name: str
+    vehicle: Vehicle
+    runs: tuple[Run, ...]
+    held_out: tuple[str, ...] | None = None
+    """Runs that `split.yaml` holds out; None where there is no such file."""
+
+    def run(self, name: str) -> Run:
+        """The run of that name; KeyError if there is none."""
+        for run in self.runs:
+            if run.name == name:
+                return run
+        raise KeyError(name)

@@ -1,0 +1,140 @@
+"""What the user believes about a vehicle or a stand: `vehicle.yaml` as a typed model.
+
+Axes: world north-east-down, body forward-right-down with its origin at the believed centre of mass.
+A rotor's thrust acts along -z of the body. A rotor that spins counter-clockwise seen from above (`ccw`)
+pushes the airframe clockwise: positive yaw moment.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Inertia(_Strict):
+    """Entries of the inertia matrix J about the centre of mass, kg m2 (J_xz = -∫ x z dm)."""
+
+    xx: float = Field(gt=0)
+    yy: float = Field(gt=0)
+    zz: float = Field(gt=0)
+    xy: float = 0.0
+    xz: float = 0.0
+    yz: float = 0.0
+
+    def matrix(self) -> np.ndarray:
+        """Inertia matrix, shape (3, 3), kg m2, body axes."""
+        return np.array([[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]])
+
+
+class Rotor(_Strict):
+    """Where a rotor sits (body axes, m) and how it spins seen from above."""
+
+    x_m: float
+    y_m: float
+    z_m: float = 0.0
+    spin: Literal["ccw", "cw"]
+
+    @property
+    def yaw_sign(self) -> float:
+        """+1 where the rotor's reaction torque on the airframe is a positive yaw moment (ccw)."""
+        return 1.0 if self.spin == "ccw" else -1.0
+
+
+class Noise(_Strict):
+    """One-sigma sensor noise as the user believes it; a hint that the tool checks."""
+
+    specific_force_m_s2: float | None = Field(None, ge=0)
+    angular_velocity_rad_s: float | None = Field(None, ge=0)
+    rotor_speed_relative: float | None = Field(None, ge=0)
+    velocity_m_s: float | None = Field(None, ge=0)
+    position_m: float | None = Field(None, ge=0)
+    force_n: float | None = Field(None, ge=0)
+    moment_n_m: float | None = Field(None, ge=0)
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+
+_FLIGHT_NEEDS = ("mass_kg", "inertia_kg_m2", "rotors", "thrust_coefficient_n_s2", "torque_coefficient_n_m_s2")
+
+
+class Vehicle(_Strict):
+    """A vehicle (kinds `flight`, `stand`) or a bench, as believed by its user."""
+
+    name: str
+    kind: Literal["flight", "stand", "bench"]
+    mass_kg: float | None = Field(None, gt=0)
+    inertia_kg_m2: Inertia | None = None
+    rotors: tuple[Rotor, ...] = ()
+    thrust_coefficient_n_s2: float | tuple[float, ...] | None = None
+    torque_coefficient_n_m_s2: float | tuple[float, ...] | None = None
+    gravity_m_s2: float = Field(9.81, gt=0)
+    rotor_radius_m: float | None = Field(None, gt=0)
+    rotor_inertia_kg_m2: float | None = Field(None, ge=0)
+    ground_z_m: float | None = None
+    accelerometer_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sensor_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sensor_mount: Literal["level", "tilting"] = "level"
+    tared: bool | None = None
+    rotor_speed_limits_rad_s: tuple[float, float] | None = None
+    noise: Noise = Noise()
+    trust: dict[str, float] = Field(default_factory=dict)
+    effects: tuple[dict[str, Any], ...] = ()
+    """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""
+
+    @field_validator("trust")
+    @classmethod
+    def _trust_is_positive(cls, trust: dict[str, float]) -> dict[str, float]:
+        for key, sigma in trust.items():
+            if not sigma >= 0:
+                raise ValueError(f"trust of {key} is {sigma}, expected a relative one-sigma of 0 or more")
+        return trust
+
+    @model_validator(mode="after")
+    def _complete(self) -> Vehicle:
+        if self.kind == "flight":
+            missing = [key for key in _FLIGHT_NEEDS if not getattr(self, key)]
+            if missing:
+                raise ValueError(f"kind flight needs {', '.join(missing)}")
+        if self.kind == "stand" and not (self.rotors and self.thrust_coefficient_n_s2):
+            raise ValueError("kind stand needs rotors and thrust_coefficient_n_s2")
+        count = len(self.rotors)
+        for key in ("thrust_coefficient_n_s2", "torque_coefficient_n_m_s2"):
+            value = getattr(self, key)
+            if isinstance(value, tuple) and len(value) != count:
+                raise ValueError(f"{key} has {len(value)} values for {count} rotors")
+            values = value if isinstance(value, tuple) else () if value is None else (value,)
+            if any(v <= 0 for v in values):
+                raise ValueError(f"{key} must be positive")
+        if self.rotor_speed_limits_rad_s is not None:
+            low, high = self.rotor_speed_limits_rad_s
+            if not 0 <= low < high:
+                raise ValueError("rotor_speed_limits_rad_s must be [low, high] with 0 <= low < high")
+        if self.inertia_kg_m2 is not None and np.linalg.eigvalsh(self.inertia_kg_m2.matrix())[0] <= 0:
+            raise ValueError("inertia_kg_m2 is not a positive definite matrix")
+        return self
+
+    @property
+    def rotor_count(self) -> int:
+        return len(self.rotors)
+
+    def rotor_positions_m(self) -> np.ndarray:
+        """Rotor hubs, shape (n_rotors, 3), m, body axes."""
+        return np.array([[r.x_m, r.y_m, r.z_m] for r in self.rotors], dtype=float).reshape(-1, 3)
+
+    def yaw_signs(self) -> np.ndarray:
+        """Sign of each rotor's reaction torque about body z, shape (n_rotors,)."""
+        return np.array([r.yaw_sign for r in self.rotors])
+
+    def thrust_coefficients_n_s2(self) -> np.ndarray:
+        """C_F per rotor, shape (n_rotors,), N s2."""
+        return np.broadcast_to(np.asarray(self.thrust_coefficient_n_s2, float), (self.rotor_count,)).copy()
+
+    def torque_coefficients_n_m_s2(self) -> np.ndarray:
+        """C_Q per rotor, shape (n_rotors,), N m s2; zero where the vehicle states none."""
+        value = 0.0 if self.torque_coefficient_n_m_s2 is None else self.torque_coefficient_n_m_s2
+        return np.broadcast_to(np.asarray(value, float), (self.rotor_count,)).copy()

@@ -1,0 +1,1 @@
+"""Filters and derivatives shared by every stage."""

@@ -1,0 +1,47 @@
+"""Symmetric (zero-phase) low-pass and derivative kernels, so that both sides of an equation are filtered alike."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.signal import fftconvolve
+from scipy.signal.windows import kaiser
+
+ATTENUATION_BETA = 5.0
+"""Kaiser window for about 50 dB in the stop band."""
+HALF_LENGTH_CYCLES = 2.4
+"""Half the kernel's length in periods of the cutoff: the transition is 0.6 of the cutoff wide."""
+
+
+def half_length(rate_hz: float, cutoff_hz: float) -> int:
+    """Samples lost at each end by a kernel of this cutoff."""
+    return max(2, int(np.ceil(HALF_LENGTH_CYCLES * rate_hz / cutoff_hz)))
+
+
+@lru_cache(maxsize=64)
+def low_pass(rate_hz: float, cutoff_hz: float) -> np.ndarray:
+    """Windowed-sinc low-pass of unit gain at zero frequency, shape (2 half_length + 1,); -6 dB at the cutoff."""
+    half = half_length(rate_hz, cutoff_hz)
+    k = np.arange(-half, half + 1)
+    kernel = np.sinc(2 * cutoff_hz * k / rate_hz) * kaiser(2 * half + 1, ATTENUATION_BETA)
+    return kernel / kernel.sum()
+
+
+@lru_cache(maxsize=64)
+def derivative(rate_hz: float, cutoff_hz: float) -> np.ndarray:
+    """Derivative of a signal low-passed at the cutoff, 1/s: the sampled derivative of the low-pass kernel."""
+    half = half_length(rate_hz, cutoff_hz)
+    k = np.arange(-half, half + 1)
+    x = np.pi * 2 * cutoff_hz * k / rate_hz
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.where(k == 0, 0.0, (np.cos(x) - np.sinc(x / np.pi)) / k)
+    kernel = slope * kaiser(2 * half + 1, ATTENUATION_BETA)
+    # A ramp of slope one must give exactly one.
+    return -kernel * rate_hz / (kernel * k).sum()
+
+
+def apply(kernel: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """Convolve along axis 0 and keep only samples that the kernel fully covers."""
+    shape = (len(kernel),) + (1,) * (signal.ndim - 1)
+    return fftconvolve(signal, kernel.reshape(shape), mode="valid", axes=0)

@@ -1,0 +1,46 @@
+"""What every stage uses: the checked configuration and the code of the library as a parameter."""
+
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+
+from rotorid.codehash import Code
+from rotorid.config import ConfigError, check
+
+ROOT = Path(workflow.basedir)
+CODE = Code(ROOT)
+
+try:
+    CONFIG = check(config)
+except ConfigError as error:
+    raise WorkflowError(str(error)) from None
+
+
+def code_of(script):
+    """Hash of the code that a script (its name without .py) or a notebook (its path) runs."""
+    path = script if script.endswith(".ipynb") else f"workflow/scripts/{script}.py"
+    return CODE.of(path)
+
+
+def code_of_chapter(name):
+    """Hash of the code of a chapter's notebook and of what runs it."""
+    return code_of("run_notebook") + code_of(f"notebooks/{name}.ipynb")
+
+
+def results_behind(*files):
+    """The files and every result that they hang on, for a target to ask for by name.
+
+    Snakemake does not miss a deleted result while what was made of it is still there.
+    """
+    found, waiting = set(), list(files)
+    while waiting:
+        path = waiting.pop()
+        found.add(path)
+        for producer in (known for known in workflow.rules if known.is_producer(path)):
+            inputs, *_ = producer.expand_input(producer.get_wildcards(path))
+            waiting += {str(file) for file in inputs if str(file).startswith("results/")} - found
+    return sorted(found)
+
+
+wildcard_constraints:
+    chapter="[a-z][a-z0-9_]*",

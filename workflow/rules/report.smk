@@ -1,0 +1,132 @@
+"""From the chapters' figures, tables and texts to the report; included last, after every chapter's rule."""
+
+PARTS = "workflow/report"
+
+
+for name in CONFIG.report.chapters:
+    if not (ROOT / f"notebooks/{name}.md").is_file():
+        raise WorkflowError(
+            f"config.yaml: report.chapters names {name}, but there is no notebooks/{name}.md."
+        )
+
+# A chapter without a rule of its own is text alone.
+CHAPTERS = {
+    name: getattr(rules, f"chapter_{name}")
+    for name in CONFIG.report.chapters
+    if f"chapter_{name}" in {known.name for known in workflow.rules}
+}
+
+
+def chapter_files(wildcards):
+    """The files that a chapter's text may use, by name: outputs and single inputs of its rule."""
+    chapter = CHAPTERS.get(wildcards.chapter)
+    named = {**dict(chapter.input.items()), **dict(chapter.output.items())} if chapter else {}
+    shown = {".json", ".csv", ".svg", ".png"}
+    return {
+        name: path for name, path in named.items() if isinstance(path, str) and Path(path).suffix in shown
+    }
+
+
+def chapter_figures(wildcards):
+    """Every figure of every chapter."""
+    files = [path for chapter in CHAPTERS.values() for path in chapter.output]
+    return [path for path in files if Path(path).suffix in {".svg", ".png"}]
+
+
+def raw_files(wildcards):
+    """Everything that instruments wrote, and the list of public recordings with their hashes."""
+    return sorted(str(path) for path in Path("raw").rglob("*") if path.is_file()) + [MANIFEST]
+
+
+rule render_chapter:
+    """Numbers, tables and figures put into a chapter's text."""
+    message:
+        "Report: text of chapter {wildcards.chapter}"
+    input:
+        unpack(chapter_files),
+        prose="notebooks/{chapter}.md",
+    output:
+        markdown="results/report/chapters/{chapter}.md",
+    params:
+        code=code_of("render_chapter"),
+    log:
+        "results/logs/render_chapter/{chapter}.log",
+    script:
+        "../scripts/render_chapter.py"
+
+
+rule typeset_pdf:
+    """The chapters as a book."""
+    message:
+        "Report: typesetting the PDF"
+    input:
+        chapters=expand(rules.render_chapter.output.markdown, chapter=CONFIG.report.chapters),
+        figures=chapter_figures,
+        template=PARTS + "/report.typ",
+        filter=PARTS + "/crossref.lua",
+        references=PARTS + "/references.bib",
+    output:
+        pdf="results/report/report.pdf",
+        source="results/report/report.typ",
+    params:
+        title=CONFIG.report.title,
+        subtitle=CONFIG.report.subtitle,
+        code=code_of("typeset_pdf"),
+    log:
+        "results/logs/typeset_pdf.log",
+    script:
+        "../scripts/typeset_pdf.py"
+
+
+rule build_html:
+    """The chapters as one page that needs no other file."""
+    message:
+        "Report: building the HTML"
+    input:
+        chapters=expand(rules.render_chapter.output.markdown, chapter=CONFIG.report.chapters),
+        figures=chapter_figures,
+        template=PARTS + "/report.html",
+        style=PARTS + "/report.css",
+        filter=PARTS + "/crossref.lua",
+        references=PARTS + "/references.bib",
+    output:
+        html="results/report/report.html",
+    params:
+        title=CONFIG.report.title,
+        subtitle=CONFIG.report.subtitle,
+        code=code_of("build_html"),
+    log:
+        "results/logs/build_html.log",
+    script:
+        "../scripts/build_html.py"
+
+
+rule record_provenance:
+    """Versions, commit, configuration and hashes of raw: the only output that may differ between two runs."""
+    message:
+        "Report: provenance"
+    input:
+        raw=raw_files,
+        lock="requirements.lock",
+        report=[rules.typeset_pdf.output.pdf, rules.build_html.output.html],
+    output:
+        provenance="results/report/provenance.json",
+    params:
+        config=config,
+        code=code_of("record_provenance"),
+    log:
+        "results/logs/record_provenance.log",
+    script:
+        "../scripts/record_provenance.py"
+
+
+rule report:
+    """The report and where it came from."""
+    message:
+        "The report is up to date"
+    input:
+        results_behind(
+            rules.typeset_pdf.output.pdf,
+            rules.build_html.output.html,
+            rules.record_provenance.output.provenance,
+        ),

@@ -1,0 +1,15 @@
+"""Build the self-contained HTML of the report."""
+
+from pathlib import Path
+
+from rotorid import log, typeset
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        typeset.html(
+            chapters=snakemake.input.chapters,
+            title=snakemake.params.title,
+            subtitle=snakemake.params.subtitle,
+            parts=Path(snakemake.input.template).parent,
+            out=snakemake.output.html,
+        )
