@@ -187,9 +187,7 @@ def calibration(campaign: Campaign) -> None:
                     physics.place_load("z", load)
                     return lambda: True
 
-                setup = Setup(
-                    platform="clamp", cell=cell, load_gf=load, load_items=list(items), repeat=repeat
-                )
+                setup = Setup(platform="clamp", cell=cell, load_gf=load, load_items=list(items), repeat=repeat)
                 campaign.record(
                     "calibration",
                     f"cal-cell{cell}",
@@ -215,17 +213,13 @@ def static(campaign: Campaign) -> None:
                 rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
                 reaction = int(rng.integers(60, 120))
                 prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, reaction)
-                setup = Setup(
-                    platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat
-                )
+                setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
                 campaign.record(
                     "static",
                     f"static-{platform}-{axis}",
                     world,
                     {name: setup},
-                    lambda recorder, prompt=prompt, rule=rule: procedures.static_test(
-                        recorder, prompt, 50, rule
-                    ),
+                    lambda recorder, prompt=prompt, rule=rule: procedures.static_test(recorder, prompt, 50, rule),
                     {"name": "static_test", "samples": 50, **vars(rule)},
                 )
 
@@ -250,14 +244,8 @@ def dynamic(campaign: Campaign) -> None:
                 "dynamic",
                 f"dynamic-set{repeat}",
                 world,
-                {
-                    name: Setup(
-                        platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand"
-                    )
-                },
-                lambda recorder, prompt=prompt, rule=rule: procedures.dynamic_test(
-                    recorder, prompt, 1500, rule
-                ),
+                {name: Setup(platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand")},
+                lambda recorder, prompt=prompt, rule=rule: procedures.dynamic_test(recorder, prompt, 1500, rule),
                 {"name": "dynamic_test", "samples": 1500, **vars(rule)},
                 pause_s=300,
             )
@@ -466,9 +454,7 @@ def main() -> None:
     given = parser.parse_args()
     recordings = run_campaign(given.raw, given.sealed, given.seed, given.part or PARTS)
     size = sum(file.stat().st_size for file in (given.raw / "campaign").rglob("*") if file.is_file())
-    print(
-        f"{len(recordings)} recordings, {size / 1e6:.1f} MB in {given.raw}/campaign; truth in {given.sealed}"
-    )
+    print(f"{len(recordings)} recordings, {size / 1e6:.1f} MB in {given.raw}/campaign; truth in {given.sealed}")
 
 
 if __name__ == "__main__":

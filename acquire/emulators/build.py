@@ -54,9 +54,7 @@ def build(
         return World(physics, line(Jr3Device(physics)))
     if what == "tensile":
         if infill_percent not in truth.plastic:
-            raise ValueError(
-                f"specimens have an infill of {list(truth.plastic)} percent, not {infill_percent}"
-            )
+            raise ValueError(f"specimens have an infill of {list(truth.plastic)} percent, not {infill_percent}")
         physics = TensilePhysics(truth.plastic[infill_percent], 1.0, 0.05, rng)
         return World(physics, line(TensileDevice(physics)))
     if what == "rotor":

@@ -64,9 +64,7 @@ def test_the_campaign_is_whole(index):
         "dynamics": 2 * 48,
         "tensile": 4 * 3,
     }
-    assert {row["ended"] for row in index} == {"finished"} and {row["source"] for row in index} == {
-        "emulator"
-    }
+    assert {row["ended"] for row in index} == {"finished"} and {row["source"] for row in index} == {"emulator"}
     assert {row["kind"] for row in index} == set(PARTS)
     assert len({row["id"] for row in index}) == len(index)
     loads = {float(row["load_gf"]) for row in index if row["kind"] == "static"}
@@ -82,18 +80,12 @@ def test_logs_are_the_bytes_that_were_recorded(index):
         unpacked = gzip.decompress((RAW / row["file"]).read_bytes())
         assert hashlib.sha256(unpacked).hexdigest() == session.log_sha256
         log = read_log(RAW / row["file"])
-        assert (
-            log.cut_at is None
-            and len(log.table) == int(row["samples"])
-            and log.missing == int(row["missing"])
-        )
+        assert log.cut_at is None and len(log.table) == int(row["samples"]) and log.missing == int(row["missing"])
         assert log.session.setup.air is not None
 
 
 def test_no_truth_in_raw():
-    text = (RAW / "sessions.tsv").read_text() + "".join(
-        p.read_text() for p in RAW.glob("campaign/*/*-1*.yaml")
-    )
+    text = (RAW / "sessions.tsv").read_text() + "".join(p.read_text() for p in RAW.glob("campaign/*/*-1*.yaml"))
     for word in ("compliance", "crosstalk", "com_offset", "thrust_factors", "creep"):
         assert word not in text
 

@@ -29,9 +29,7 @@ def emulator(tmp_path):
     def start(what: str, *names: str, more: tuple[str, ...] = ()) -> list[str]:
         links = [str(tmp_path / name) for name in names]
         options = [word for link in links for word in ("--link", link)]
-        process = subprocess.Popen(
-            [*ACQUIRE, "emulate", what, *options, *more], stdout=subprocess.PIPE, text=True
-        )
+        process = subprocess.Popen([*ACQUIRE, "emulate", what, *options, *more], stdout=subprocess.PIPE, text=True)
         processes.append(process)
         for _ in links:
             assert "Ctrl-C ends it" in process.stdout.readline()
@@ -118,10 +116,7 @@ def test_rotor_and_tensile(emulator, tmp_path):
 def test_wrench_operations(emulator, tmp_path):
     (port,) = emulator("wrench", "ttyWRENCH", more=("--speed", "20"))
     for step in ("power-on", "offset"):
-        assert (
-            run("wrench", "--port", port, "--only", step, "--out", str(tmp_path), "--id", step).returncode
-            == 0
-        )
+        assert run("wrench", "--port", port, "--only", step, "--out", str(tmp_path), "--id", step).returncode == 0
     done = run(
         *("wrench", "--port", port, "--interval", "0.02", "--measuring-times", "40", "--restart-times", "1"),
         *("--offset", "--out", str(tmp_path), "--id", "w"),
@@ -130,10 +125,7 @@ def test_wrench_operations(emulator, tmp_path):
     log = read_log(tmp_path / "w.rlog")
     assert len(log.table) == 80 and log.end.sent == 80  # one run and one restart of forty
     assert abs(log.table.force_z_n.mean()) < 0.1  # the weight is offset away
-    assert (
-        run("wrench", "--port", port, "--only", "power-off", "--out", str(tmp_path), "--id", "off").returncode
-        == 0
-    )
+    assert run("wrench", "--port", port, "--only", "power-off", "--out", str(tmp_path), "--id", "off").returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -187,9 +179,7 @@ def test_reference_sensor_on_the_bench_command(emulator, tmp_path):
     assert done.returncode == 0, done.stderr
     log = read_log(tmp_path / "j.rlog")
     table, marks = log.table.set_index("index"), log.session.marks
-    read = (
-        table.force_z_n.loc[marks["read_start"] : marks["read_stop"]].mean() - log.session.tare["force_z_n"]
-    )
+    read = table.force_z_n.loc[marks["read_start"] : marks["read_stop"]].mean() - log.session.tare["force_z_n"]
     assert read == pytest.approx(-957.5475 * GF_N, abs=0.3)
 
 
@@ -233,7 +223,7 @@ def test_braille_curve_by_hand():
 
 def test_modules_of_the_library_stay_apart():
     """`rotorid.io` knows nothing of `acquire`."""
-    for path in Path("src/rotorid").rglob("*.py"):
+    for path in (Path(__file__).parents[2] / "src" / "rotorid").rglob("*.py"):
         assert "acquire" not in [
             word.split(".")[0]
             for line in path.read_text().splitlines()

@@ -73,9 +73,7 @@ def test_quadrotor(loopback):
 def test_experiment_says_the_programme_while_the_sensor_measures(loopback):
     _, vehicle, sensor = loopback("stand")
     with vehicle, sensor:
-        procedures.experiment(
-            vehicle, sensor, "h", Programme(TRAPEZOID, (0.2,) * 4, 1.0, 2.0, 0.0), rest_s=1.0
-        )
+        procedures.experiment(vehicle, sensor, "h", Programme(TRAPEZOID, (0.2,) * 4, 1.0, 2.0, 0.0), rest_s=1.0)
     assert [word[0] for word in said(sensor.log_path)] == ["?", "P", "I", "G", "X", "P"]
     flight, wrench = read_log(vehicle.log_path), read_log(sensor.log_path)
     # rest, 4 s and half a second of programme, rest; the sensor reads 6.396 N less the thrust at the maximum

@@ -103,9 +103,7 @@ def test_port_vanishes_and_comes_back(plugged, recorder_on):
     ports = plugged("bench", replug_after_s=0.02)
     recorder = recorder_on("bench", ports.names[0])
     pull_at(ports, recorder, 100)
-    wanted = (
-        5000  # more than all buffers on the way hold, so that the plug is out before the recording is over
-    )
+    wanted = 5000  # more than all buffers on the way hold, so that the plug is out before the recording is over
     log = record(recorder, wanted)
     assert log.resets == 1 and log.session.counts.port_losses == 1
     before, after = (log.table[log.table.segment == segment] for segment in (0, 1))
@@ -156,9 +154,7 @@ def test_wrong_checksum(plugged, recorder_on):
 
 
 def test_dropped_repeated_and_reordered_frames(plugged, recorder_on):
-    faults = Faults(
-        drop=frozenset({30, 31, 32, 100}), repeat=frozenset({40, 41, 200}), swap=frozenset({50, 150})
-    )
+    faults = Faults(drop=frozenset({30, 31, 32, 100}), repeat=frozenset({40, 41, 200}), swap=frozenset({50, 150}))
     log = record(recorder_on("bench", plugged("bench", faults).names[0]))
     numbers = frame_numbers(log)
     assert (np.diff(numbers) > 0).all()

@@ -25,7 +25,7 @@ def log_path(loopback):
     """A short recording with a few faults in it."""
     _, recorder = loopback("bench", Faults(drop=frozenset({5}), repeat=frozenset({9}), swap=frozenset({12})))
     with recorder:
-        procedures.stream(recorder, 30)
+        procedures.stream(recorder, 15)
     return recorder.log_path
 
 
@@ -62,7 +62,7 @@ def test_a_damaged_chunk_ends_the_log(log_path):
     data[len(data) // 2] ^= 0xFF
     log_path.write_bytes(data)
     log = read_log(log_path)
-    assert log.cut_at <= len(data) // 2 and 0 < len(log.table) < 30
+    assert log.cut_at <= len(data) // 2 and 0 < len(log.table) < 15
 
 
 def test_no_log_at_all(tmp_path):
@@ -102,9 +102,7 @@ def test_saturated_samples_are_flagged(loopback, tmp_path):
 
 
 def test_metadata_are_written_atomically(tmp_path, monkeypatch):
-    session = Session(
-        id="a", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log="a.rlog"
-    )
+    session = Session(id="a", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log="a.rlog")
     path = tmp_path / "a.yaml"
     write_session(session, path)
     before = path.read_bytes()
@@ -146,9 +144,7 @@ def test_index(log_path):
     rows = write_index(raw)
     assert len(rows) == 1 and list(rows[0]) == COLUMNS
     assert rows == read_index(raw)
-    assert (
-        rows[0]["file"] == "run-bench.rlog" and rows[0]["missing"] == "1" and rows[0]["ended"] == "finished"
-    )
+    assert rows[0]["file"] == "run-bench.rlog" and rows[0]["missing"] == "1" and rows[0]["ended"] == "finished"
 
 
 def test_table_a1_spot_checks():
