@@ -127,6 +127,13 @@ def test_static_reading_by_the_recorders_marks():
     assert force[2] == pytest.approx(-500.48 * 9.80665e-3, rel=0.005)
 
 
+def test_the_workflow_never_names_the_sealed_truth():
+    root = RAW.parent
+    files = [root / "Snakefile", root / "config.yaml", *(root / "workflow").rglob("*"), *(root / "src").rglob("*.py")]
+    texts = {p: p.read_text(errors="replace") for p in files if p.is_file() and p.suffix != ".pyc"}
+    assert [p for p, text in texts.items() if "campaign_truth" in text] == []
+
+
 def test_index_is_a_table():
     with open(RAW / "sessions.tsv", newline="") as file:
         widths = {len(row) for row in csv.reader(file, delimiter="\t")}
