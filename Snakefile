@@ -13,6 +13,9 @@ include: "workflow/rules/public.smk"
 include: "workflow/rules/check.smk"
 include: "workflow/rules/rotor.smk"
 include: "workflow/rules/neurobem.smk"
+include: "workflow/rules/white_box.smk"
+include: "workflow/rules/grey_box.smk"
+include: "workflow/rules/black_box.smk"
 include: "workflow/rules/report.smk"
 
 

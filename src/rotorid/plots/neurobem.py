@@ -35,9 +35,7 @@ def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figur
     fig, axes = style.figure(4.6, rows=2, columns=3, sharex=True)
     for axis, channel in zip(axes.flat, CHANNELS, strict=True):
         size = points[channel].abs()
-        axis.plot(
-            points["airspeed_m_s"], size, ".", markersize=1.6, color="#bbbbbb", rasterized=True, zorder=0
-        )
+        axis.plot(points["airspeed_m_s"], size, ".", markersize=1.6, color="#bbbbbb", rasterized=True, zorder=0)
         for model, colour, label in (
             ("rigid_body", style.COLOUR["before"], "rigid body, RMS"),
             ("neurobem", style.COLOUR["after"], "NeuroBEM, RMS"),
