@@ -116,7 +116,7 @@ class GreyBox(Section):
     design_candidates: int = Field(ge=4, description="Excitations tried by the search [1].")
     flight_s: float = Field(gt=0, description="Length of the identification flight [s].")
     motor_time_s: float = Field(ge=0, description="Time constant of the motors on that flight [s].")
-    draws: int = Field(ge=1, description="Draws of the readings' noise [1].")
+    draws: int = Field(ge=1, description="Identification flights, each with its own disturbance and noise [1].")
     band_hz: tuple[float, float] = Field(
         strict=False, description="Band in which real flights tell their inertia [Hz]."
     )

@@ -2,8 +2,8 @@
 
 - Standard errors that the thesis's manoeuvres and the designed multisine allow, for the same readings.
 - The multisine flown in closed loop with motor lag, disturbance and noisy readings.
-- Inertias by output error over windows for many draws of the readings' noise; gyroscopic weights left free and
-  tested for consistency.
+- Inertias by output error over windows for many such flights, each with its own disturbance and noise; gyroscopic
+  weights left free and tested for consistency.
 """
 
 import json
@@ -21,7 +21,7 @@ from rotorid.estimate.inertial import WEIGHT_NAMES, weights_of_inertias
 from rotorid.estimate.output_error import cut_windows, fit_output_error, tied, untied
 from rotorid.recordings import read_vehicle
 from rotorid.vehicle.mixer import wrench_matrix
-from rotorid.vehicle.simulator import Disturbance, Motors, simulate
+from rotorid.vehicle.simulator import Disturbance, Motors, Start, simulate
 
 SAMPLE_S = 0.004
 AXES = ("xx", "yy", "zz")
@@ -84,7 +84,8 @@ def main(
     multisine, _ = design(vehicle, wanted, readings, candidates, rng)
     push = Disturbance(force_n, moment_n_m, correlation_s)
     lag, hold = Motors(motor_time_s), ExcitedHold(vehicle, multisine, tuple(limits_rad_s))
-    trace = simulate(vehicle, hold, duration_s, SAMPLE_S, motors=lag, disturbance=push, rng=rng)
+    start = Start(*(np.zeros((draws, 3)) for _ in range(4)))
+    trace = simulate(vehicle, hold, duration_s, SAMPLE_S, start, lag, disturbance=push, rng=rng)
     rates, speeds = trace.angular_velocity[0], trace.rotor_speed[0]
     flights = {}
     for reference in (training_reference(), validation_reference()):
@@ -96,12 +97,14 @@ def main(
     rows, fitted = [], []
     for draw in range(draws):
         noise = np.random.default_rng([seed, draw])
-        read_speeds = speeds * (1 + speed_noise_relative * noise.normal(size=speeds.shape))
-        read_rates = rates + rate_noise * noise.normal(size=rates.shape)
+        read_speeds = trace.rotor_speed[draw] * (1 + speed_noise_relative * noise.normal(size=speeds.shape))
+        read_rates = trace.angular_velocity[draw] + rate_noise * noise.normal(size=rates.shape)
         windows = cut_windows(read_rates, moments_of(vehicle, read_speeds), SAMPLE_S, WINDOW_S)
-        start = np.log(truth * np.array([1.2, 0.85, 1.1]))
-        fit = fit_output_error(windows, tied, start)
-        free = fit_output_error(windows, untied, np.concatenate([start, np.zeros(3)]))
+        guess = np.log(truth * np.array([1.2, 0.85, 1.1]))
+        fit = fit_output_error(windows, tied, guess, moment_noise_n_m=readings.moments_n_m)
+        free = fit_output_error(
+            windows, untied, np.concatenate([guess, np.zeros(3)]), moment_noise_n_m=readings.moments_n_m
+        )
         weights, covariance = untied_weights(free)
         agreement = check_consistency(weights, covariance)
         fitted.append((fit, weights, covariance, agreement))

@@ -1,6 +1,7 @@
 """Inertias by the masked network of thesis 4.3.2 on the simulated manoeuvre (figure 4.22), and what is wrong with it.
 
-- The network from random weights, rate 0.8, batch; least squares on the same data with intervals.
+- The network from random weights, rate 0.8, batch: as the thesis trains it, and with inputs and outputs scaled.
+- Least squares on the same data, where both would end, with intervals.
 - The consistency test of the gyroscopic weights: on these weights, and on those that the thesis prints.
 - How well the manoeuvre can tell each weight at all.
 """
@@ -18,7 +19,6 @@ from rotorid.estimate.inertial import (
     fit_least_squares,
     fit_masked_network,
     inertias_of_weights,
-    six_weights,
     weights_of_inertias,
 )
 from rotorid.networks.training import Training
@@ -51,8 +51,8 @@ def main(
     table = pd.read_csv(flight)
     whole = [columns(table, name) for name in COLUMNS]
     thinned = [values[::every] for values in whole]
-    trained = fit_masked_network(*thinned, Training(rate, epochs, every=max(epochs // 400, 1), seed=seed))
-    weights = six_weights(trained.network.weights[0])
+    how = Training(rate, epochs, every=max(epochs // 400, 1), seed=seed)
+    plain, scaled = (fit_masked_network(*thinned, how, scaled=s) for s in (False, True))
     squares = fit_least_squares(*whole)
     short = fit_least_squares(*thinned, block=max(50 // every, 1))
     half = 1.96 * squares.inertia_errors
@@ -60,26 +60,35 @@ def main(
     found = {
         "names": list(WEIGHT_NAMES),
         "truth": weights_of_inertias(truth).tolist(),
-        "network": weights.tolist(),
+        "network": scaled.weights.tolist(),
+        "network_plain": plain.weights.tolist(),
+        "epochs": epochs,
+        "epochs_to_settle_plain": plain.epochs_to_settle.tolist(),
+        "epochs_to_settle_scaled": scaled.epochs_to_settle.tolist(),
         "least_squares": squares.weights.tolist(),
         "least_squares_sigma": np.sqrt(np.diag(squares.covariance)).tolist(),
         "thesis": list(printed),
         "inertias": {
             "truth": truth.tolist(),
-            "network": inertias_of_weights(weights).tolist(),
+            "network": scaled.inertias.tolist(),
+            "network_plain": plain.inertias.tolist(),
             "least_squares": squares.inertias.tolist(),
             "interval_95": np.stack([squares.inertias - half, squares.inertias + half], axis=1).tolist(),
             "thesis": inertias_of_weights(printed).tolist(),
         },
-        "network_error_percent": (100 * (inertias_of_weights(weights) / truth - 1)).tolist(),
+        "network_error_percent": (100 * (scaled.inertias / truth - 1)).tolist(),
+        "network_plain_error_percent": (100 * (plain.inertias / truth - 1)).tolist(),
         "thesis_error_percent": (100 * (inertias_of_weights(printed) / truth - 1)).tolist(),
-        "network_consistency": consistency(weights, short.covariance),
+        "network_consistency": consistency(scaled.weights, short.covariance),
+        "network_plain_consistency": consistency(plain.weights, short.covariance),
         "thesis_consistency": consistency(printed, squares.covariance),
         "least_squares_consistency": consistency(squares.weights, squares.covariance),
     }
     Path(fits).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    errors = pd.DataFrame(trained.mse, columns=["p", "q", "r"])
-    errors.insert(0, "epoch", trained.epochs)
+    errors = pd.DataFrame(plain.trained.mse, columns=["p", "q", "r"])
+    k_d = np.abs(thinned[1]).max(axis=0)
+    errors[["p_scaled", "q_scaled", "r_scaled"]] = scaled.trained.mse * k_d**2
+    errors.insert(0, "epoch", plain.trained.epochs)
     errors.to_csv(history, index=False, float_format="%.6g")
 
 

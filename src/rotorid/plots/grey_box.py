@@ -61,13 +61,14 @@ def inertia_training(history: pd.DataFrame, fits: dict) -> Figure:
     fig, axes = style.figure(2.9, 1, 2)
     for colour, rate in zip(AXIS_COLOURS, "pqr", strict=True):
         axes[0].loglog(history["epoch"] + 1, history[rate], color=colour, label=rf"$\dot {rate}$")
+        axes[0].loglog(history["epoch"] + 1, history[f"{rate}_scaled"], color=colour, linestyle="--")
     axes[0].set_xlabel("epoch")
     axes[0].set_ylabel("MSE (rad²/s⁴)")
     axes[0].legend()
     place = np.arange(3)
     found = (
         ("thesis, trained", fits["thesis"][:3], style.ORANGE, "s"),
-        ("network here, trained", fits["network"][:3], style.BLUE, "o"),
+        ("network here, scaled", fits["network"][:3], style.BLUE, "o"),
         ("truth", fits["truth"][:3], style.BLACK, "_"),
     )
     for shift, (label, values, colour, mark) in zip((-0.2, 0.0, 0.2), found, strict=True):
@@ -136,7 +137,7 @@ def errors(draws: pd.DataFrame, thesis_percent: list[float], network_percent: li
         axis.set_yscale("symlog", linthresh=0.5)
         axis.set_yticks([-3, -1, -0.2, 0, 0.2, 1, 3], ["-3", "-1", "-0.2", "0", "0.2", "1", "3"])
         axis.set_title(f"$J_{{{name}}}$")
-        axis.set_xlabel("draw of the noise")
+        axis.set_xlabel("flight")
     axes[0].set_ylabel("error (%)")
     handles, names = axes[0].get_legend_handles_labels()
     fig.legend(handles, names, loc="outside lower center", ncols=3)
