@@ -50,6 +50,8 @@ def samples(tested: pd.DataFrame) -> Figure:
 
 def comparison(metrics: pd.DataFrame) -> Figure:
     """RMSE of each model and output on whole experiments held out, with intervals."""
+    from matplotlib.ticker import NullFormatter
+
     fig, axes = style.figure(4.2, 2, 3, sharey=True)
     models = list(dict.fromkeys(metrics["model"]))[::-1]
     for axis, (name, (label, unit)) in zip(axes.flat, OUTPUTS.items(), strict=True):
@@ -65,6 +67,7 @@ def comparison(metrics: pd.DataFrame) -> Figure:
             capsize=2,
         )
         axis.set_xscale("log")
+        axis.xaxis.set_minor_formatter(NullFormatter())
         axis.set_title(f"{label} ({'m' if scale > 1 else ''}{unit})")
     for axis in axes[:, 0]:
         axis.set_yticks(range(len(models)), models)

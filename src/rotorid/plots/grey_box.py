@@ -63,7 +63,7 @@ def inertia_training(history: pd.DataFrame, fits: dict) -> Figure:
         axes[0].loglog(history["epoch"] + 1, history[rate], color=colour, label=rf"$\dot {rate}$")
         axes[0].loglog(history["epoch"] + 1, history[f"{rate}_scaled"], color=colour, linestyle="--")
     axes[0].set_xlabel("epoch")
-    axes[0].set_ylabel("MSE (rad²/s⁴)")
+    axes[0].set_ylabel(r"MSE ($\mathrm{rad^2/s^4}$)")
     axes[0].legend()
     place = np.arange(3)
     found = (
@@ -113,7 +113,7 @@ def excitation(traces: pd.DataFrame) -> Figure:
     axes[0].set_ylabel("moment (mN m)")
     axes[1].set_ylabel("body rate (rad/s)")
     axes[1].set_xlabel("time (s)")
-    axes[0].legend(ncols=3, loc="upper right")
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return fig
 
 

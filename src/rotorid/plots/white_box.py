@@ -54,7 +54,7 @@ def attitude(flight: pd.DataFrame) -> Figure:
         )
         axis.plot(flight["time_s"], np.degrees(flight[f"{angle}_rad"]), color=style.COLOUR["model"], label="flown")
         axis.set_ylabel(f"{angle} (deg)")
-    axes[0].legend(loc="upper right", ncols=2)
+    axes[-1].legend(loc="upper left")
     axes[-1].set_xlabel("time (s)")
     return fig
 
@@ -89,7 +89,7 @@ def view(flight: pd.DataFrame, every_s: float = 0.5) -> Figure:
     from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 
     style.use()
-    fig = plt.figure(figsize=(style.TEXT_WIDTH_IN, 3.6))
+    fig = plt.figure(figsize=(style.TEXT_WIDTH_IN, 2.3))
     axes = fig.add_subplot(projection="3d")
     step = float(flight["time_s"].iloc[1])
     rows = flight.iloc[:: max(int(every_s / step), 1)]
@@ -104,10 +104,10 @@ def view(flight: pd.DataFrame, every_s: float = 0.5) -> Figure:
             axes.plot(*(np.array([hubs[a], hubs[b]]) * [1, -1, -1]).T, color=style.BLACK, linewidth=1.2)
         for hub, colour in zip(hubs, (style.RED, style.RED, style.BLUE, style.BLUE), strict=True):
             axes.plot(*(hub[None] * [1, -1, -1]).T, "o", color=colour, markersize=4)
-    axes.set_box_aspect((4.2, 1.0, 0.7))
+    axes.set_box_aspect((4.2, 1.0, 0.7), zoom=2.1)
     axes.set_xticks([0.32 * i for i in range(0, len(rows), 2)], [f"{every_s * i:g}" for i in range(0, len(rows), 2)])
     axes.set_yticks([])
     axes.set_zticks([])
-    axes.set_xlabel("time (s)")
+    axes.set_xlabel("time (s)", labelpad=12)
     axes.view_init(elev=28, azim=-75)
     return fig

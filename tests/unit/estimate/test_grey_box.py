@@ -34,9 +34,7 @@ def test_appendix_a12_torque():
 
 
 def test_appendix_a13_inertias_and_the_contradiction():
-    np.testing.assert_allclose(
-        inertias_of_weights(THESIS_INERTIAL), [2.4903e-3, 2.5756e-3, 4.5862e-3], rtol=2e-5
-    )
+    np.testing.assert_allclose(inertias_of_weights(THESIS_INERTIAL), [2.4903e-3, 2.5756e-3, 4.5862e-3], rtol=2e-5)
     np.testing.assert_allclose(implied_gyroscopic(THESIS_INERTIAL), [-0.8074, 0.8138, -0.0186], atol=6e-5)
     np.testing.assert_allclose(weights_of_inertias(TRUE)[:3], [-0.8475, 0.8526, -0.0182], atol=6e-5)
 
