@@ -39,9 +39,7 @@ def test_back_propagation_is_the_gradient_of_the_squared_error():
                 moved = [a.copy() for a in arrays]
                 moved[layer][index] += sign * 1e-6
                 parts = {"weights": network.weights, "biases": network.biases, kind: tuple(moved)}
-                change[sign] = cost(
-                    Network(parts["weights"], parts["biases"], network.activations, network.masks)
-                )
+                change[sign] = cost(Network(parts["weights"], parts["biases"], network.activations, network.masks))
             assert step[index] == pytest.approx(-(change[1] - change[-1]) / 2e-6, rel=1e-6)
 
 
@@ -53,9 +51,7 @@ def test_batch_of_one_is_stochastic_and_group_of_all_is_batch():
     def weights(**how):
         return train(network, x, d, Training(0.1, 20, **how)).network.weights[0]
 
-    np.testing.assert_allclose(
-        weights(method="mini-batch", group=1), weights(method="stochastic"), rtol=1e-12
-    )
+    np.testing.assert_allclose(weights(method="mini-batch", group=1), weights(method="stochastic"), rtol=1e-12)
     np.testing.assert_allclose(weights(method="mini-batch", group=6), weights(method="batch"), rtol=1e-10)
     assert not np.allclose(weights(method="stochastic"), weights(method="batch"))
 
