@@ -137,6 +137,7 @@ def main(
         "gyroscopic_truth": weights_of_inertias(truth)[:3].tolist(),
         "consistency_p": agreement.p_value,
         "consistency_p_smallest": float(table["consistency_p"].min()),
+        "consistency_share": float(np.mean(table["consistency_p"] > 0.05)),
         "draws": draws,
         "all_within_0_2_percent": bool(max(table[f"{a}_error_percent"].abs().max() for a in AXES) < 0.2),
     }
