@@ -31,8 +31,8 @@ test: $(TESTED) ## run every check; does nothing when nothing has changed since 
 check: $(READY) ## the checks of form alone: lint, format, stripped notebooks
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/ruff format --check --quiet .
-	@$(BIN)/snakefmt --check Snakefile workflow
-	@$(BIN)/nbstripout --verify notebooks/*.ipynb
+	@$(BIN)/snakefmt --check Snakefile workflow 2>&1 || { echo "Run: .venv/bin/snakefmt Snakefile workflow"; exit 1; }
+	@$(BIN)/nbstripout --verify notebooks/*.ipynb || { echo "Run: .venv/bin/nbstripout notebooks/*.ipynb"; exit 1; }
 
 $(TESTED): $(READY) $(SOURCES)
 	@$(MAKE) --no-print-directory check

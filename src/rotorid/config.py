@@ -60,9 +60,7 @@ class RotorSettings(Section):
     speed_noise_relative: float = Field(
         ge=0, lt=0.2, description="One-sigma noise of a rotor-speed reading, as a share of it [1]."
     )
-    outlying_above: float = Field(
-        gt=0, description="Modified z-score beyond which a motor is called outlying [1]."
-    )
+    outlying_above: float = Field(gt=0, description="Modified z-score beyond which a motor is called outlying [1].")
 
 
 class Residuals(Section):

@@ -149,7 +149,8 @@ def by_airspeed(
     spread = np.sqrt(total / np.where(number > 0, number, np.nan)[:, :, None])
     centre = np.sqrt(squares.sum(axis=0) / counts.sum(axis=0)[:, None])
     low, high = np.nanpercentile(spread, [2.5, 97.5], axis=0)
-    ratio = spread[:, -1] / spread[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):  # a channel may have nothing left over
+        ratio, growth = spread[:, -1] / spread[:, 0], centre[-1] / centre[0]
     return Binned(
         low_m_s=edges[:-1][kept],
         high_m_s=edges[1:][kept],
@@ -157,6 +158,6 @@ def by_airspeed(
         rms=centre,
         rms_low=low,
         rms_high=high,
-        growth=centre[-1] / centre[0],
+        growth=growth,
         growth_95=np.nanpercentile(ratio, [2.5, 97.5], axis=0).T,
     )

@@ -40,9 +40,7 @@ def test_an_unknown_key_is_named_with_what_was_meant(values: dict[str, Any]) -> 
 
 def test_an_unknown_key_like_no_other_gets_the_known_ones(values: dict[str, Any]) -> None:
     values["report"]["zzz"] = 1
-    with pytest.raises(
-        ConfigError, match=r"report\.zzz is not a known key; known here are chapters, subtitle"
-    ):
+    with pytest.raises(ConfigError, match=r"report\.zzz is not a known key; known here are chapters, subtitle"):
         check(values)
 
 
@@ -76,9 +74,7 @@ def test_the_committed_schema_is_the_models_own() -> None:
     assert SCHEMA_PATH.read_text() == schema_text(), "run: python -m rotorid.config --write-schema"
 
 
-def leaves(
-    schema: dict[str, Any], whole: dict[str, Any], at: str = ""
-) -> Iterator[tuple[str, dict[str, Any]]]:
+def leaves(schema: dict[str, Any], whole: dict[str, Any], at: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
     for key, entry in schema.get("properties", {}).items():
         if "$ref" in entry:
             yield from leaves(whole["$defs"][entry["$ref"].rsplit("/", 1)[-1]], whole, f"{at}{key}.")

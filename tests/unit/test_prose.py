@@ -25,7 +25,7 @@ def rendered(tmp_path: Path, text: str, files: dict[str, str]) -> str:
 
 def test_numbers_come_from_the_file_with_the_asked_digits(tmp_path: Path, files: dict[str, str]) -> None:
     text = "{{ fit.c_f | sci(4) }}; {{ fit.a0 | fix(3) }}; {{ fit.share | percent(1) }} %"
-    assert rendered(tmp_path, text, files) == "1.3877 × 10^−6^; −0.074; 2.1 %"
+    assert rendered(tmp_path, text, files) == "1.3877\u00a0×\u00a010^−6^; −0.074; 2.1 %"
     assert rendered(tmp_path, "{{ fit.ends | interval(2) }}", files) == "39.75 to 39.76"
 
 
@@ -39,7 +39,7 @@ def test_a_table_has_heading_numbers_caption_and_label(tmp_path: Path, files: di
     text = '{{ table("cells", "Cells.", [("cell", "Cell"), ("a1", "$a_1$", "fix2"), ("note", "Note")]) }}'
     assert rendered(tmp_path, text, files).splitlines() == [
         "| Cell | $a_1$ | Note |",
-        "| :--- | ---: | :--- |",
+        "| :---- | -----: | :---- |",
         "| 1 | 39.76 | a\\_b |",
         "| 2 | 37.27 | – |",
         "",
@@ -68,8 +68,12 @@ def test_pandocs_identifiers_are_not_comments(tmp_path: Path, files: dict[str, s
         ('{{ table("cells", "x", [("a1", "A", "round2")]) }}', r"round2 is not a form of a number"),
     ],
 )
-def test_what_is_missing_stops_the_report(
-    tmp_path: Path, files: dict[str, str], text: str, message: str
-) -> None:
+def test_what_is_missing_stops_the_report(tmp_path: Path, files: dict[str, str], text: str, message: str) -> None:
     with pytest.raises(prose.ProseError, match=message):
         rendered(tmp_path, text, files)
+
+
+def test_columns_of_long_text_get_more_room(tmp_path: Path) -> None:
+    rows = [{"what": "a" * 60, "n": 1.0}, {"what": "b", "n": 22.0}]
+    lines = prose.table_of(rows, "All.", [("what", "What"), ("n", "Number of them", "fix0")], "tbl:x")
+    assert lines.splitlines()[1] == f"| :{'-' * 40} | {'-' * 6}: |"

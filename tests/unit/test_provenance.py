@@ -24,9 +24,7 @@ def test_raw_files_are_named_with_their_hash(tmp_path: Path) -> None:
     assert record["config"] == {"a": 1}
 
 
-def test_outside_of_git_the_commit_is_said_to_be_unknown(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_outside_of_git_the_commit_is_said_to_be_unknown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
     assert provenance.commit(tmp_path) == "unknown: not a git checkout"
 

@@ -41,9 +41,7 @@ def test_the_library_knows_neither_workflow_nor_instruments_nor_matplotlib(path:
         assert "matplotlib" not in names
 
 
-@pytest.mark.parametrize(
-    "path", sorted((ROOT / "workflow" / "scripts").glob("*.py")), ids=lambda path: path.stem
-)
+@pytest.mark.parametrize("path", sorted((ROOT / "workflow" / "scripts").glob("*.py")), ids=lambda path: path.stem)
 def test_a_script_touches_snakemake_only_when_run_by_it(path: Path) -> None:
     tree = ast.parse(path.read_text())
     outside = [node for node in tree.body if not isinstance(node, ast.If)]

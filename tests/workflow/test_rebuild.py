@@ -22,6 +22,10 @@ def edited(path: Path, old: str, new: str) -> Iterator[None]:
         os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
 
+AFTER_CHAPTER = {"render_chapter", "typeset_pdf", "build_html", "record_provenance"}
+AFTER_CALIBRATION = {"chapter_loadcell", *AFTER_CHAPTER}
+
+
 def test_a_second_run_does_nothing(built: Project) -> None:
     assert built.would_run() == set()
 
@@ -43,9 +47,27 @@ def test_a_comment_in_library_or_script_reruns_nothing(built: Project) -> None:
 
 
 def test_a_constant_two_imports_away_reruns_what_uses_it(built: Project) -> None:
-    # Scripts import prose and typeset, and these import errors.
+    # The script imports bench.loadcell, and that imports errors; so do the scripts of the report's text.
     with edited(built.root / "src/rotorid/errors.py", "class InputError", "LIMIT = 3\n\n\nclass InputError"):
-        assert {"render_chapter", "typeset_pdf", "build_html"} <= built.would_run()
+        would = built.would_run()
+    assert {"calibrate_load_cells", "render_chapter"} <= would
+
+
+def test_a_changed_formula_reruns_its_stage_and_what_follows_only(built: Project) -> None:
+    with edited(built.root / "src/rotorid/bench/loadcell.py", "a1 = sxy / sxx", "a1 = 2 * sxy / sxx"):
+        assert built.would_run() == {"calibrate_load_cells", *AFTER_CALIBRATION}
+
+
+def test_an_edited_raw_file_reruns_what_hangs_on_it_only(built: Project) -> None:
+    with edited(built.root / "raw/thesis/table_2_8.csv", "-0.0829", "-0.0830"):
+        # The chapter takes tables 2.6 and 2.7 itself, 2.8 through the calibration.
+        assert built.would_run() == {"calibrate_load_cells", *AFTER_CALIBRATION}
+
+
+def test_a_touched_raw_file_reruns_nothing(built: Project) -> None:
+    for path in (built.root / "raw/thesis").glob("*.csv"):
+        os.utime(path, (time.time(), time.time()))
+    assert built.would_run() == set()
 
 
 def test_a_deleted_result_is_made_again_with_what_hangs_on_it_only(built: Project) -> None:
@@ -57,15 +79,24 @@ def test_a_deleted_result_is_made_again_with_what_hangs_on_it_only(built: Projec
     assert page.read_bytes() == kept
 
 
-def test_a_touched_input_reruns_nothing(built: Project) -> None:
-    style = built.root / "workflow/report/report.css"
-    os.utime(style, (time.time(), time.time()))
+def test_a_deleted_figure_is_drawn_again_and_the_report_made_of_it(built: Project) -> None:
+    figure = built.root / "results/report/loadcell/lines.svg"
+    kept = figure.read_bytes()
+    figure.unlink()
+    assert built.would_run() == AFTER_CALIBRATION
+    # Put back with the same bytes, only newer, it is as good as never gone.
+    figure.write_bytes(kept)
     assert built.would_run() == set()
 
 
 def test_a_changed_setting_reruns_what_takes_it(built: Project) -> None:
     with edited(built.root / "config.yaml", "subtitle: What was", "subtitle: That which was"):
         assert built.would_run() == {"typeset_pdf", "build_html", "record_provenance"}
+
+
+def test_another_folder_of_recordings_is_taken_from_the_command_line(built: Project) -> None:
+    said = built.snakemake("--dry-run", "--config", "recordings=elsewhere")
+    assert "not a known key" not in said
 
 
 def test_an_unknown_key_stops_before_the_first_job(project: Project) -> None:

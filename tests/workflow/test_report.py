@@ -9,9 +9,7 @@ from rotorid import typeset
 
 ROOT = Path(__file__).parents[2]
 PARTS = ROOT / "workflow" / "report"
-FIGURE = (
-    '<svg xmlns="http://www.w3.org/2000/svg" width="90" height="30"><rect width="90" height="30"/></svg>\n'
-)
+FIGURE = '<svg xmlns="http://www.w3.org/2000/svg" width="90" height="30"><rect width="90" height="30"/></svg>\n'
 ONE = """# First {#sec:first}
 
 See @fig:first-box, @tbl:first-cells, @eq:law, @sec:second and @sec:second-part; also [@jimenez2024].

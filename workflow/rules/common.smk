@@ -27,5 +27,20 @@ def code_of_chapter(name):
     return code_of("run_notebook") + code_of(f"notebooks/{name}.ipynb")
 
 
+def results_behind(*files):
+    """The files and every result that they hang on, for a target to ask for by name.
+
+    Snakemake does not miss a deleted result while what was made of it is still there.
+    """
+    found, waiting = set(), list(files)
+    while waiting:
+        path = waiting.pop()
+        found.add(path)
+        for producer in (known for known in workflow.rules if known.is_producer(path)):
+            inputs, *_ = producer.expand_input(producer.get_wildcards(path))
+            waiting += {str(file) for file in inputs if str(file).startswith("results/")} - found
+    return sorted(found)
+
+
 wildcard_constraints:
     chapter="[a-z][a-z0-9_]*",

@@ -122,7 +122,11 @@ rule record_provenance:
 
 rule report:
     """The report and where it came from."""
+    message:
+        "The report is up to date"
     input:
-        rules.typeset_pdf.output.pdf,
-        rules.build_html.output.html,
-        rules.record_provenance.output.provenance,
+        results_behind(
+            rules.typeset_pdf.output.pdf,
+            rules.build_html.output.html,
+            rules.record_provenance.output.provenance,
+        ),

@@ -63,7 +63,7 @@ rule chapter_white_box:
         thrust=rules.fit_white_box.output.thrust,
         torque=rules.fit_white_box.output.torque,
         parameters=rules.fit_white_box.output.parameters,
-        table=rules.fit_white_box.output.table,
+        compared=rules.fit_white_box.output.table,
         components="raw/vehicle/components.csv",
         flight=rules.simulate_attitude.output.flight,
         summary=rules.simulate_attitude.output.summary,

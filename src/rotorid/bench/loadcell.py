@@ -37,9 +37,7 @@ class LineFit:
 
     def interval(self, which: int, level: float = 0.95) -> tuple[float, float]:
         """Confidence interval of a0 (`which` 0) or a1 (`which` 1)."""
-        half = student_t.ppf(0.5 + level / 2, self.degrees_of_freedom) * np.sqrt(
-            self.covariance[which][which]
-        )
+        half = student_t.ppf(0.5 + level / 2, self.degrees_of_freedom) * np.sqrt(self.covariance[which][which])
         centre = (self.a0, self.a1)[which]
         return float(centre - half), float(centre + half)
 
@@ -60,9 +58,7 @@ def fit_line(x: Sequence[float], y: Sequence[float]) -> LineFit:
     x, y = np.asarray(x, float), np.asarray(y, float)
     n = len(x)
     if n < 3 or len(y) != n:
-        raise InputError(
-            f"a line with intervals needs at least 3 pairs, found {n} readings and {len(y)} values"
-        )
+        raise InputError(f"a line with intervals needs at least 3 pairs, found {n} readings and {len(y)} values")
     if np.ptp(x) == 0:
         raise InputError("all readings are equal, so no slope can be found")
     sxx = n * np.sum(x**2) - np.sum(x) ** 2
@@ -106,3 +102,50 @@ def check_weights(weights_path: str | Path, table_path: str | Path) -> float:
         total = sum(weights[element] for element in row.elements.split(" + "))
         worst = max(worst, abs(total - row.weight_gf))
     return float(worst)
+
+
+def balance_disagreement(weights_path: str | Path) -> float:
+    """Median share by which the first balance reads above the second, over elements weighed on both."""
+    table = pd.read_csv(weights_path).dropna()
+    return float(((table["ohaus_gf"] - table["mettler_gf"]) / table["average_gf"]).median())
+
+
+@dataclass(frozen=True)
+class SharedWeightError:
+    """What all cells agree on about the error of one weight."""
+
+    mean_gf: float
+    """True weight minus printed weight [gf], mean over the cells."""
+    interval_95_gf: tuple[float, float]
+    """Student's t over the cells, which are independent instruments."""
+    by_cell_gf: tuple[float, ...]
+
+
+def shared_weight_error(
+    weights_gf: np.ndarray, readings: dict[int, np.ndarray], contains: np.ndarray
+) -> SharedWeightError:
+    """Error of one weight, from the residuals that it would leave in every cell alike.
+
+    Each cell's line is fitted with one unknown more, d: weight + d * contains = a0 + a1 * reading.
+
+    Parameters
+    ----------
+    weights_gf
+        Known weights [gf], shape (n,), n at least 4.
+    readings
+        Readings of each of at least two cells, any unit, shape (n,) each.
+    contains
+        1 where the weight in question is part of the load, otherwise 0, shape (n,).
+    """
+    if len(readings) < 2 or len(weights_gf) < 4:
+        raise InputError("an error shared by cells needs at least 2 cells and 4 loads")
+    found = []
+    for reading in readings.values():
+        columns = np.column_stack([np.ones(len(reading)), reading, -contains])
+        solution, _, rank, _ = np.linalg.lstsq(columns, weights_gf, rcond=None)
+        if rank < 3:
+            raise InputError("the weight in question must be part of some loads and not of others")
+        found.append(float(solution[2]))
+    mean = float(np.mean(found))
+    half = student_t.ppf(0.975, len(found) - 1) * np.std(found, ddof=1) / np.sqrt(len(found))
+    return SharedWeightError(mean, (mean - float(half), mean + float(half)), tuple(found))

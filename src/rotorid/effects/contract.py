@@ -136,6 +136,8 @@ class Form:
     vehicle_requires: tuple[str, ...] = ()
     """Keys of vehicle.yaml that must be stated."""
     minimum_rotors: int = 1
+    memory: bool = False
+    """Whether it needs the past (a pendulum of its own): one instant does not give its wrench."""
 
     @property
     def linear(self) -> tuple[int, ...]:

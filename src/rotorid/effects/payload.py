@@ -58,6 +58,7 @@ def forms(vehicle):
             ),
             slung,
             ("specific_force", "rotation"),
+            memory=True,
         ),
     )
 

@@ -59,9 +59,7 @@ def blank_held(
             continue
         table.loc[same, columns] = np.nan
         rate = (~same).sum() / (table[TIME].iloc[-1] - table[TIME].iloc[0])
-        found = (
-            f"{name} repeats its last value in {same.mean():.0%} of the rows (new values at {rate:.3g} Hz)"
-        )
+        found = f"{name} repeats its last value in {same.mean():.0%} of the rows (new values at {rate:.3g} Hz)"
         faults.append(Fault("held", ", ".join(columns), found, "repeats made empty cells", int(same.sum())))
     empty = table.drop(columns=TIME).isna().all(axis=1)
     return table[~empty].reset_index(drop=True), faults

@@ -100,9 +100,7 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     return table, faults + repeated
 
 
-def in_the_air(
-    table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0
-) -> list[tuple[float, float]]:
+def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0) -> list[tuple[float, float]]:
     """Start and stop of every flight in a log: motors above 30 % and, where known, 0.1 m off the ground."""
     flying = table[THROTTLES].mean(axis=1).to_numpy() > 0.3
     if "position_z_m" in table:

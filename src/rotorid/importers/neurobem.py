@@ -35,10 +35,10 @@ ANGULAR_ACCELERATION = tuple(f"angular_acceleration_{a}_rad_s2" for a in "xyz")
 
 def read_matrix(path: Path) -> np.ndarray:
     """The one matrix in a NeuroBEM `.mat`, shape (n, at least 35)."""
+    if not Path(path).is_file():
+        raise InputError(f"{path}: file is missing")
     try:
         content = loadmat(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: file is missing") from None
     except Exception as error:
         raise InputError(f"{path}: not a MATLAB file that can be read ({error})") from None
     matrices = [v for k, v in content.items() if not k.startswith("__") and getattr(v, "ndim", 0) == 2]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from rotorid.importers.public_sets import PUBLIC_SETS
 from rotorid.importers.report import read_report
 from rotorid.recordings import read_set
 from rotorid.recordings.check import check_set
@@ -38,8 +39,11 @@ FAULT_NAMES = {
     "unknown_event": "unknown event",
     "dropout": "logger dropout",
     "no_command": "no command logged",
+    "no_clock": "no clock",
     "second_sensor": "second sensor",
 }
+CHOICES = {"cut", "on_ground"}
+"""Kinds that note what part of a log was kept, which is no fault of the log."""
 
 
 def sources(status_files: Sequence[Path]) -> pd.DataFrame:
@@ -87,25 +91,27 @@ def recordings(folders: Sequence[Path]) -> pd.DataFrame:
 
 
 def faults(folders: Sequence[Path]) -> pd.DataFrame:
-    """One row a set and kind of fault: in how many runs, an example of what was seen and what was done."""
+    """One row a source and kind of fault: in how many runs, an example of what was seen and what was done."""
     rows: dict[tuple[str, str], dict] = {}
     for folder in folders:
         report = read_report(Path(folder))
         for fault in report["faults"]:
-            key = (report["set"], fault["kind"])
+            if fault["kind"] in CHOICES:
+                continue
+            recipe = PUBLIC_SETS[report["set"]]
             row = rows.setdefault(
-                key,
+                (recipe.source, fault["kind"]),
                 {
-                    "set": report["set"],
+                    "source": recipe.source,
                     "fault": FAULT_NAMES.get(fault["kind"], fault["kind"]),
                     "runs": set(),
                     "found": fault["found"],
                     "action": fault["action"],
                 },
             )
-            row["runs"].add(fault["run"])
+            row["runs"].add((report["set"], fault["run"]))
     table = [{**row, "runs": len(row["runs"])} for row in rows.values()]
-    return pd.DataFrame(table, columns=["set", "fault", "runs", "found", "action"])
+    return pd.DataFrame(table, columns=["source", "fault", "runs", "found", "action"])
 
 
 def state(table: pd.DataFrame) -> dict:

@@ -18,6 +18,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.importers import crazyflie
 from rotorid.importers.crazyflie_usd import read_usd_log
+from rotorid.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.importers.neurobem import read_neurobem
 from rotorid.importers.obtain import Obtained
 from rotorid.importers.rcbenchmark import read_rcbenchmark
@@ -69,9 +70,7 @@ def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | N
     for number, (start, stop) in enumerate(stretches):
         run, found = crazyflie.flight_run(table, start, stop)
         label = prefix if len(stretches) == 1 else f"{prefix}_{number + 1}"
-        flown = Fault(
-            "cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0
-        )
+        flown = Fault("cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0)
         runs[label] = (run, [*faults, *more, flown, *found])
     return runs
 
@@ -79,8 +78,7 @@ def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | N
 def _imrc_brushless(path: Path, name: str) -> Runs:
     """The controller's map of thrust to PWM is published: it gives the commanded speed of each rotor."""
     return {
-        run: (with_commanded_speed(table), faults)
-        for run, (table, faults) in _crazyflie(path, Path(name).name).items()
+        run: (with_commanded_speed(table), faults) for run, (table, faults) in _crazyflie(path, Path(name).name).items()
     }
 
 
@@ -108,6 +106,10 @@ def with_commanded_speed(table: pd.DataFrame) -> pd.DataFrame:
 
 def _crazypad(path: Path, name: str) -> Runs:
     return _crazyflie(path, Path(name).name)
+
+
+def _scale(path: Path, name: str) -> Runs:
+    return {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)}
 
 
 def _bench(path: Path, name: str) -> Runs:
@@ -182,6 +184,26 @@ def _public_sets() -> dict[str, PublicSet]:
             notes=("roll and pitch window 55-90 s as upstream",),
         ),
     }
+    bench = "system-id/data"
+    scales = {
+        "stock": ("brushed", ("cf21_bitcraze2021/cf2.1-stock-prop", "cf21_bitcraze2021/cf21_stock2")),
+        "plus": (
+            "brushed",
+            tuple(
+                f"cf21plus/data_feb_24_2026_{battery}"
+                for battery in ("250mah_battery0", "350mah_battery0", "350mah_battery1")
+            ),
+        ),
+        "guards": ("brushless", ("cf21bl_guards/feb25_2026_0",)),
+    }
+    for name, (vehicle, files) in scales.items():
+        sets[f"imrc-bench-{name}"] = PublicSet(
+            "imrc-crazyflie-rpm",
+            tuple(f"{bench}/{file}.csv" for file in files),
+            _scale,
+            f"imrc-bench-{vehicle}",
+            "thrust of the whole vehicle along -z of the body",
+        )
     for label, (folder, numbers) in pad.items():
         sets[f"crazypad-{label}"] = PublicSet(
             "crazypad",
@@ -235,9 +257,7 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
     lost = [file for file in recipe.files if file not in obtained.files]
     if lost:
         reason = obtained.missing.get(lost[0], f"{lost[0]} is not in the manifest")
-        ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(
-            folder
-        )
+        ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(folder)
         return folder
     runs, faults = [], []
     for file in recipe.files:

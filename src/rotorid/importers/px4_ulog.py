@@ -64,13 +64,9 @@ def _on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarr
 def _rotor_topics(data: dict, rotors: int) -> list[Topic]:
     topics = []
     if "actuator_motors" in data:
-        topics.append(
-            Topic("actuator_motors", _indexed("control", rotors), c.rotor_columns("throttle", rotors))
-        )
+        topics.append(Topic("actuator_motors", _indexed("control", rotors), c.rotor_columns("throttle", rotors)))
     elif "actuator_outputs" in data:
-        topics.append(
-            Topic("actuator_outputs", _indexed("output", rotors), c.rotor_columns("throttle", rotors))
-        )
+        topics.append(Topic("actuator_outputs", _indexed("output", rotors), c.rotor_columns("throttle", rotors)))
     if "esc_status" in data:
         fields = tuple(f"esc[{i}].esc_rpm" for i in range(rotors))
         topics.append(Topic("esc_status", fields, c.rotor_columns("rotor_speed", rotors), RPM))

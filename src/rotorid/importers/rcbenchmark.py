@@ -71,9 +71,7 @@ def read_table(text: str, where: str) -> pd.DataFrame:
                 columns[name].append(float(cell) if cell else np.nan)
             except ValueError:
                 heading = rows[0][place].strip()
-                raise InputError(
-                    f"{where}, line {line}, column {heading}: expected a number, found {cell!r}"
-                ) from None
+                raise InputError(f"{where}, line {line}, column {heading}: expected a number, found {cell!r}") from None
     return pd.DataFrame(columns)
 
 

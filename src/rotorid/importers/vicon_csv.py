@@ -49,9 +49,7 @@ def read_matrix(path: Path) -> tuple[np.ndarray, list[Fault]]:
         if len(values) != COUNT:
             if not last:
                 raise InputError(f"{path}, line {number}: expected {COUNT} columns, found {len(values)}")
-            faults.append(
-                Fault("cut_off", "", f"last line has {len(cells)} of {COUNT} columns", "left out", 1)
-            )
+            faults.append(Fault("cut_off", "", f"last line has {len(cells)} of {COUNT} columns", "left out", 1))
             continue
         rows.append(values)
     if len(rows) < 2:

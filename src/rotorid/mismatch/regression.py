@@ -96,10 +96,14 @@ class Regression:
     """Run number of each block."""
     training: np.ndarray
     """Mask of the blocks to fit."""
+    held_out: np.ndarray
+    """Mask of the blocks held out (some blocks between the two may be in neither)."""
     precision: np.ndarray
     """Prior precision of every column, (K,)."""
     bias_gram: np.ndarray
     bias_cross: np.ndarray
+    filters: dict[int, np.ndarray]
+    """Whitening filter of each channel."""
 
     def columns(self, keys: Iterable[str]) -> np.ndarray:
         """Column numbers of terms, in the order given."""
@@ -244,12 +248,15 @@ def build(
     rows: list[Rows],
     terms: list[Term],
     filters: dict[int, np.ndarray],
-    training_runs: set[str],
+    in_training,
     block_s: float,
     rate_hz: float,
     noisy: list[Rows] | None = None,
 ) -> Regression:
-    """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more."""
+    """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
+
+    `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap.
+    """
     start, at = {}, 0
     for term in terms:
         start[term.key] = at
@@ -272,7 +279,8 @@ def build(
             crosses.append(flat.T @ target)
             squares.append(float(target @ target))
             runs.append(names[r.run])
-            training.append(r.run in training_runs)
+            middle = r.time_s[min(len(r.time_s) - 1, len(r.time_s) - len(y) + int(part.mean()))]
+            training.append(in_training(r.run, float(middle)))
     precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     return Regression(
         terms,
@@ -281,10 +289,12 @@ def build(
         np.array(crosses),
         np.array(squares),
         np.array(runs),
-        np.array(training),
+        np.array([t is True for t in training]),
+        np.array([t is False for t in training]),
         precision,
         bias_gram,
         bias_cross,
+        filters,
     )
 
 

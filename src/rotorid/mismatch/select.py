@@ -99,6 +99,8 @@ class Search:
     def best_form(self, key: str, active: list[str]) -> str:
         """The form of the same id that explains most for its parameters, the others in the model kept."""
         effect = self.terms[key].effect
+        if self.terms[key].run:
+            return key
         base = self.without(key, active)
         rest = [k for k in active if k != key]
         judged = [

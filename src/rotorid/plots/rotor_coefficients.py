@@ -38,7 +38,6 @@ def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: d
                 markersize=2.2,
                 color=colour,
                 label={"2s": "7.4 V", "3s": "11.1 V"}[cells],
-                rasterized=True,
             )
         speed = np.linspace(300, mine["speed_rad_s"].max(), 200)
         axis.axhline(1e6 * fits["origin"], color=style.BLACK, label="through the origin")
@@ -50,7 +49,7 @@ def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: d
         axis.set_xlabel("rotor speed (rad/s)")
     for axis in axes[:, 0]:
         axis.set_ylabel(r"$F/\omega^2$ ($10^{-6}$ N s²)")
-    axes[0, 0].legend(loc="lower right", ncols=2)
+    axes[1, 0].legend(loc="lower right", ncols=2, markerscale=2)
     return fig
 
 

@@ -84,9 +84,7 @@ def _lacks_of_flight(has, count: int) -> list[str]:
             "throttle curve and thrust curve cannot be told apart well."
         )
     elif not commands and not throttles:
-        lacks.append(
-            "No commands: motor lag, throttle curve, saturation and delays of the motors cannot be tested."
-        )
+        lacks.append("No commands: motor lag, throttle curve, saturation and delays of the motors cannot be tested.")
     force = has(*c.SPECIFIC_FORCE)
     moving = has(*c.VELOCITY) or has(*c.POSITION)
     attitude = has(*c.QUATERNION)
@@ -162,8 +160,7 @@ def as_text(check: SetCheck) -> str:
     for run in check.runs:
         gaps = f", {run.gaps} gaps (longest {run.longest_gap_s:.3g} s)" if run.gaps else ", no gaps"
         lines.append(
-            f"  {run.name:<{width}}  {run.samples} samples, {run.duration_s:.2f} s "
-            f"at {run.rate_hz:.4g} Hz{gaps}"
+            f"  {run.name:<{width}}  {run.samples} samples, {run.duration_s:.2f} s at {run.rate_hz:.4g} Hz{gaps}"
         )
         groups: dict[tuple[float, float], list[str]] = {}
         for name, share in run.empty.items():

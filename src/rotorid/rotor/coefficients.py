@@ -1,8 +1,9 @@
 """Thrust coefficient of a propeller from stand runs: through the origin, with an offset, per motor, pooled.
 
 - Through the origin, F = C_F ω² (thesis eq. 4.25), and with an offset of each run, F = C_F ω² + F_0.
-- Speeds are noisy too: points are weighted by their effective variance σ_F² + (2 C_F ω σ_ω)², with σ_F found
-  so that the weighted residuals have unit variance, and the mean of ω² is freed of the noise's own σ_ω².
+- Speeds are noisy too: where their noise σ_ω is given, the fit is the maximum-likelihood one with errors in
+  both variables, min Σ (F - F_0 - C_F Ω²)²/σ_F² + (ω - Ω)²/σ_ω² over C_F, F_0 and the true speeds Ω. At its
+  solution each point weighs 1/(σ_F² + (2 C_F Ω σ_ω)²); σ_F is what gives weighted residuals unit variance.
 - One motor's interval says how well that motor's points fit a curve, not how well the propeller is known: the
   same propeller differs from motor to motor. The pooled value is therefore a random-effects mean
   (Paule and Mandel 1982) with Hartung's and Knapp's interval (2001), which holds for few motors.
@@ -80,16 +81,51 @@ def usable(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
     return known & ~lost_speed(speed_rad_s, thrust_n)
 
 
-def _solve(columns: np.ndarray, y: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted least squares: estimate and (XᵀWX)⁻¹."""
-    information = columns.T @ (weight[:, None] * columns)
-    inverse = np.linalg.inv(information)
-    return inverse @ (columns.T @ (weight * y)), inverse
+def _design(runs: Sequence[Points], kept: Sequence[np.ndarray], offset: bool) -> np.ndarray:
+    """Columns of the offsets, shape (n, runs) or (n, 0)."""
+    counts = [int(k.sum()) for k in kept]
+    if not offset:
+        return np.zeros((sum(counts), 0))
+    return np.repeat(np.eye(len(runs)), counts, axis=0)
 
 
-def fit_coefficient(
-    runs: Sequence[Points], offset: bool, speed_noise_relative: float = 0.0
-) -> CoefficientFit:
+def _true_speeds(speed, thrust, offsets, c_f, force_sd, speed_sd):
+    """Speeds nearest to reading and curve together: min (F - F_0 - C_F Ω²)²/σ_F² + (ω - Ω)²/σ_ω²."""
+    found = speed.copy()
+    for _ in range(8):
+        left = thrust - offsets - c_f * found**2
+        slope = -2 * c_f * found * left / force_sd**2 - (speed - found) / speed_sd**2
+        bend = ((2 * c_f * found) ** 2 - 2 * c_f * np.minimum(left, 0)) / force_sd**2 + 1 / speed_sd**2
+        found = found - slope / bend
+    return found
+
+
+def _both_noisy(speed, thrust, offset_columns, start, force_sd, speed_noise_relative):
+    """Maximum-likelihood fit with noise in thrust and speed: estimate, covariance, chi-square."""
+    theta, true = start.copy(), speed
+    for _ in range(60):
+        offsets = offset_columns @ theta[1:]
+        # A share of the true speed: a share of the reading would trust low readings more and raise C_F.
+        speed_sd = speed_noise_relative * true
+        true = _true_speeds(speed, thrust, offsets, theta[0], force_sd, speed_sd)
+        slope = 2 * theta[0] * true
+        residual = thrust - offsets - theta[0] * true**2 - slope * (speed - true)
+        weight = 1 / (force_sd**2 + (slope * speed_sd) ** 2)
+        columns = np.column_stack([true**2, offset_columns])
+        scale = np.linalg.norm(columns, axis=0)
+        inverse = np.linalg.inv((columns / scale).T @ (weight[:, None] * columns / scale))
+        step = inverse @ ((columns / scale).T @ (weight * residual)) / scale
+        theta = theta + step
+        if abs(step[0]) < 1e-12 * abs(theta[0]):
+            break
+    return theta, inverse / np.outer(scale, scale), float(np.sum(weight * residual**2))
+
+
+LEAST_FORCE_SD_N = 1e-4
+"""The balance is never taken as more exact than this."""
+
+
+def fit_coefficient(runs: Sequence[Points], offset: bool, speed_noise_relative: float = 0.0) -> CoefficientFit:
     """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
 
     Parameters
@@ -99,64 +135,47 @@ def fit_coefficient(
     offset
         Whether each run has a force offset of its own.
     speed_noise_relative
-        One-sigma noise of the speed reading, as a share of the speed.
+        One-sigma noise of the speed reading, as a share of the speed; 0 for ordinary least squares.
 
     Raises
     ------
     InputError
         Not more points than unknowns.
     """
-    kept = [(p, usable(p.speed_rad_s, p.thrust_n)) for p in runs]
-    speed = np.concatenate([p.speed_rad_s[k] for p, k in kept])
-    thrust = np.concatenate([p.thrust_n[k] for p, k in kept])
-    unknowns = 1 + (len(runs) if offset else 0)
-    if len(speed) <= unknowns:
-        raise InputError(
-            f"runs {', '.join(p.run for p in runs)}: {len(speed)} points for {unknowns} unknowns"
-        )
-    # E[(ω + ε)²] = ω² + σ_ω²: what the noise adds to the mean of the square is taken off.
-    columns = [speed**2 / (1 + speed_noise_relative**2)]
-    if offset:
-        for number in range(len(runs)):
-            columns.append(
-                np.concatenate([np.full(k.sum(), float(i == number)) for i, (_, k) in enumerate(kept)])
-            )
-    columns = np.column_stack(columns)
-    scale = np.array([np.mean(columns[:, 0])] + [1.0] * (unknowns - 1))
-    columns = columns / scale
+    kept = [usable(p.speed_rad_s, p.thrust_n) for p in runs]
+    speed = np.concatenate([p.speed_rad_s[k] for p, k in zip(runs, kept, strict=True)])
+    thrust = np.concatenate([p.thrust_n[k] for p, k in zip(runs, kept, strict=True)])
+    offset_columns = _design(runs, kept, offset)
+    unknowns = 1 + offset_columns.shape[1]
     freedom = len(speed) - unknowns
-    estimate, inverse = _solve(columns, thrust, np.ones(len(speed)))
-    variance = np.sum((thrust - columns @ estimate) ** 2) / freedom
+    if freedom < 1:
+        names = ", ".join(p.run for p in runs)
+        raise InputError(f"runs {names}: {len(speed)} points for {unknowns} unknowns")
+    columns = np.column_stack([speed**2, offset_columns])
+    scale = np.linalg.norm(columns, axis=0)
+    inverse = np.linalg.inv((columns / scale).T @ (columns / scale)) / np.outer(scale, scale)
+    values = inverse @ (columns.T @ thrust)
+    variance = np.sum((thrust - columns @ values) ** 2) / freedom
+    covariance = variance * inverse
     if speed_noise_relative > 0:
-        for _ in range(20):
-            from_speed = (2 * estimate[0] / scale[0] * speed**2 * speed_noise_relative) ** 2
 
-            def excess(force_variance, spread=from_speed):
-                trial, _ = _solve(columns, thrust, 1 / (force_variance + spread))
-                return np.sum((thrust - columns @ trial) ** 2 / (force_variance + spread)) - freedom
+        def fit_at(force_sd):
+            return _both_noisy(speed, thrust, offset_columns, values, force_sd, speed_noise_relative)
 
-            ceiling = variance + 1e-12
-            own = brentq(excess, 1e-12, 100 * ceiling) if excess(1e-12) > 0 > excess(100 * ceiling) else 1e-12
-            new, inverse = _solve(columns, thrust, 1 / (own + from_speed))
-            moved = abs(new[0] - estimate[0])
-            estimate = new
-            if moved < 1e-12 * abs(estimate[0]):
-                break
-        covariance = inverse
-    else:
-        covariance = variance * inverse
-    errors = np.sqrt(np.diag(covariance)) / scale
-    values = estimate / scale
-    half = student_t.ppf(0.975, freedom) * errors
+        ceiling = 3 * np.sqrt(variance) + 2 * LEAST_FORCE_SD_N
+        force_sd = LEAST_FORCE_SD_N
+        if fit_at(force_sd)[2] > freedom:
+            force_sd = brentq(lambda sd: fit_at(sd)[2] - freedom, force_sd, ceiling, rtol=1e-3)
+        values, covariance, _ = fit_at(force_sd)
+    half = student_t.ppf(0.975, freedom) * np.sqrt(np.diag(covariance))
     intervals = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
-    residuals = thrust - columns @ estimate
     return CoefficientFit(
         value=float(values[0]),
-        standard_error=float(errors[0]),
+        standard_error=float(np.sqrt(covariance[0, 0])),
         interval_95=intervals[0],
         offsets_n=tuple(float(v) for v in values[1:]),
         offset_intervals_n=intervals[1:],
-        residual_rms_n=float(np.sqrt(np.mean(residuals**2))),
+        residual_rms_n=float(np.sqrt(np.mean((thrust - columns @ values) ** 2))),
         points=len(speed),
     )
 

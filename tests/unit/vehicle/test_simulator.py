@@ -460,5 +460,4 @@ def test_a_slung_load_swings_in_the_simulator():
     slung = next(f for f in catalogue()["payload"].forms(vehicle) if f.name == "slung")
     hold = Commands(np.array([0.0]), np.full((1, 4), np.sqrt(0.652 * 9.81 / (4 * CF))))
     trace = simulate(vehicle, hold, 0.5, 0.005, effects=[(slung, [0.1, 0.5])])
-    if getattr(slung, "memory", False):
-        assert trace.velocity[0, -1, 2] == pytest.approx(0.1 * 9.81 / 0.652 * 0.5, rel=1e-3)
+    assert trace.velocity[0, -1, 2] == pytest.approx(0.1 * 9.81 / 0.652 * 0.5, rel=1e-3)
