@@ -141,6 +141,8 @@ class Form:
     minimum_rotors: int = 1
     must_show: tuple[int, ...] = ()
     """Parameters without which the form is another effect: each must differ from zero by two standard errors."""
+    memory: bool = False
+    """Whether it needs the past (a pendulum of its own): one instant does not give its wrench."""
 
     @property
     def linear(self) -> tuple[int, ...]:

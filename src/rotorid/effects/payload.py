@@ -59,6 +59,7 @@ def forms(vehicle):
             ),
             slung,
             ("specific_force", "rotation"),
+            memory=True,
         ),
     )
 
