@@ -15,6 +15,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decide import wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence, leftover
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, residual
@@ -41,9 +42,10 @@ NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturati
 
 def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     """The whole analysis of a set of kind `flight`."""
+    recordings, mistakes, remarks = find_mistakes(recordings)
     prepared = prepare(recordings, cutoff_hz)
-    notes: list[str] = []
-    findings: list[Finding] = []
+    notes = list(remarks)
+    findings = list(mistakes)
     reasons = dict(prepared.not_testable)
     measured = all(s.measured_speed for s in prepared.segments)
 
