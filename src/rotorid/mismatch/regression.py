@@ -228,7 +228,7 @@ class Regression:
         where = np.argsort(fit.columns)[where]
         b = fit.beta[where]
         cov = fit.covariance[np.ix_(where, where)]
-        statistic = float(b @ np.linalg.pinv(cov, hermitian=True) @ b)
+        statistic = quadratic_form(b, cov)
         q = len(b)
         if count - q < 2:
             return 1.0
@@ -267,13 +267,23 @@ def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
 
 def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
     """A covariance that is in no direction smaller than the plain one."""
-    values, vectors = np.linalg.eigh((plain + plain.T) / 2)
-    values = np.maximum(values, values[-1] * 1e-14 if len(values) else 0)
+    # Coefficients differ by many powers of ten (kg m2 beside relative changes): compare in units of their own.
+    unit = np.sqrt(np.maximum(np.diag(plain), 0.0))
+    scale = np.where(unit > 0, 1.0 / np.where(unit > 0, unit, 1.0), 0.0)
+    values, vectors = np.linalg.eigh((plain + plain.T) / 2 * np.outer(scale, scale))
+    values = np.maximum(values, 1e-12)
     root = vectors * np.sqrt(values)
     back = vectors / np.sqrt(values)
-    inner = back.T @ robust @ back
+    inner = back.T @ (robust * np.outer(scale, scale)) @ back
     v, u = np.linalg.eigh((inner + inner.T) / 2)
-    return root @ (u * np.maximum(v, 1.0)) @ u.T @ root.T
+    return root @ (u * np.maximum(v, 1.0)) @ u.T @ root.T * np.outer(unit, unit)
+
+
+def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
+    """valuesᵀ covariance⁻¹ values, in units of the coefficients' own standard errors."""
+    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    scaled = values / unit
+    return float(scaled @ np.linalg.pinv(covariance / np.outer(unit, unit), rcond=1e-10, hermitian=True) @ scaled)
 
 
 def whiten(rows: Rows, filters: np.ndarray | dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
+from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
 
 ENTER_P = 1e-4
@@ -21,6 +21,9 @@ SHARE_OF_LARGEST = 0.04
 COST_PER_EFFECT = 20.0
 """Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
 ALTERNATIVE_P = 0.01
+"""A term that beside an alternative is less significant than this could be that alternative instead."""
+MOST_EXTRA_PARAMETERS = 3
+"""An alternative with more further parameters than this explains by its freedom, not by its cause."""
 MOST_EFFECTS = 10
 EXPECTED_HELD_OUT = 25.0
 """Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
@@ -43,7 +46,8 @@ class Candidate:
 
     @property
     def score(self) -> float:
-        return self.gain / self.inflation - COST_PER_PARAMETER * len(self.beta)
+        """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
+        return self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
 
 
 @dataclass
@@ -93,7 +97,7 @@ class Search:
         beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
         p_value = self.regression.wald(fit, cols, self.blocks)
         gain = fit.gain - base.gain
-        statistic = float(beta @ np.linalg.pinv(covariance, hermitian=True) @ beta)
+        statistic = quadratic_form(beta, covariance)
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         physical = physical and self.regression.noise_share(keys, key, beta) < MOST_ATTENUATION
@@ -332,7 +336,7 @@ class Search:
             other = self.judge(term.key, rest, self.without(key, active))
             if not other.physical or other.p_value > 1e-3 or other.gain < 0.5 * own.gain:
                 continue
-            if len(other.beta) > len(own.beta) and other.score < own.score - COST_PER_PARAMETER:
+            if len(other.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
                 continue
             both = self.judge(key, [*rest, term.key], self.regression.fit(self.always + rest + [term.key]))
             if both.p_value > ALTERNATIVE_P:
