@@ -9,10 +9,22 @@ configfile: "config.yaml"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/public.smk"
+include: "workflow/rules/check.smk"
+include: "workflow/rules/calibration.smk"
+include: "workflow/rules/rotor.smk"
+include: "workflow/rules/neurobem.smk"
+include: "workflow/rules/white_box.smk"
+include: "workflow/rules/grey_box.smk"
+include: "workflow/rules/black_box.smk"
+include: "workflow/rules/mismatch.smk"
 include: "workflow/rules/report.smk"
 
 
 rule all:
+    """Everything: the report and all it needs."""
     default_target: True
+    message:
+        "All results are up to date"
     input:
         rules.report.input,

@@ -1,6 +1,6 @@
 """The code of the library as part of a rule's identity.
 
-Snakemake watches a script, not what the script imports. `code_of` hashes the syntax tree of a script and of
+Snakemake watches a script, not what the script imports. `Code.of` hashes the syntax tree of a script and of
 every `rotorid` module that it reaches, so that a changed formula reruns exactly what uses it, while comments,
 docstrings and layout change nothing.
 
@@ -15,57 +15,81 @@ import ast
 import hashlib
 import json
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 PACKAGE = "rotorid"
 
 
-def code_of(script: str | Path, root: str | Path) -> str:
-    """Sixteen hexadecimal digits that stand for the code that `script` runs.
+class Code:
+    """The code of a project as it is now; each file is read once, so that many rules can be asked for.
 
     Parameters
     ----------
-    script
-        Path of a Python file or a notebook, relative to `root`.
     root
         Top of the project: holds `src/rotorid`.
-
-    Raises
-    ------
-    FileNotFoundError
-        The script does not exist.
-    SyntaxError
-        The script or a module that it reaches is not valid Python.
     """
-    root = Path(root).resolve()
-    script = root / script
-    if not script.is_file():
-        raise FileNotFoundError(f"code_of: there is no file {script}.")
-    fingerprints = [_fingerprint(script)]
-    fingerprints += [_fingerprint(path) for path in reached_modules(script, root)]
-    return hashlib.sha256("\n".join(fingerprints).encode()).hexdigest()[:16]
+
+    def __init__(self, root: str | Path) -> None:
+        self.root = Path(root).resolve()
+        self._source = self.root / "src"
+        self._trees: dict[Path, ast.Module] = {}
+        self._digests: dict[Path, str] = {}
+        self._imports: dict[Path, list[Path]] = {}
+
+    def of(self, script: str | Path) -> str:
+        """Sixteen hexadecimal digits that stand for the code that `script` runs.
+
+        Parameters
+        ----------
+        script
+            Path of a Python file or a notebook, relative to the top of the project.
+
+        Raises
+        ------
+        FileNotFoundError
+            The script does not exist.
+        SyntaxError
+            The script or a module that it reaches is not valid Python.
+        """
+        path = self.root / script
+        if not path.is_file():
+            raise FileNotFoundError(f"code_of: there is no file {path}.")
+        digests = [self._digest(file) for file in (path, *self.reached_modules(path))]
+        return hashlib.sha256("\n".join(digests).encode()).hexdigest()[:16]
+
+    def reached_modules(self, script: Path) -> list[Path]:
+        """Files of the library that `script` reaches by imports of any depth, sorted."""
+        found: set[Path] = set()
+        waiting = [script]
+        while waiting:
+            new = set(self._imported_files(waiting.pop())) - found
+            found |= new
+            waiting += new
+        return sorted(found)
+
+    def _imported_files(self, path: Path) -> list[Path]:
+        """Files of the library that one file imports itself."""
+        if path not in self._imports:
+            names = set(_imported_names(self._tree(path), _package_of(path, self._source), self._source))
+            self._imports[path] = sorted({file for name in names for file in _files_of(name, self._source)})
+        return self._imports[path]
+
+    def _digest(self, path: Path) -> str:
+        """Hash of a file's syntax tree, with the file's name."""
+        if path not in self._digests:
+            tree = ast.dump(self._tree(path))
+            self._digests[path] = f"{path.name} {hashlib.sha256(tree.encode()).hexdigest()}"
+        return self._digests[path]
+
+    def _tree(self, path: Path) -> ast.Module:
+        if path not in self._trees:
+            self._trees[path] = _parse(path)
+        return self._trees[path]
 
 
-def reached_modules(script: Path, root: Path) -> list[Path]:
-    """Files of the library that `script` reaches by imports of any depth, sorted."""
-    source = root / "src"
-    found: set[Path] = set()
-    waiting = [script]
-    while waiting:
-        path = waiting.pop()
-        for name in _imported_names(path, source):
-            for module in _files_of(name, source):
-                if module not in found:
-                    found.add(module)
-                    waiting.append(module)
-    return sorted(found)
-
-
-def _imported_names(path: Path, source: Path) -> Iterator[str]:
+def _imported_names(tree: ast.Module, package: str, source: Path) -> Iterator[str]:
     """Dotted names of the library that a file mentions, found anywhere in it."""
-    package = _package_of(path, source)
-    for node in ast.walk(_tree(path)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -112,12 +136,7 @@ def _files_of(name: str, source: Path) -> Iterator[Path]:
                 yield file
 
 
-def _tree(path: Path) -> ast.Module:
-    return _parse(path, path.stat().st_mtime_ns)
-
-
-@cache
-def _parse(path: Path, mtime_ns: int) -> ast.Module:
+def _parse(path: Path) -> ast.Module:
     """Syntax tree of a Python file, or of the code cells of a notebook, without docstrings."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".ipynb":
@@ -129,13 +148,3 @@ def _parse(path: Path, mtime_ns: int) -> ast.Module:
             if ast.get_docstring(node, clean=False) is not None:
                 node.body = node.body[1:] or [ast.Pass()]
     return tree
-
-
-def _fingerprint(path: Path) -> str:
-    """Hash of a file's syntax tree, with the file's name."""
-    return f"{path.name} {_digest(path, path.stat().st_mtime_ns)}"
-
-
-@cache
-def _digest(path: Path, mtime_ns: int) -> str:
-    return hashlib.sha256(ast.dump(_parse(path, mtime_ns)).encode()).hexdigest()

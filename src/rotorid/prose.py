@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,8 @@ import jinja2
 from rotorid.errors import InputError
 
 FIGURES = {".svg", ".png"}
+WIDEST = 40
+"""A column longer than this many characters gets no more room in a table."""
 
 
 class ProseError(InputError):
@@ -50,7 +52,7 @@ def render(path: str | Path, files: Mapping[str, str]) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(fix=fix, sci=sci, interval=interval, text=text, percent=percent)
+    environment.filters.update({form.__name__: _defined(form) for form in (fix, sci, interval, text, percent)})
     known: dict[str, Any] = {name: _read(Path(file)) for name, file in files.items()}
 
     def figure(name: str, caption: str, width: str = "100%") -> str:
@@ -78,6 +80,17 @@ def render(path: str | Path, files: Mapping[str, str]) -> str:
         if isinstance(error, ProseError):
             raise
         raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
+
+
+def _defined(form: Callable[..., str]) -> Callable[..., str]:
+    """`form`, but naming the value where it is undefined."""
+
+    def checked(value: Any, *rest: Any) -> str:
+        if isinstance(value, jinja2.Undefined):
+            str(value)  # raises Jinja2's own error, with the name
+        return form(value, *rest)
+
+    return checked
 
 
 def _line_of(error: BaseException) -> int | str:
@@ -127,11 +140,16 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     """
     headings = [column[1] for column in columns]
     forms = [column[2] if len(column) > 2 else "text" for column in columns]
-    rules = [":---" if form == "text" else "---:" for form in forms]
-    lines = [_row(headings), _row(rules)]
-    lines += [
-        _row([_formatted(row[column[0]], form) for column, form in zip(columns, forms, strict=True)]) for row in rows
+    cells = [[_formatted(row[column[0]], form) for column, form in zip(columns, forms, strict=True)] for row in rows]
+    # Where a table is too wide for one line a cell, pandoc takes the columns' shares from these dashes.
+    longest_words = [max(map(len, heading.split())) for heading in headings]
+    widths = [
+        max(3, word, *(min(len(line[place]), WIDEST) for line in cells)) for place, word in enumerate(longest_words)
     ]
+    rules = [
+        ":" + "-" * width if form == "text" else "-" * width + ":" for width, form in zip(widths, forms, strict=True)
+    ]
+    lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}}}\n"
 
 
@@ -163,7 +181,8 @@ def sci(value: float | None, decimals: int) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
     mantissa, exponent = f"{value:.{decimals}e}".split("e")
-    return f"{mantissa.replace('-', '−')} × 10^{str(int(exponent)).replace('-', '−')}^"
+    # No-break spaces: a number stays in one piece.
+    return f"{mantissa.replace('-', '−')}\u00a0×\u00a010^{str(int(exponent)).replace('-', '−')}^"
 
 
 def percent(value: float | None, decimals: int) -> str:

@@ -63,6 +63,7 @@ def _pandoc(
         f"--from={MARKDOWN}",
         *(str(chapter) for chapter in chapters),
         "--fail-if-warnings",
+        "--columns=10000",  # or tables with long lines would get columns of equal width
         f"--lua-filter={parts / 'crossref.lua'}",
         "--citeproc",
         f"--bibliography={parts / 'references.bib'}",

@@ -4,10 +4,11 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from rotorid import codehash
+from rotorid.codehash import Code
 from rotorid.config import ConfigError, check
 
 ROOT = Path(workflow.basedir)
+CODE = Code(ROOT)
 
 try:
     CONFIG = check(config)
@@ -18,12 +19,27 @@ except ConfigError as error:
 def code_of(script):
     """Hash of the code that a script (its name without .py) or a notebook (its path) runs."""
     path = script if script.endswith(".ipynb") else f"workflow/scripts/{script}.py"
-    return codehash.code_of(path, ROOT)
+    return CODE.of(path)
 
 
 def code_of_chapter(name):
     """Hash of the code of a chapter's notebook and of what runs it."""
     return code_of("run_notebook") + code_of(f"notebooks/{name}.ipynb")
+
+
+def results_behind(*files):
+    """The files and every result that they hang on, for a target to ask for by name.
+
+    Snakemake does not miss a deleted result while what was made of it is still there.
+    """
+    found, waiting = set(), list(files)
+    while waiting:
+        path = waiting.pop()
+        found.add(path)
+        for producer in (known for known in workflow.rules if known.is_producer(path)):
+            inputs, *_ = producer.expand_input(producer.get_wildcards(path))
+            waiting += {str(file) for file in inputs if str(file).startswith("results/")} - found
+    return sorted(found)
 
 
 wildcard_constraints:

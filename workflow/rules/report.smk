@@ -1,10 +1,10 @@
 """From the chapters' figures, tables and texts to the report; included last, after every chapter's rule."""
 
-PARTS = ROOT / "workflow" / "report"
+PARTS = "workflow/report"
 
 
 for name in CONFIG.report.chapters:
-    if not (ROOT / "notebooks" / f"{name}.md").is_file():
+    if not (ROOT / f"notebooks/{name}.md").is_file():
         raise WorkflowError(
             f"config.yaml: report.chapters names {name}, but there is no notebooks/{name}.md."
         )
@@ -34,8 +34,8 @@ def chapter_figures(wildcards):
 
 
 def raw_files(wildcards):
-    """Everything that instruments wrote."""
-    return sorted(str(path) for path in Path("raw").rglob("*") if path.is_file())
+    """Everything that instruments wrote, and the list of public recordings with their hashes."""
+    return sorted(str(path) for path in Path("raw").rglob("*") if path.is_file()) + [MANIFEST]
 
 
 rule render_chapter:
@@ -44,7 +44,7 @@ rule render_chapter:
         "Report: text of chapter {wildcards.chapter}"
     input:
         unpack(chapter_files),
-        prose=ROOT / "notebooks" / "{chapter}.md",
+        prose="notebooks/{chapter}.md",
     output:
         markdown="results/report/chapters/{chapter}.md",
     params:
@@ -62,9 +62,9 @@ rule typeset_pdf:
     input:
         chapters=expand(rules.render_chapter.output.markdown, chapter=CONFIG.report.chapters),
         figures=chapter_figures,
-        template=PARTS / "report.typ",
-        filter=PARTS / "crossref.lua",
-        references=PARTS / "references.bib",
+        template=PARTS + "/report.typ",
+        filter=PARTS + "/crossref.lua",
+        references=PARTS + "/references.bib",
     output:
         pdf="results/report/report.pdf",
         source="results/report/report.typ",
@@ -85,10 +85,10 @@ rule build_html:
     input:
         chapters=expand(rules.render_chapter.output.markdown, chapter=CONFIG.report.chapters),
         figures=chapter_figures,
-        template=PARTS / "report.html",
-        style=PARTS / "report.css",
-        filter=PARTS / "crossref.lua",
-        references=PARTS / "references.bib",
+        template=PARTS + "/report.html",
+        style=PARTS + "/report.css",
+        filter=PARTS + "/crossref.lua",
+        references=PARTS + "/references.bib",
     output:
         html="results/report/report.html",
     params:
@@ -107,7 +107,7 @@ rule record_provenance:
         "Report: provenance"
     input:
         raw=raw_files,
-        lock=ROOT / "requirements.lock",
+        lock="requirements.lock",
         report=[rules.typeset_pdf.output.pdf, rules.build_html.output.html],
     output:
         provenance="results/report/provenance.json",
@@ -122,7 +122,11 @@ rule record_provenance:
 
 rule report:
     """The report and where it came from."""
+    message:
+        "The report is up to date"
     input:
-        rules.typeset_pdf.output.pdf,
-        rules.build_html.output.html,
-        rules.record_provenance.output.provenance,
+        results_behind(
+            rules.typeset_pdf.output.pdf,
+            rules.build_html.output.html,
+            rules.record_provenance.output.provenance,
+        ),

@@ -6,6 +6,7 @@
 """
 
 import logging
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -33,16 +34,18 @@ def main(notebook: str, parameters: Mapping[str, Any], outputs: Mapping[str, str
         raise ValueError(f"{notebook}: the cell tagged parameters does not set {', '.join(unknown)}.")
     Path(executed).parent.mkdir(parents=True, exist_ok=True)
     LOGGER.info("running %s", notebook)
-    papermill.execute_notebook(
-        notebook,
-        executed,
-        parameters=dict(parameters),
-        kernel_name="python3",
-        cwd=Path(notebook).parent,
-        progress_bar=False,
-        log_output=True,
-        config=Config({"KernelManager": {"transport": "ipc"}}),
-    )
+    # Sockets in a folder of their own: by default two chapters that run at once would share them.
+    with tempfile.TemporaryDirectory() as sockets:
+        papermill.execute_notebook(
+            notebook,
+            executed,
+            parameters=dict(parameters),
+            kernel_name="python3",
+            cwd=Path(notebook).parent,
+            progress_bar=False,
+            log_output=True,
+            config=Config({"KernelManager": {"transport": "ipc", "ip": f"{sockets}/kernel"}}),
+        )
     missing = [path for path in outputs.values() if not Path(path).is_file()]
     if missing:
         raise FileNotFoundError(f"{notebook}: ended without writing {', '.join(missing)}.")

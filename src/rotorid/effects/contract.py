@@ -11,7 +11,7 @@ Frames: world north-east-down, body forward-right-down. All functions take n ins
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -69,7 +69,10 @@ class Motion:
     def hub_velocity(self, positions_m: np.ndarray) -> np.ndarray:
         """Velocity of each hub through the air, v + Ω × r_i, shape (n, k, 3), m/s, body axes."""
         rate = self.angular_velocity if self.angular_velocity is not None else np.zeros((self.size, 3))
-        return self.air_velocity[:, None, :] + np.cross(rate[:, None, :], positions_m[None, :, :])
+        x, y, z = positions_m.T
+        p, q, r = rate[:, :1], rate[:, 1:2], rate[:, 2:]
+        turning = np.stack([q * z - r * y, r * x - p * z, p * y - q * x], axis=2)
+        return self.air_velocity[:, None, :] + turning
 
     def has(self, names: tuple[str, ...]) -> bool:
         """Whether every named field is there."""
@@ -136,6 +139,10 @@ class Form:
     vehicle_requires: tuple[str, ...] = ()
     """Keys of vehicle.yaml that must be stated."""
     minimum_rotors: int = 1
+    must_show: tuple[int, ...] = ()
+    """Parameters without which the form is another effect: each must differ from zero by two standard errors."""
+    memory: bool = False
+    """Whether it needs the past (a pendulum of its own): one instant does not give its wrench."""
 
     @property
     def linear(self) -> tuple[int, ...]:
@@ -147,6 +154,42 @@ class Form:
 
 
 FormsFor = Callable[[Vehicle], tuple[Form, ...]]
+
+
+@dataclass(frozen=True)
+class SpeedPath:
+    """What lies between command and rotor speed, at n even instants."""
+
+    speed: np.ndarray
+    """Speed so far along the path, (n, k), rad/s."""
+    time_s: np.ndarray
+    full_speed: float
+    """Upper limit of the rotor speed (or its largest command), rad/s; scales the parameters."""
+    voltage: np.ndarray | None = None
+    """Battery voltage, (n,), V."""
+    full_voltage: float | None = None
+    """Largest battery voltage of the set, V."""
+
+    @property
+    def dt_s(self) -> float:
+        return float(self.time_s[1] - self.time_s[0])
+
+
+@dataclass(frozen=True)
+class SpeedForm:
+    """One way in which rotor speed differs from its command; `apply(path, values)` gives the new speed (n, k).
+
+    `stage` orders the path: 0 static map, 1 supply, 2 limits, 3 delay, 4 lag. `neutral` are the parameter values
+    that change nothing.
+    """
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    stage: int
+    apply: Callable[[SpeedPath, np.ndarray], np.ndarray]
+    neutral: tuple[float, ...]
+    requires: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -165,8 +208,8 @@ class Effect:
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
-    lacking: dict[str, str] = field(default_factory=dict)
-    """Reason shown for a missing field, by field name; a default text otherwise."""
+    speed_forms: tuple[SpeedForm, ...] = ()
+    """Forms that act between command and rotor speed."""
 
 
 LACK = {
@@ -197,6 +240,24 @@ def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | N
     return None
 
 
+def rotor_radius_m(vehicle: Vehicle) -> float:
+    """Rotor radius, m; where none is stated, 0.45 of the smallest distance between two hubs."""
+    if vehicle.rotor_radius_m is not None:
+        return vehicle.rotor_radius_m
+    hubs = vehicle.rotor_positions_m()
+    if len(hubs) < 2:
+        return 0.1
+    apart = np.linalg.norm(hubs[:, None] - hubs[None], axis=2)
+    return 0.45 * float(apart[apart > 0].min())
+
+
 def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
     """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
-    return Contribution(force=forces.sum(axis=1), moment=np.cross(positions_m[None, :, :], forces).sum(axis=1))
+    # Products of (n, k) by (k,) are many times faster here than sums and cross products over short axes.
+    fx, fy, fz = forces[:, :, 0], forces[:, :, 1], forces[:, :, 2]
+    x, y, z = positions_m.T
+    every = np.ones(len(positions_m))
+    return Contribution(
+        force=np.stack([fx @ every, fy @ every, fz @ every], axis=1),
+        moment=np.stack([fz @ y - fy @ z, fx @ z - fz @ x, fy @ x - fx @ y], axis=1),
+    )

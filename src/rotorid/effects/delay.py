@@ -1,22 +1,37 @@
-"""Stamps of a sensor, or the actuation, late by a constant of more than one sample.
+"""A pure delay: of the command on its way to the rotors, or of a sensor's stamps."""
 
-Recognised before the physics (rotorid.mismatch.mistakes); it is no wrench, so it has no form to fit.
-"""
+import numpy as np
 
-from rotorid.effects.contract import Effect
+from rotorid.effects.contract import Effect, Parameter, SpeedForm
 
 
-def forms(vehicle):
-    return ()
+def shifted(path, values):
+    """ω(t) = ω_c(t - T), linear between samples."""
+    steps = values[0] / path.dt_s
+    index = np.arange(len(path.speed)) - steps
+    low = np.clip(np.floor(index).astype(int), 0, len(path.speed) - 1)
+    high = np.clip(low + 1, 0, len(path.speed) - 1)
+    part = np.clip(index - low, 0.0, 1.0)[:, None]
+    return (1 - part) * path.speed[low] + part * path.speed[high]
 
 
 EFFECT = Effect(
     id="delay",
-    name="a delay between columns",
-    sentence="a sensor shows the motion later than the others, equally at every frequency",
-    forms=forms,
+    name="a delay",
+    sentence="one recording follows another late, without being smoothed",
+    forms=lambda vehicle: (),
+    speed_forms=(
+        SpeedForm(
+            "of the command",
+            "ω(t) = ω_c(t − T)",
+            (Parameter("T", "s", -0.05, 0.3, nonlinear=True, starts=(0.01, 0.03, 0.1)),),
+            3,
+            shifted,
+            (0.0,),
+        ),
+    ),
     source="physics.md F20",
     confusers=("motor_lag", "clock_skew"),
-    separating_manoeuvre="excite roll and pitch quickly (3 to 15 Hz)",
+    separating_manoeuvre="excite collective and attitude up to 8 Hz",
     kind="sensor",
 )

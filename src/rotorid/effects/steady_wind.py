@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
 
 IN_PLANE = np.array([1.0, 1.0, 0.0])
 
@@ -19,16 +19,16 @@ def world_force(motion, vehicle, values):
 
 
 def rotor_force(motion, vehicle, values):
-    """F = Σω P Rᵀ (k w_N, k w_E, 0): the wind's part of rotor drag on airspeed."""
-    total = motion.rotor_speed.sum(axis=1, keepdims=True)
-    return Contribution(force=total * _world(motion, values[0], values[1]) * IN_PLANE)
+    """F_i = ω_i P Rᵀ (k w_N, k w_E, 0) at each hub: the wind's part of rotor drag on airspeed."""
+    wind = _world(motion, values[0], values[1]) * IN_PLANE
+    return at_hubs(motion.rotor_speed[:, :, None] * wind[:, None, :], vehicle.rotor_positions_m())
 
 
 def forms(vehicle):
     return (
         Form(
             "on the rotors",
-            "F = Σω P Rᵀ k_d w",
+            "F_i = ω_i P Rᵀ k_d w",
             (Parameter("kw_north", "N s/rad"), Parameter("kw_east", "N s/rad")),
             rotor_force,
             ("rotation", "rotor_speed"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,36 +22,65 @@ from rotorid.mismatch.rows import (
     form_columns,
     offset_columns,
     project,
+    slope_column,
     value_columns,
+)
+from rotorid.mismatch.rows import (
+    measured_moment as moment_of,
 )
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
 HELD_OUT_SHARE = 1 / 3
+GAP_S = 2.0
+"""Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
-ACTIVE = "active"
+MOST_NOISE_SAMPLES = 8192
+"""Samples of a column that its noise level is read from."""
 
 
 def split_runs(recordings: RecordingSet) -> Split:
-    """Training and held-out runs: as `split.yaml` says, else about a third held out, spread evenly in time."""
+    """Training and held-out runs: as `split.yaml` says, else about a third held out, spread evenly in time.
+
+    A single run is named on both sides: its last third is held out.
+    """
     names = [run.name for run in recordings.runs]
     if recordings.held_out is not None:
         held = [n for n in names if n in recordings.held_out]
     elif len(names) == 1:
-        held = []
+        return Split((names[0],), (names[0],))
     else:
         count = max(1, round(len(names) * HELD_OUT_SHARE))
         held = [names[int((k + 0.5) * len(names) / count)] for k in range(count)]
     return Split(tuple(n for n in names if n not in held), tuple(held))
 
 
+def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float], bool | None]:
+    """Whether a block is fitted (True), held out (False) or in the gap between (None).
+
+    Whole runs where there are several; of a single run the last third, after a gap of GAP_S.
+    """
+    if split.held_out != split.training:
+        return lambda run, time_s: run in split.training
+    start = min(s.motion.time_s[0] for s in segments)
+    stop = max(s.motion.time_s[-1] for s in segments)
+    border = start + (stop - start) * (1 - HELD_OUT_SHARE)
+
+    def rule(run: str, time_s: float) -> bool | None:
+        if abs(time_s - border) < GAP_S / 2:
+            return None
+        return time_s < border
+
+    return rule
+
+
 def white_level(values: np.ndarray) -> float:
     """One-sigma of the white part of an evenly sampled signal: the lowest level of its spectrum, as if flat."""
-    values = values[np.isfinite(values)]
+    values = values[np.isfinite(values)][:MOST_NOISE_SAMPLES]
     if len(values) < 64:
         return 0.0
-    _, density = welch(values, fs=1.0, nperseg=min(256, len(values) // 2), detrend="linear")
+    _, density = welch(values, fs=1.0, nperseg=min(256, len(values) // 2))
     smooth = np.convolve(density[2:], np.ones(9) / 9, mode="valid")
     return float(np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 
@@ -214,26 +244,57 @@ def with_predictions(segment: Segment, vehicle: Vehicle, model: dict[str, np.nda
     return replace(segment, motion=replace(motion, **changed))
 
 
+def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[dict[str, np.ndarray]]:
+    """What one metre a second more wind from each of north and east adds through the effects that feel the air."""
+    wind = np.zeros(3) if segment.motion.wind is None else segment.motion.wind
+    columns = []
+    for axis in range(2):
+        parts = []
+        for sign in (0.5, -0.5):
+            step = np.zeros(3)
+            step[axis] = sign
+            moved = replace(segment.motion, wind=wind + step)
+            total: dict[str, np.ndarray] = {}
+            for form, values in effects:
+                for name, part in project(form.contribution(moved, vehicle, values), segment, vehicle, groups).items():
+                    total[name] = total.get(name, 0.0) + part
+            parts.append(total)
+        columns.append({k: parts[0][k] - parts[1][k] for k in parts[0]})
+    return columns
+
+
 def assemble_rows(
     prepared: Prepared,
     terms: list[Term],
     segments: list[Segment] | None = None,
     effects: list[tuple[Form, np.ndarray]] | None = None,
+    measured_moment: bool = False,
 ) -> list[Rows]:
-    """Rows of every segment for the given terms; `effects` only shape the value columns."""
+    """Rows of every segment for the given terms; `effects` only shape the value columns.
+
+    `measured_moment` puts the measured moments into the value columns in place of the predicted ones.
+    """
     vehicle, groups = prepared.vehicle, prepared.groups
 
     def source(segment):
         columns = []
-        model = {}
+        model, reverse = {}, None
+        if measured_moment and "moment" in groups:
+            reverse = moment_of(segment, vehicle)
         if segment.motion.rotor_speed is not None:
             model = model_wrench(segment, vehicle, effects or [])
             segment = with_predictions(segment, vehicle, model)
         for term in terms:
-            if term.kind == "effect":
+            if term.run and term.run != segment.run:
+                columns += [{}] * term.size
+            elif term.kind == "wind":
+                columns += wind_columns(segment, vehicle, groups, effects or [])
+            elif term.kind == "slope":
+                columns.append(slope_column(term, segment, vehicle, groups))
+            elif term.kind == "effect":
                 columns += form_columns(term.form, term.values, segment, vehicle, groups)
             elif term.kind == "value":
-                columns.append(value_columns(term.key, segment, vehicle, groups, model))
+                columns.append(value_columns(term.key, segment, vehicle, groups, model, reverse))
             else:
                 columns.append(offset_columns(term.key, segment, vehicle, groups))
         return columns

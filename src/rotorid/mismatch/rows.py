@@ -44,6 +44,12 @@ class Term:
     """Current values of a form's parameters (nonlinear ones matter for its columns)."""
     size: int = 1
     prior_sd: tuple[float, ...] = (np.inf,)
+    run: str = ""
+    """Only run that the term acts in; empty for all."""
+    window: tuple[str, float, float] | None = None
+    """(run, start_s, stop_s) of an effect in part of the flight."""
+    slope_of: int | None = None
+    """For the slope of a nonlinear parameter: its index in the form."""
 
 
 def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -52,13 +58,13 @@ def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.nd
     thrust = vehicle.thrust_coefficients_n_s2() * squared
     positions = vehicle.rotor_positions_m()
     force = np.zeros((motion.size, 3))
-    force[:, 2] = -thrust.sum(axis=1)
+    force[:, 2] = -thrust @ np.ones(len(positions))
     arm = np.zeros_like(force)
     # r × (0, 0, -T) = (-y T, x T, 0)
-    arm[:, 0] = -(thrust * positions[:, 1]).sum(axis=1)
-    arm[:, 1] = (thrust * positions[:, 0]).sum(axis=1)
+    arm[:, 0] = -thrust @ positions[:, 1]
+    arm[:, 1] = thrust @ positions[:, 0]
     torque = np.zeros_like(force)
-    torque[:, 2] = (squared * vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs()).sum(axis=1)
+    torque[:, 2] = squared @ (vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs())
     return force, arm, torque
 
 
@@ -142,14 +148,44 @@ def form_columns(form: Form, values, segment: Segment, vehicle: Vehicle, groups)
     return columns
 
 
-def value_columns(key: str, segment: Segment, vehicle: Vehicle, groups, model: dict[str, np.ndarray]):
+def slope_column(term: Term, segment: Segment, vehicle: Vehicle, groups) -> dict[str, np.ndarray]:
+    """Derivative of a form's contribution by one nonlinear parameter at the term's values."""
+    values = np.asarray(term.values, float)
+    step = 1e-3 * max(abs(values[term.slope_of]), 1e-6)
+    up, down = values.copy(), values.copy()
+    up[term.slope_of] += step
+    down[term.slope_of] -= step
+    a = project(term.form.contribution(segment.motion, vehicle, up), segment, vehicle, groups)
+    b = project(term.form.contribution(segment.motion, vehicle, down), segment, vehicle, groups)
+    return {k: (a[k] - b[k]) / (2 * step) for k in a}
+
+
+def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:
+    """J dΩ/dt + Ω × J Ω from the measured body rates, (n, 3), N m."""
+    inertia, rate = vehicle.inertia_kg_m2.matrix(), segment.motion.angular_velocity
+    return segment.motion.angular_acceleration @ inertia + np.cross(rate, rate @ inertia)
+
+
+def value_columns(
+    key: str,
+    segment: Segment,
+    vehicle: Vehicle,
+    groups,
+    model: dict[str, np.ndarray],
+    reverse: np.ndarray | None = None,
+):
     """Column of a relative change of one believed value, as channel contributions.
 
     Accelerations on the left side are replaced by what the current model predicts (`model`: force N and moment
-    N m, native rate), because a regression on a noisy derivative of the body rate would be biased.
+    N m, native rate), because a regression on a noisy derivative of the body rate would be biased. `reverse`
+    (the measured moment, (n, 3), N m) takes the predicted moments' place for a check from the other side.
     """
     motion = segment.motion
     force, arm, torque = baseline_wrench(motion, vehicle)
+    if reverse is not None:
+        arm = reverse * np.array([1.0, 1.0, 0.0])
+        torque = reverse * np.array([0.0, 0.0, 1.0])
+        model = {**model, "moment": reverse}
     out = {}
     if key == "thrust":
         out = {"force": force, "moment": arm}
@@ -210,6 +246,7 @@ class Thinner:
     """Low-pass and thinning, the same for everything."""
 
     def __init__(self, rate_hz: float, cutoff_hz: float):
+        self.cutoff_hz = cutoff_hz
         self.kernel = kernels.low_pass(rate_hz, cutoff_hz)
         self.step = max(1, int(np.floor(rate_hz / (2 * cutoff_hz) + 1e-9)))
         self.rate_hz = rate_hz / self.step

@@ -132,6 +132,13 @@ def check_table(table: pd.DataFrame, where: str) -> pd.DataFrame:
     return table
 
 
+def _read_parquet(path: Path) -> pd.DataFrame:
+    try:
+        return pd.read_parquet(path)
+    except ValueError as error:  # pyarrow's own error for broken files is one of these
+        raise InputError(f"{path}: cannot be read as a table ({error})") from None
+
+
 def read_run(path: Path) -> Run:
     """Read one run; InputError names file, line and column of a fault."""
     name = run_name(path)
@@ -139,7 +146,7 @@ def read_run(path: Path) -> Run:
         raise InputError(f"{path}: expected one of {', '.join(RUN_SUFFIXES)}")
     try:
         if path.name.endswith(".parquet"):
-            table = pd.read_parquet(path)
+            table = _read_parquet(path)
         else:
             table = pd.read_csv(path, skipinitialspace=True, encoding="utf-8-sig")
             table.columns = [str(column).strip() for column in table.columns]

@@ -1,0 +1,67 @@
+# Two commands for a newcomer with Python 3.11 or newer and make:
+#   make report   measurements to results/report/report.pdf and report.html
+#   make test     every check of the project
+# Both make the environment (.venv, from the hashes in requirements.lock) when it is missing.
+
+PYTHON ?= python3
+CORES ?= 2
+# More for Snakemake, e.g. make report OPTIONS="--configfile tests/configs/small.yaml"
+OPTIONS ?=
+
+BIN := .venv/bin
+READY := .venv/ready
+TESTED := .venv/tested
+SOURCES := $(shell find Snakefile config.yaml pyproject.toml README.md .pre-commit-config.yaml \
+	src acquire workflow notebooks tests raw docs \
+	-type f ! -path '*/__pycache__/*' ! -name '* *' 2>/dev/null)
+
+.PHONY: help report campaign test check environment lock
+.DEFAULT_GOAL := help
+
+help: ## say what there is
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
+
+report: $(READY) ## make the report from raw measurements
+	@$(BIN)/snakemake --cores $(CORES) $(OPTIONS)
+	@echo "The report: results/report/report.pdf and results/report/report.html"
+
+campaign: $(READY) ## record the emulated campaign anew into raw/campaign
+	@$(BIN)/python -m acquire.campaign
+
+test: $(TESTED) ## run every check; does nothing when nothing has changed since it last passed
+	@echo "Every check has passed on these files."
+
+check: $(READY) ## the checks of form alone: lint, format, stripped notebooks
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --check --quiet .
+	@$(BIN)/snakefmt --check Snakefile workflow 2>&1 || { echo "Run: .venv/bin/snakefmt Snakefile workflow"; exit 1; }
+	@$(BIN)/nbstripout --verify notebooks/*.ipynb || { echo "Run: .venv/bin/nbstripout notebooks/*.ipynb"; exit 1; }
+
+$(TESTED): $(READY) $(SOURCES)
+	@$(MAKE) --no-print-directory check
+	@$(BIN)/pytest -m "not slow" -n 2 --dist loadgroup
+	@touch $@
+
+environment: $(READY) ## make the environment alone
+
+# uv, itself from the lock, installs the rest in seconds; where it cannot, pip does it in a minute.
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "rotorid needs Python 3.11 or newer, and $(PYTHON) is not; say which to use: make PYTHON=python3.12 ..."; \
+		exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+		echo "$(PYTHON) cannot make environments (no ensurepip); on Debian and Ubuntu: apt install python3-venv"; \
+		exit 1; }
+	@echo "Environment: making .venv and installing the locked packages"
+	@$(PYTHON) -m venv --clear .venv
+	@sed -n '/^uv==/,/# via/p' requirements.lock > .venv/uv.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r .venv/uv.lock \
+		&& $(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock \
+		|| { echo "Environment: uv did not work here; installing with pip, about a minute"; \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock; }
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+lock: $(READY) ## resolve the dependencies of pyproject.toml anew
+	@$(BIN)/uv pip compile --quiet pyproject.toml --extra dev --universal --generate-hashes \
+		--python-version 3.11 --no-header --output-file requirements.lock

@@ -1,0 +1,5 @@
+"""`python -m acquire` is `rotorid-acquire`."""
+
+from acquire.cli import app
+
+app()

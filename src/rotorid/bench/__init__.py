@@ -1,0 +1,1 @@
+"""The load-cell bench: calibration, reconstruction of forces, tests."""

@@ -1,0 +1,1 @@
+"""Controllers and their references, one file each."""

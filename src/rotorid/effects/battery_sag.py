@@ -1,0 +1,60 @@
+"""Rotor speed that falls with the battery's voltage."""
+
+import numpy as np
+
+from rotorid.effects.contract import Effect, Parameter, SpeedForm
+
+
+def power(path, values):
+    """ω = ω_c (V/V_0)^p, V_0 the set's largest voltage."""
+    return path.speed * ((path.voltage / path.full_voltage) ** values[0])[:, None]
+
+
+def power_of_reference(path, values):
+    """ω = ω_c (1 + g) (V/V_0)^p: the command is right at another voltage than the largest."""
+    return (1 + values[1]) * power(path, values[:1])
+
+
+def drift(path, values):
+    """ω = ω_c (1 - k t) within a run, without a voltmeter; t in minutes from the run's start."""
+    minutes = (path.time_s - path.time_s[0]) / 60.0
+    return path.speed * np.maximum(1.0 - values[0] * minutes, 0.05)[:, None]
+
+
+EFFECT = Effect(
+    id="battery_sag",
+    name="the sag of the battery",
+    sentence="all rotors turn slower than commanded as the battery's voltage falls",
+    forms=lambda vehicle: (),
+    speed_forms=(
+        SpeedForm(
+            "power of voltage",
+            "ω = ω_c (V/V_0)^p",
+            (Parameter("p", "1", 0.0, 3.0),),
+            1,
+            power,
+            (0.0,),
+            ("voltage",),
+        ),
+        SpeedForm(
+            "power of voltage, own reference",
+            "ω = (1 + g) ω_c (V/V_0)^p",
+            (Parameter("p", "1", 0.0, 3.0), Parameter("g", "1", -0.5, 1.0)),
+            1,
+            power_of_reference,
+            (0.0, 0.0),
+            ("voltage",),
+        ),
+        SpeedForm(
+            "drift in time",
+            "ω = ω_c (1 − k t)",
+            (Parameter("k", "1/min", 0.0, 1.0),),
+            1,
+            drift,
+            (0.0,),
+        ),
+    ),
+    source="physics.md F4",
+    confusers=("throttle_curve", "command_saturation"),
+    separating_manoeuvre="record voltage and current, rest the battery and repeat the same hover",
+)

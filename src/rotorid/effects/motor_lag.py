@@ -1,0 +1,67 @@
+"""Motors that need time to reach the commanded speed."""
+
+import numpy as np
+from numba import njit
+
+from rotorid.effects.contract import Effect, Parameter, SpeedForm
+
+
+@njit(cache=True)
+def _lag(command, up, down):
+    """First-order lag with its own step factor (1 - exp(-dt/τ)) up and down; the command holds over a sample."""
+    out = np.empty_like(command)
+    for j in range(command.shape[1]):
+        state = command[0, j]
+        out[0, j] = state
+        for i in range(1, command.shape[0]):
+            gap = command[i - 1, j] - state
+            state += (up if gap > 0 else down) * gap
+            out[i, j] = state
+    return out
+
+
+def lagged(command, tau_up_s, tau_down_s, dt_s):
+    """dω/dt = (ω_c - ω)/τ, exact over a sample, shape (n, k)."""
+    up = 1.0 - np.exp(-dt_s / max(tau_up_s, 1e-5))
+    down = 1.0 - np.exp(-dt_s / max(tau_down_s, 1e-5))
+    return _lag(np.ascontiguousarray(command), up, down)
+
+
+def one_constant(path, values):
+    return lagged(path.speed, values[0], values[0], path.dt_s)
+
+
+def up_and_down(path, values):
+    return lagged(path.speed, values[0], values[1], path.dt_s)
+
+
+def on_thrust(path, values):
+    """The thrust, not the speed, follows as a first-order lag."""
+    return np.sqrt(np.maximum(lagged(path.speed**2, values[0], values[0], path.dt_s), 0.0))
+
+
+def _tau(symbol):
+    return Parameter(symbol, "s", 0.0, 1.0, nonlinear=True, starts=(0.015, 0.05, 0.15), meaning="time constant")
+
+
+EFFECT = Effect(
+    id="motor_lag",
+    name="the lag of the motors",
+    sentence="rotor speed follows its command late and smoothed",
+    forms=lambda vehicle: (),
+    speed_forms=(
+        SpeedForm("one constant", "dω/dt = (ω_c − ω)/τ", (_tau("tau"),), 4, one_constant, (0.0,)),
+        SpeedForm(
+            "up and down",
+            "dω/dt = (ω_c − ω)/τ_up or τ_down",
+            (_tau("tau_up"), _tau("tau_down")),
+            4,
+            up_and_down,
+            (0.0, 0.0),
+        ),
+        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), 4, on_thrust, (0.0,)),
+    ),
+    source="physics.md F1; Quan, Introduction to Multicopter Design and Control, ch. 6",
+    confusers=("delay", "throttle_curve"),
+    separating_manoeuvre="excite collective and attitude up to 8 Hz, or record rotor speeds",
+)

@@ -1,0 +1,73 @@
+"""Steady rotor speed that is not proportional to its command."""
+
+import numpy as np
+
+from rotorid.effects.contract import Effect, Parameter, SpeedForm
+
+
+def affine(path, values):
+    """ω = ω_c + a_0 ω_max + a_1 ω_c."""
+    return np.maximum(path.speed * (1 + values[1]) + values[0] * path.full_speed, 0.0)
+
+
+def quadratic(path, values):
+    """ω = ω_c + a_1 ω_c + a_2 ω_c (ω_c/ω_max): the gain changes with the command."""
+    return np.maximum(path.speed * (1 + values[0] + values[1] * path.speed / path.full_speed), 0.0)
+
+
+def dead_zone(path, values):
+    """ω = ω_max (u - u_0)/(1 - u_0), zero below u_0; u = ω_c/ω_max."""
+    start = values[0]
+    return path.full_speed * np.maximum(path.speed / path.full_speed - start, 0.0) / (1.0 - start)
+
+
+def root(path, values):
+    """T/T_max = (1 - a) u + a u², u = ω_c/ω_max; a = 1 is a proportional speed."""
+    u = np.clip(path.speed / path.full_speed, 0.0, None)
+    a = 1.0 - values[0]
+    return path.full_speed * np.sqrt((1 - a) * u + a * u**2)
+
+
+EFFECT = Effect(
+    id="throttle_curve",
+    name="the curve between throttle and rotor speed",
+    sentence="the steady rotor speed is not proportional to its command",
+    forms=lambda vehicle: (),
+    speed_forms=(
+        SpeedForm(
+            "affine",
+            "ω = (1 + a_1) ω_c + a_0 ω_max",
+            (Parameter("a_0", "1", -0.8, 0.8), Parameter("a_1", "1", -0.8, 2.0)),
+            0,
+            affine,
+            (0.0, 0.0),
+        ),
+        SpeedForm(
+            "quadratic",
+            "ω = (1 + a_1 + a_2 ω_c/ω_max) ω_c",
+            (Parameter("a_1", "1", -0.8, 2.0), Parameter("a_2", "1", -2.0, 2.0)),
+            0,
+            quadratic,
+            (0.0, 0.0),
+        ),
+        SpeedForm(
+            "dead zone",
+            "ω = ω_max (u − u_0)/(1 − u_0)",
+            (Parameter("u_0", "1", -0.3, 0.5),),
+            0,
+            dead_zone,
+            (0.0,),
+        ),
+        SpeedForm(
+            "thrust curve of the throttle",
+            "T/T_max = b u + (1 − b) u²",
+            (Parameter("b", "1", -0.3, 1.0),),
+            0,
+            root,
+            (0.0,),
+        ),
+    ),
+    source="physics.md F2; PX4's THR_MDL_FAC",
+    confusers=("battery_sag", "thrust_curve", "command_saturation"),
+    separating_manoeuvre="step the throttle up and down over its whole range with two battery charges",
+)

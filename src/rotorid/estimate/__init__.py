@@ -1,0 +1,1 @@
+"""Grey-box estimators: parameters of the equations of motion from data."""

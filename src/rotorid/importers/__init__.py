@@ -1,0 +1,1 @@
+"""Importers of laboratory formats, each ending in recording sets of the contract."""

@@ -1,0 +1,1 @@
+"""Reading and writing: raw logs, recording sets, importers."""

@@ -1,0 +1,189 @@
+"""What a recorder writes beside the bytes: `<log>.yaml`, one validated model for recorder and pipeline."""
+
+from __future__ import annotations
+
+import os
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+try:  # the C loader is ten times faster where PyYAML was built with it
+    from yaml import CSafeLoader as Loader
+except ImportError:  # pragma: no cover - depends on the platform
+    from yaml import SafeLoader as Loader
+
+
+class Ended(StrEnum):
+    """How a recording ended. RECORDING means: it never did; the recorder was killed."""
+
+    RECORDING = "recording"
+    FINISHED = "finished"
+    INTERRUPTED = "interrupted"
+    DEVICE_LOST = "device_lost"
+    DEVICE_SILENT = "device_silent"
+    DEVICE_RESET = "device_reset"
+    REFUSED = "refused"
+    DISK_FULL = "disk_full"
+    FAILED = "failed"
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class Air(_Model):
+    """Air during the recording."""
+
+    temperature_c: float
+    pressure_pa: float
+    relative_humidity: float = Field(ge=0, le=1)
+
+    @property
+    def density_kg_m3(self) -> float:
+        """Of moist air, kg/m³: dry air and vapour as ideal gases, Magnus's formula for saturation."""
+        saturation_pa = 611.2 * 2.718281828 ** (17.62 * self.temperature_c / (243.12 + self.temperature_c))
+        vapour_pa = self.relative_humidity * saturation_pa
+        kelvin = self.temperature_c + 273.15
+        return (self.pressure_pa - vapour_pa) / (287.05 * kelvin) + vapour_pa / (461.5 * kelvin)
+
+
+class Setup(_Model):
+    """What the operator knows and the instrument does not. Everything is optional."""
+
+    kind: str = "free"  # calibration, static, dynamic, thrust, torque, dynamics, tensile, free
+    operator: str | None = None
+    platform: str | None = None  # al, pla, jr3; stand
+    axis: str | None = None  # of the applied load: x, y, z
+    load_gf: float | None = None
+    load_items: list[str] | None = None
+    repeat: int | None = None
+    cell: int | None = None
+    experiment: int | None = None  # table A.1
+    throttle: float | None = None
+    motor: int | None = None
+    specimen: str | None = None
+    infill_percent: int | None = None
+    gauge_length_mm: float | None = None
+    cross_section_mm2: float | None = None
+    propeller: str | None = None
+    battery: str | None = None
+    mount_roll_deg: float | None = None
+    mount_pitch_deg: float | None = None
+    sensor_position_m: list[float] | None = None  # body axes, from the believed centre of mass
+    tared: bool | None = None  # the reading was zeroed with the vehicle in place
+    air: Air | None = None
+    remarks: str | None = None
+
+
+class GapEntry(_Model):
+    """Frames that never came, in device time of their segment."""
+
+    segment: int
+    first_index: int
+    count: int
+    start_s: float
+    stop_s: float
+
+
+class Event(_Model):
+    """Something that happened to the line, at the host's time since the recording began."""
+
+    host_s: float
+    what: str
+    text: str
+
+
+class Counts(_Model):
+    """Totals of a recording."""
+
+    bytes_received: int = 0
+    frames: int = 0
+    samples: int = 0
+    missing: int = 0
+    repeated: int = 0
+    late: int = 0
+    checksum_errors: int = 0
+    broken_frames: int = 0
+    lost_bytes: int = 0
+    resets: int = 0
+    clock_rollovers: int = 0
+    port_losses: int = 0
+    device_skipped: int = 0  # samples the device itself said it had to skip
+
+
+class Session(_Model):
+    """One recording of one instrument."""
+
+    format: str = "rotorid-session-1"
+    id: str
+    group: str | None = None  # recordings that belong together (quadrotor and wrench of one experiment)
+    instrument: str
+    firmware: str | None = None
+    serial_number: str | None = None
+    source: str | None = None  # instrument | emulator, as the device itself says
+    started: str  # ISO 8601 with offset
+    host_start_ns: int  # the host's monotonic clock at that moment; comparable within a group
+    port: str | None = None
+    baud_rate: int | None = None
+    setup: Setup = Setup()
+    procedure: dict[str, Any] = {}  # what the recorder was told to do
+    marks: dict[str, int] = {}  # step: value of the table's column `index` at its first (or last) sample
+    tare: dict[str, float] | None = None  # column: mean of the 25 tare samples
+    promised_rate_hz: float | None = None
+    measured_rate_hz: float | None = None  # samples over device time
+    device_clock_ratio: float | None = None  # device seconds per host second
+    duration_s: float | None = None
+    counts: Counts = Counts()
+    gaps: list[GapEntry] = []
+    gaps_left_out: int = 0  # beyond the first thousand
+    events: list[Event] = []
+    warnings: list[str] = []
+    ended: Ended = Ended.RECORDING
+    message: str = "the recorder never got to the end: it was killed or the computer stopped"
+    log: str  # file name beside this file
+    log_sha256: str | None = None  # of the unpacked log
+
+
+class SessionError(ValueError):
+    """The metadata file is missing, unreadable or not what it should be."""
+
+
+def session_path(log: str | Path) -> Path:
+    """Where the metadata of a log stands: `x.rlog` or `x.rlog.gz` → `x.yaml`."""
+    log = Path(log)
+    return log.with_name(log.name.removesuffix(".gz").removesuffix(".rlog") + ".yaml")
+
+
+def write_session(session: Session, path: str | Path) -> None:
+    """Write atomically: a reader sees the old file or the new one, never half of either."""
+    path = Path(path)
+    text = yaml.safe_dump(
+        session.model_dump(mode="json", exclude_none=True), sort_keys=False, allow_unicode=True, width=110
+    )
+    temporary = path.with_name(path.name + ".tmp")
+    try:
+        with open(temporary, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def read_session(path: str | Path) -> Session:
+    """Read and validate. Raises SessionError naming the file and the first key that is wrong."""
+    try:
+        return Session.model_validate(yaml.load(Path(path).read_text(encoding="utf-8"), Loader))
+    except FileNotFoundError as error:
+        raise SessionError(f"{path}: no such file; every log has its metadata beside it") from error
+    except yaml.YAMLError as error:
+        raise SessionError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise SessionError(f"{path}: {where}: {first['msg']}") from error

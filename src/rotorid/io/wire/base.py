@@ -1,0 +1,126 @@
+"""The parts that all instruments share: channels, start and end records, commands and answers."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+BOOTED, ASKED, STREAMING = 0, 1, 2  # why a start record is sent
+STOPPED, COMPLETE, FAULT = 0, 1, 2  # why a stream ended
+OK, REFUSED, UNKNOWN = 0, 1, 2  # how a command was taken
+
+IDENTIFY, GO, STOP = "?", "G", "X"  # commands that every instrument knows
+
+
+class StartRecord(NamedTuple):
+    """Payload of a start record: who speaks, since which boot, at which promised interval."""
+
+    boot_id: int  # another number after every power-up
+    interval_us: int  # promised time between two samples
+    reason: int  # BOOTED, ASKED or STREAMING
+    instrument: str
+    firmware: str
+    serial_number: str
+
+    _LAYOUT = struct.Struct("<IIB")
+
+    def pack(self) -> bytes:
+        text = "\0".join((self.instrument, self.firmware, self.serial_number))
+        return self._LAYOUT.pack(self.boot_id, self.interval_us, self.reason) + text.encode()
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> StartRecord:
+        boot_id, interval_us, reason = cls._LAYOUT.unpack_from(payload)
+        instrument, firmware, serial_number = payload[cls._LAYOUT.size :].decode().split("\0")
+        return cls(boot_id, interval_us, reason, instrument, firmware, serial_number)
+
+
+class EndRecord(NamedTuple):
+    """Payload of an end record: data frames sent in this stream, samples the device had to skip, why."""
+
+    sent: int
+    skipped: int
+    reason: int
+
+    _LAYOUT = struct.Struct("<IIB")
+
+    def pack(self) -> bytes:
+        return self._LAYOUT.pack(*self)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> EndRecord:
+        return cls(*cls._LAYOUT.unpack(payload))
+
+
+class Answer(NamedTuple):
+    """Payload of an answer: the command's letter, OK, REFUSED or UNKNOWN, and a sentence if refused."""
+
+    letter: str
+    status: int
+    text: str
+
+    def pack(self) -> bytes:
+        return self.letter.encode() + bytes([self.status]) + self.text.encode()
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Answer:
+        return cls(chr(payload[0]), payload[1], payload[2:].decode(errors="replace"))
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One number of a sample. `column` carries the unit; value = scale × count. `low` and `high` are the
+    counts at which the channel saturates; a command or a state (`reading=False`) does not saturate."""
+
+    column: str
+    code: str  # struct format of the count
+    scale: float
+    low: int
+    high: int
+    reading: bool = True
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """An instrument's name and what its data frames hold."""
+
+    name: str
+    title: str
+    baud_rate: int
+    interval_us: int  # when nothing else is asked for
+    channels: tuple[Channel, ...]
+    commands: dict[str, str]  # letter: what it does and its arguments
+
+    @cached_property
+    def layout(self) -> struct.Struct:
+        return struct.Struct("<" + "".join(channel.code for channel in self.channels))
+
+    @cached_property
+    def scales(self) -> tuple[float, ...]:
+        return tuple(channel.scale for channel in self.channels)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return tuple(channel.column for channel in self.channels)
+
+    def encode(self, counts: tuple[int, ...] | list[int]) -> bytes:
+        """Payload of a data frame. Counts beyond a channel's range stand at its end, as a converter's do."""
+        return self.layout.pack(*(min(max(n, c.low), c.high) for n, c in zip(counts, self.channels, strict=True)))
+
+    def decode(self, payload: bytes) -> tuple[float, ...]:
+        """Values in the columns' units. Raises struct.error where the payload has another length."""
+        return tuple(n * s for n, s in zip(self.layout.unpack(payload), self.scales, strict=True))
+
+
+def counts(columns: list[str], code: str, scale: float, high: int, low: int | None = None) -> tuple:
+    """Channels of one kind; the range is symmetric unless `low` is given."""
+    return tuple(Channel(name, code, scale, -high if low is None else low, high) for name in columns)
+
+
+COMMON_COMMANDS = {
+    IDENTIFY: "say who you are (a start record)",
+    GO: "start to stream; interval u32 in µs, 0 for the instrument's own",
+    STOP: "stop the stream",
+}

@@ -1,0 +1,385 @@
+"""From a recording set to what is off in it: the whole analysis in its order.
+
+1. mistakes in the set, 2. what lies between command and rotor speed, 3. the grouped search over force, moment and
+sensor effects with the believed values free, 4. refinement of nonlinear parameters and of the wind, 5. a word on
+each id: established, ambiguous, absorbed or not established.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
+from rotorid.mismatch.dependence import dependence, leftover
+from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.motion import stretches
+from rotorid.mismatch.prepare import Prepared, prepare, training_rule
+from rotorid.mismatch.regime import regime_variables
+from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, residual
+from rotorid.mismatch.select import Selection
+from rotorid.mismatch.speedpath import SpeedResult, commanded_path
+from rotorid.mismatch.wrench import (
+    WrenchModel,
+    chosen,
+    in_wind,
+    nonlinear_intervals,
+    path_segments,
+    refine_nonlinear,
+    reverse_regression,
+    speed_path,
+    with_gusts,
+    with_wind,
+    wrench_model,
+)
+from rotorid.recordings import RecordingSet, Vehicle
+
+ABSORBED_P = 1e-6
+UNITS = {"force": "N", "moment": "N m"}
+NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
+
+
+def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
+    """The whole analysis of a set of kind `flight`."""
+    recordings, mistakes, remarks = find_mistakes(recordings)
+    prepared = prepare(recordings, cutoff_hz)
+    notes = list(remarks)
+    findings = list(mistakes)
+    reasons = dict(prepared.not_testable)
+    measured = all(s.measured_speed for s in prepared.segments)
+
+    found = speed_path(prepared)
+    segments, noisy = prepared.segments, prepared.noisy_segments
+    if found is not None and not measured:
+        cutoff = prepared.thinner.cutoff_hz
+        segments = path_segments(segments, *found, cutoff)
+        noisy = path_segments(noisy, *found, cutoff)
+    model = refined_model(prepared, segments, noisy)
+    if found is not None and not measured and model.selection.active:
+        # The wrench effects found change what the commands must explain: once more with them known.
+        found = speed_path(prepared, chosen(model))
+        segments = path_segments(prepared.segments, *found, cutoff)
+        noisy = path_segments(prepared.noisy_segments, *found, cutoff)
+        model = refined_model(prepared, segments, noisy)
+
+    if model.wind is not None:
+        findings.append(wind_finding(model))
+        segments = in_wind(segments, model.wind)
+    if found is None:
+        reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
+    else:
+        findings += speed_findings(found[0], prepared, measured, found[1])
+        if found[2] is None:
+            reasons.setdefault("battery_sag", "no battery voltage")
+    rule = training_rule(prepared.split, segments)
+    held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
+    findings += wrench_findings(
+        model.rows,
+        model.regression,
+        model.search,
+        model.selection,
+        model.noise,
+        held,
+        nonlinear_intervals(prepared, model, segments),
+    )
+
+    def size(key: str, change: float) -> float:
+        return float(model.search.sizes_of(key, np.array([change])).max())
+
+    if found is not None and not measured:
+        findings = [throttle_or_thrust(f) for f in findings]
+
+    values = wrong_values(
+        model.regression,
+        model.search,
+        model.selection,
+        reverse_regression(prepared, model, segments),
+        size,
+    )
+    findings += absorbed_findings(model, values, findings)
+    plain_values = {}
+    if model.wind is None:
+        nothing = Selection([], model.selection.fit)
+        plain_values = wrong_values(model.regression, model.search, nothing, None, size)
+    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
+    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in values.items()})
+    traces = make_traces(prepared, model, found, measured, plain_values, values)
+    before, after, depends = dependence(prepared, model, segments)
+    share, channels, description = leftover(prepared, model, segments, before, after, depends)
+    known = {f.id for f in findings if f.status in ("established", "ambiguous")}
+    return Analysis(
+        recordings=recordings,
+        split=prepared.split,
+        believed=prepared.vehicle,
+        refitted=refitted,
+        improved=improved,
+        findings=tuple(together(findings)),
+        values=contract_values(prepared.vehicle, values),
+        not_testable={k: v for k, v in reasons.items() if k not in known},
+        traces=traces,
+        noise_floor=noise_floors(prepared, model, found, measured),
+        p_values={c: (before[c], after[c]) for c in before},
+        regimes=regimes_by_run(segments, prepared),
+        unexplained_share=share,
+        unexplained_channels=channels,
+        unexplained_depends_on=tuple(depends),
+        unexplained_description=description,
+        force_source=segments[0].force_source,
+        notes=tuple(notes),
+    )
+
+
+def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
+    """The search, then nonlinear parameters refined and the search repeated from there."""
+    model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
+    terms = list(prepared.terms)
+    for _ in range(2 if any(model.search.terms[k].form.nonlinear for k in model.selection.active) else 0):
+        refined = refine_nonlinear(prepared, model, segments)
+        terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
+        again = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
+        same = set(again.selection.active) == set(model.selection.active)
+        model = again
+        if same:
+            break
+    model = with_wind(prepared, model, segments, noisy, terms)
+    if model.wind is not None:
+        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
+        terms = [t for t in model.terms if not t.run]
+    return with_gusts(prepared, model, segments, noisy, terms)
+
+
+def wind_finding(model: WrenchModel) -> Finding:
+    """The steady wind as a velocity, fitted through the drag."""
+    effect = catalogue()["steady_wind"]
+    w, sd = model.wind, model.wind_sd
+    drag = next(
+        (v for k, v in zip(model.selection.active, chosen(model), strict=True) if k.startswith("rotor_drag/")), None
+    )
+    form = next(f for f in effect.forms(model.prepared.vehicle) if f.name == "on the rotors")
+    k_d = 0.0 if drag is None or "independent" in drag[0].name else float(np.mean(drag[1]))
+    return Finding(
+        id="steady_wind",
+        status="established",
+        form=form if k_d else None,
+        values=tuple(float(k_d * x) for x in w),
+        equation="v_air = v − Rᵀ w",
+        sentence=effect.sentence,
+        parameters=tuple(
+            Estimate(f"w_{axis}", float(x), "m/s", float(x - 1.96 * s), float(x + 1.96 * s))
+            for axis, x, s in zip(("north", "east"), w, sd, strict=True)
+        ),
+        p_value=float(np.exp(-0.5 * min(1400.0, np.sum((w / sd) ** 2)))),
+        channels=("force_x", "force_y"),
+    )
+
+
+def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full_speed: float) -> list[Finding]:
+    """Findings between command and rotor speed."""
+    effects = catalogue()
+    out = []
+    channels = tuple(f"rotor_speed_{i + 1}" for i in range(prepared.vehicle.rotor_count)) if measured else ("force_z",)
+    for key, form in result.fit.chain:
+        where = result.fit.slice_of(key)
+        values = result.fit.values[where]
+        sd = np.sqrt(np.diag(result.fit.covariance)[where])
+        parameters = tuple(
+            Estimate(p.symbol, float(v), p.unit, float(v - 1.96 * s), float(v + 1.96 * s))
+            for p, v, s in zip(form.parameters, values, sd, strict=True)
+        )
+        alternatives = result.alternatives[key]
+        beyond = ()
+        if key == "command_saturation":
+            beyond = saturation_windows(prepared.segments, values[0] * full_speed, form.name == "upper limit")
+        out.append(
+            Finding(
+                id=key,
+                status="ambiguous" if alternatives else "established",
+                values=tuple(float(v) for v in values),
+                equation=form.equation,
+                sentence=effects[key].sentence,
+                parameters=parameters,
+                p_value=result.p_values[key],
+                channels=channels,
+                alternatives=tuple(sorted({key, *alternatives})) if alternatives else (),
+                windows=beyond,
+            )
+        )
+    for key, reason in result.dropped.items():
+        if key not in {f.id for f in out}:
+            out.append(
+                Finding(id=key, status="not_established", sentence=f"{effects[key].name} did not hold: {reason}")
+            )
+    return out
+
+
+def throttle_or_thrust(finding: Finding) -> Finding:
+    """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
+    if finding.id != "thrust_curve" or finding.status not in ("established", "ambiguous"):
+        return finding
+    both = tuple(sorted({"thrust_curve", "throttle_curve", *finding.alternatives}))
+    return replace(finding, status="ambiguous", alternatives=both)
+
+
+def absorbed_findings(model: WrenchModel, values: dict, findings: list[Finding]) -> list[Finding]:
+    """Effects that look significant while the wrong values are held at their belief, and vanish with them."""
+    if not values:
+        return []
+    search = model.search
+    held = [k for k in search.always if k not in values]
+    base = model.regression.fit(held + model.selection.active)
+    taken = {f.id for f in findings}
+    out: dict[str, Finding] = {}
+    for term in model.regression.terms:
+        if term.kind != "effect" or term.effect in taken or term.effect in out:
+            continue
+        fit = model.regression.fit([*held, *model.selection.active, term.key])
+        p = model.regression.wald(fit, model.regression.columns([term.key]), search.blocks)
+        if p < ABSORBED_P and fit.gain - base.gain > 50:
+            name = catalogue()[term.effect].name
+            out[term.effect] = Finding(
+                id=term.effect,
+                status="absorbed",
+                sentence=f"{name} looked significant with the believed values; the refitted values explain it",
+                p_value=p,
+            )
+    return list(out.values())
+
+
+def contract_values(vehicle: Vehicle, values: dict) -> dict[str, tuple[float, float, float, float]]:
+    """Wrong values under the names of vehicle.yaml: believed, refitted and its interval."""
+    out = {}
+    for key, (relative, sd) in values.items():
+        believed = believed_value(vehicle, key)
+        out[PARAMETER_NAMES[key]] = tuple(
+            float(believed * (1 + x)) for x in (0.0, relative, relative - 1.96 * sd, relative + 1.96 * sd)
+        )
+    return out
+
+
+def believed_value(vehicle: Vehicle, key: str) -> float:
+    """The number that a value's name stands for (the mean over rotors of coefficients)."""
+    if key == "mass":
+        return vehicle.mass_kg
+    if key == "thrust":
+        return float(vehicle.thrust_coefficients_n_s2().mean())
+    if key == "torque":
+        return float(vehicle.torque_coefficients_n_m_s2().mean())
+    if key == "arm":
+        return 1.0
+    return getattr(vehicle.inertia_kg_m2, key[-2:])
+
+
+def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
+    """The vehicle with values changed by relative amounts."""
+    change = {}
+    for key, name in (("thrust", "thrust_coefficient_n_s2"), ("torque", "torque_coefficient_n_m_s2")):
+        if key in relative:
+            old = getattr(vehicle, name)
+            factor = 1 + relative[key]
+            change[name] = tuple(v * factor for v in old) if isinstance(old, tuple) else old * factor
+    if "mass" in relative:
+        change["mass_kg"] = vehicle.mass_kg * (1 + relative["mass"])
+    inertia = {k[-2:]: 1 + v for k, v in relative.items() if k.startswith("inertia")}
+    if inertia:
+        old = vehicle.inertia_kg_m2
+        change["inertia_kg_m2"] = old.model_copy(update={k: getattr(old, k) * f for k, f in inertia.items()})
+    if "arm" in relative:
+        f = 1 + relative["arm"]
+        change["rotors"] = tuple(r.model_copy(update={"x_m": r.x_m * f, "y_m": r.y_m * f}) for r in vehicle.rotors)
+    return vehicle.model_copy(update=change)
+
+
+def offsets_of(model: WrenchModel) -> list[str]:
+    """Nuisance terms that every fit carries."""
+    return [t.key for t in model.regression.terms if t.kind in ("nuisance", "wind")]
+
+
+def make_traces(
+    prepared, model: WrenchModel, found, measured: bool, plain_values: dict, values: dict
+) -> tuple[Trace, ...]:
+    """Residual of every channel before refitting, after refitting and with the effects.
+
+    Only values that are clearly wrong are refitted: the others stay as believed, as in the improved vehicle.
+    """
+    regression = model.regression
+    loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
+    plain = regression.fit(offsets_of(model) + list(plain_values), loose=loose)
+    full = regression.fit(offsets_of(model) + list(values) + model.selection.active, loose=loose)
+    out = []
+    for r, segment in zip(model.rows, prepared.segments, strict=True):
+        before = r.y
+        if found is not None and not measured:
+            groups = residual(segment, prepared.vehicle)
+            before = np.full_like(r.y, np.nan)
+            for index, group in enumerate(("force", "moment")):
+                if group in groups:
+                    before[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
+        refitted = r.y - r.x[:, :, plain.columns] @ plain.beta
+        after = r.y - r.x[:, :, full.columns] @ full.beta
+        for c in range(6):
+            if np.isfinite(r.y[:, c]).all():
+                unit = UNITS[CHANNELS[c].split("_")[0]]
+                out.append(Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], refitted[:, c], after[:, c]))
+        if found is not None and measured:
+            result: SpeedResult = found[0]
+            path = commanded_path(segment, result.fit.chain, result.fit.values, result.fit.shift_s, *found[1:])
+            believed = prepared.thinner(segment.motion.rotor_speed - segment.command)
+            left = prepared.thinner(segment.motion.rotor_speed - path)
+            for i in range(believed.shape[1]):
+                name = f"rotor_speed_{i + 1}"
+                out.append(Trace(r.run, name, "rad/s", r.time_s, believed[:, i], believed[:, i], left[:, i]))
+    return tuple(out)
+
+
+def noise_floors(prepared: Prepared, model: WrenchModel, found, measured: bool) -> dict[str, float]:
+    """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain."""
+    out = {CHANNELS[c]: float(model.noise[c]) for c in range(6) if np.isfinite(model.noise[c])}
+    if found is not None and measured and found[0].noise_rad_s is not None:
+        gain = float(np.sqrt((prepared.thinner.kernel**2).sum()))
+        for i in range(prepared.vehicle.rotor_count):
+            out[f"rotor_speed_{i + 1}"] = found[0].noise_rad_s * gain
+    return out
+
+
+def regimes_by_run(segments, prepared: Prepared) -> dict[str, dict[str, np.ndarray]]:
+    """Regime variables of every run, its stretches one after the other."""
+    out: dict[str, dict[str, np.ndarray]] = {}
+    for s in segments:
+        own = regime_variables(s, prepared)
+        if s.run not in out:
+            out[s.run] = own
+            continue
+        shared = [k for k in out[s.run] if k in own]
+        out[s.run] = {k: np.concatenate([out[s.run][k], own[k]]) for k in shared}
+    return out
+
+
+def saturation_windows(segments, limit_rad_s: float, upper: bool) -> tuple[tuple[str, float, float], ...]:
+    """Stretches in which a command goes beyond a limit, closer than 0.3 s taken together."""
+    out = []
+    for s in segments:
+        beyond = (s.command > limit_rad_s if upper else s.command < limit_rad_s).any(axis=1)
+        times = s.motion.time_s
+        for start, stop in stretches(beyond):
+            begin, end = float(times[start]), float(times[stop - 1])
+            if out and out[-1][0] == s.run and begin - out[-1][2] < 0.3:
+                out[-1] = (s.run, out[-1][1], end)
+            else:
+                out.append((s.run, begin, end))
+    return tuple(out)
+
+
+def together(findings: list[Finding]) -> list[Finding]:
+    """Findings with the windows of one id (several gusts) as one."""
+    out: dict[str, Finding] = {}
+    for f in findings:
+        first = out.get(f.id)
+        if first is None or not f.windows or not first.windows:
+            out.setdefault(f.id if first is None else f"{f.id}/{len(out)}", f)
+            continue
+        better = first if first.p_value <= f.p_value else f
+        out[f.id] = replace(better, windows=first.windows + f.windows)
+    return list(out.values())

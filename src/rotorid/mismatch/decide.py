@@ -1,0 +1,204 @@
+"""From the selected terms to a word on each id: intervals, held-out gain, sameness between runs, alternatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+
+import numpy as np
+from scipy.stats import t as student
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
+from rotorid.mismatch.rows import CHANNELS, Rows
+from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
+
+COST_PER_VALUE = 12.0
+"""Whitened squares that a further wrong value must explain."""
+MOST_VALUES = 3
+MOST_DISTRUST = 9.0
+WIDEST_TRUST = 0.1
+VALUE_FLOOR = 0.002
+"""Relative one-sigma that no estimate of a value here is better than (filters, timing)."""
+VALUE_P = 5e-4
+VALUE_Z = 3.5
+"""A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""
+SMALLEST_CHANGE = 0.015
+"""A relative change below this is no wrong value: no laboratory knows its numbers better."""
+BOOTSTRAPS = 400
+
+
+def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of a term and their covariance."""
+    cols = regression.columns([key])
+    where = [list(fit.columns).index(c) for c in cols]
+    return fit.beta[where], fit.covariance[np.ix_(where, where)]
+
+
+def estimates(regression: Regression, fit: Fit, search: Search, key: str) -> tuple[Estimate, ...]:
+    """Linear parameters of a term with 95 % intervals: within runs and between them."""
+    term = search.terms[key]
+    beta, covariance = coefficients(regression, fit, key)
+    spread, p = regression.between_runs(fit, key)
+    variance = np.diag(covariance) + (spread if p < 0.05 else 0.0)
+    reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
+    out = []
+    for index, value, sd in zip(term.form.linear, beta, np.sqrt(variance), strict=False):
+        parameter = term.form.parameters[index]
+        out.append(Estimate(parameter.symbol, float(value), parameter.unit, value - reach * sd, value + reach * sd))
+    return tuple(out)
+
+
+def predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
+    """What columns add to the residual, (n, 12)."""
+    return rows.x[:, :, cols] @ beta
+
+
+def held_out_gain(
+    rows: list[Rows], regression: Regression, with_it: Fit, without: Fit, channel: int, held: list[np.ndarray]
+) -> tuple[float, float, float] | None:
+    """rmse with / without a term in its main channel on held-out samples, with a block-bootstrap interval."""
+    energies = []
+    for r, mask in zip(rows, held, strict=True):
+        if not mask.any():
+            continue
+        a = (r.y - predicted(r, with_it.columns, with_it.beta))[mask, channel]
+        b = (r.y - predicted(r, without.columns, without.beta))[mask, channel]
+        count = max(1, len(a) // 40)
+        energies += [
+            (float(x @ x), float(y @ y))
+            for x, y in zip(np.array_split(a, count), np.array_split(b, count), strict=True)
+        ]
+    if len(energies) < 4:
+        return None
+    e = np.array(energies)
+    rng = np.random.default_rng(1)
+    draws = e[rng.integers(0, len(e), (BOOTSTRAPS, len(e)))].sum(axis=1)
+    ratios = np.sqrt(draws[:, 0] / draws[:, 1])
+    low, high = np.quantile(ratios, [0.025, 0.975])
+    return float(np.sqrt(e[:, 0].sum() / e[:, 1].sum())), float(low), float(high)
+
+
+def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray) -> list[int]:
+    """Channels in which a contribution is at least a third of its strongest, the strongest first."""
+    energy = np.zeros(12)
+    for r in rows:
+        energy += (predicted(r, cols, beta) ** 2).sum(axis=0)
+    size = np.sqrt(energy / sum(len(r.y) for r in rows)) / np.where(np.isfinite(noise), noise, np.inf)
+    order = np.argsort(-size)
+    return [int(c) for c in order if size[c] > 0.33 * size[order[0]]]
+
+
+def wrench_findings(
+    rows: list[Rows],
+    regression: Regression,
+    search: Search,
+    selection: Selection,
+    noise: np.ndarray,
+    held: list[np.ndarray],
+    nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
+) -> list[Finding]:
+    """A finding for every term that entered, and for those that looked like something and did not survive."""
+    effects = catalogue()
+    findings = []
+    for key in selection.active:
+        term = search.terms[key]
+        effect = effects[term.effect]
+        beta, _ = coefficients(regression, selection.fit, key)
+        rest = [k for k in selection.active if k != key]
+        without = regression.fit(search.always + rest)
+        with_it = regression.fit(search.always + selection.active)
+        channels = main_channels(rows, regression.columns([key]), beta, noise)
+        alternatives = search.alternatives(key, selection.active)
+        status = "ambiguous" if alternatives else "established"
+        values = np.array(term.values, float)
+        if term.form.linear:
+            values[list(term.form.linear)] = beta
+        parameters = estimates(regression, selection.fit, search, key) if term.form.linear else ()
+        if key in nonlinear:
+            values, sd = nonlinear[key]
+            parameters = tuple(
+                Estimate(p.symbol, float(v), p.unit, float(v - 1.96 * s), float(v + 1.96 * s))
+                for p, v, s in zip(term.form.parameters, values, sd, strict=True)
+            )
+        findings.append(
+            Finding(
+                id=term.effect,
+                status=status,
+                form=term.form,
+                values=tuple(float(v) for v in values),
+                equation=term.form.equation,
+                sentence=effect.sentence,
+                parameters=parameters,
+                p_value=selection.p_values[key],
+                channels=tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels),
+                alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
+                gain=held_out_gain(rows, regression, with_it, without, channels[0], held),
+                windows=(term.window,) if term.window else (),
+            )
+        )
+    for effect_id, reason in selection.not_established.items():
+        effect = effects[effect_id]
+        findings.append(
+            Finding(id=effect_id, status="not_established", sentence=f"{effect.name} did not hold: {reason}")
+        )
+    return findings
+
+
+def wrong_values(
+    regression: Regression,
+    search: Search,
+    selection: Selection,
+    reverse: Regression | None,
+    size_of: Callable[[str, float], float],
+) -> dict[str, tuple[float, float]]:
+    """The fewest believed values that must change: relative change and one-sigma.
+
+    Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
+    counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
+    sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
+    side (`reverse`: measured moments as regressors) agrees, and where it matters: SMALLEST_CHANGE, and a size in
+    units of the noise (`size_of(key, relative change)`).
+    """
+    nuisance = [t.key for t in regression.terms if t.kind in ("nuisance", "wind")]
+    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
+    always = nuisance + selection.active
+    loose = {key: max(sd, WIDEST_TRUST) for key, sd in trust.items()}
+    count = int(regression.training.sum())
+
+    def penalised(keys: list[str]) -> float:
+        fit = regression.fit(always + keys, loose=loose)
+        cost = 0.0
+        for key in keys:
+            beta, _ = coefficients(regression, fit, key)
+            cost += COST_PER_VALUE + min((beta[0] / trust[key]) ** 2, MOST_DISTRUST)
+        return fit.gain - cost
+
+    subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]
+    named = max(subsets, key=penalised)
+    while named:
+        fit = regression.fit(always + named, loose=loose)
+        other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
+        doubtful = {}
+        for key in named:
+            beta, covariance = coefficients(regression, fit, key)
+            change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
+            check = float(coefficients(reverse or regression, other, key)[0][0])
+            noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
+            agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
+            matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
+            p = regression.wald(fit, regression.columns([key]), count)
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or not agrees or not matters:
+                doubtful[key] = abs(change) / sd
+        if not doubtful:
+            break
+        named.remove(min(doubtful, key=doubtful.get))
+    if not named:
+        return {}
+    fit = regression.fit(always + named, jackknife=True, loose=loose)
+    out = {}
+    for key in named:
+        beta, covariance = coefficients(regression, fit, key)
+        out[key] = (float(beta[0]), float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR)))
+    return out

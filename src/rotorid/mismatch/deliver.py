@@ -1,0 +1,54 @@
+"""From a recording set to the three files of its verdict."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+from rotorid.mismatch.analyse import analyse
+from rotorid.mismatch.findings import Analysis
+from rotorid.mismatch.forward import forward_channels, prove
+from rotorid.mismatch.improve import improved_vehicle
+from rotorid.mismatch.locate import locate
+from rotorid.mismatch.page import make_page
+from rotorid.mismatch.verdict import Verdict, make_verdict
+from rotorid.recordings import RecordingSet, read_vehicle, write_vehicle
+
+LOG = logging.getLogger(__name__)
+
+
+def deliver(
+    recordings: RecordingSet,
+    verdict_path: Path,
+    page_path: Path,
+    improved_path: Path,
+    progress: Callable[[str], None] = LOG.info,
+) -> Verdict:
+    """Analyse a set and write its verdict, its page and the improved vehicle."""
+    progress(f"{recordings.name}: analysing {len(recordings.runs)} runs")
+    return write_files(analyse(recordings), verdict_path, page_path, improved_path, progress)
+
+
+def write_files(
+    analysis: Analysis,
+    verdict_path: Path,
+    page_path: Path,
+    improved_path: Path,
+    progress: Callable[[str], None] = LOG.info,
+) -> Verdict:
+    """Write what an analysis amounts to; the improved vehicle is read back and simulated as proof."""
+    for path in (verdict_path, page_path, improved_path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    progress("locating")
+    locations = locate(analysis)
+    progress("running the simulation forward")
+    write_vehicle(improved_vehicle(analysis), improved_path)
+    forward = forward_channels(analysis)
+    prove(analysis, read_vehicle(improved_path), forward)
+    verdict = make_verdict(analysis, locations, forward.channels)
+    verdict_path.write_text(verdict.text(), encoding="utf-8")
+    progress("drawing")
+    page_path.write_text(make_page(analysis, verdict, forward.notes), encoding="utf-8")
+    progress(verdict.sentence)
+    return verdict

@@ -1,0 +1,434 @@
+"""What lies between command and rotor speed: lag, delay, throttle curve, sag, saturation.
+
+Where speeds are measured beside the commands they are the response; where only commands (or throttle) are
+recorded the response is the wrench, and the believed values are free throughout. In both cases a chain of speed
+forms is fitted by nonlinear least squares on whitened residuals, grown one id at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+from scipy.stats import chi2
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import SpeedForm, SpeedPath
+from rotorid.effects.delay import shifted
+from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.regression import at_least, autoregression
+from rotorid.signal import kernels
+
+ENTER_P = 1e-5
+COST_PER_PARAMETER = 10.0
+SMALLEST_SIZE = 0.15
+MOST_SAMPLES = 40_000
+"""Rotor-speed samples per fit; longer recordings are represented by stretches spread over all runs."""
+
+Chain = tuple[tuple[str, SpeedForm], ...]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Even stretch of commands; `start` is its offset in seconds from the run's beginning."""
+
+    segment: Segment
+    block_s: float = 1.0
+
+
+@dataclass(frozen=True)
+class SpeedFit:
+    """A fitted chain. `values` holds the parameters of every form in order; `shift_s` is a nuisance."""
+
+    chain: Chain
+    values: np.ndarray
+    shift_s: float
+    cost: float
+    covariance: np.ndarray | None = None
+    inflation: float = 1.0
+
+    def of(self, effect_id: str) -> tuple[SpeedForm, np.ndarray]:
+        """Form and values of one id."""
+        at = 0
+        for key, form in self.chain:
+            size = len(form.parameters)
+            if key == effect_id:
+                return form, self.values[at : at + size]
+            at += size
+        raise KeyError(effect_id)
+
+    def slice_of(self, effect_id: str) -> slice:
+        """Where the id's parameters stand in `values`."""
+        at = 0
+        for key, form in self.chain:
+            if key == effect_id:
+                return slice(at, at + len(form.parameters))
+            at += len(form.parameters)
+        raise KeyError(effect_id)
+
+
+@dataclass(frozen=True)
+class SpeedResult:
+    """What the search found."""
+
+    fit: SpeedFit
+    p_values: dict[str, float]
+    alternatives: dict[str, tuple[str, ...]]
+    sizes: dict[str, float]
+    dropped: dict[str, str] = field(default_factory=dict)
+    noise_rad_s: float | None = None
+    """One-sigma of the rotor speed residual, where speeds are measured."""
+
+
+def commanded_path(
+    segment: Segment, chain: Chain, values: np.ndarray, shift_s: float, full_speed: float, full_voltage: float | None
+) -> np.ndarray:
+    """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands."""
+    motion = segment.motion
+    path = SpeedPath(segment.command, motion.time_s, full_speed, motion.voltage, full_voltage)
+    steps, at = [], 0
+    for _, form in chain:
+        steps.append((form.stage, form.apply, values[at : at + len(form.parameters)]))
+        at += len(form.parameters)
+    steps.append((3, shifted, np.array([shift_s])))
+    for _, apply, own in sorted(steps, key=lambda s: s[0]):
+        path = replace(path, speed=apply(path, own))
+    return path.speed
+
+
+class SpeedProblem:
+    """Whitened residual of a chain over the training segments; subclasses say what the response is."""
+
+    def __init__(self, segments: list[Segment], full_speed: float, full_voltage: float | None):
+        self.segments = segments
+        self.full_speed = full_speed
+        self.full_voltage = full_voltage
+        self.filters: list[np.ndarray] | None = None
+        self.shift_prior_s = 0.5 / segments[0].rate_hz
+
+    def path(self, segment: Segment, chain: Chain, values, shift_s: float) -> np.ndarray:
+        return commanded_path(segment, chain, values, shift_s, self.full_speed, self.full_voltage)
+
+    def raw(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
+        """Residual of every segment, (n, channels), unwhitened."""
+        raise NotImplementedError
+
+    rate_hz: float = 0.0
+
+    def whitened(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
+        out = []
+        for part in self.raw(chain, values, shift_s):
+            if self.filters is None:
+                out.append(part / self.scale)
+                continue
+            longest = max(len(f) for f in self.filters) - 1
+            white = np.stack([lfilter(f, [1.0], part[:, j]) for j, f in enumerate(self.filters)], axis=1)
+            out.append(white[longest:])
+        return out
+
+    def learn_noise(self, chain: Chain, values, shift_s: float) -> None:
+        """Take the residual of a rich chain as the noise."""
+        parts = self.raw(chain, values, shift_s)
+        self.filters = [autoregression([p[:, j] for p in parts]) for j in range(parts[0].shape[1])]
+
+    def fit(self, chain: Chain, start: np.ndarray, shift_s: float = 0.0) -> SpeedFit:
+        """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds."""
+        low = np.array([p.low for _, f in chain for p in f.parameters] + [-2 * self.shift_prior_s])
+        high = np.array([p.high for _, f in chain for p in f.parameters] + [2 * self.shift_prior_s])
+        x0 = np.clip(np.append(start, shift_s), low + 1e-9, high - 1e-9)
+        scale = np.where(np.abs(x0) > 1e-3, np.abs(x0), 0.02)
+        scale[-1] = self.shift_prior_s
+
+        def function(x):
+            rows = np.concatenate([w.ravel() for w in self.whitened(chain, x[:-1], x[-1])])
+            return np.append(rows, x[-1] / self.shift_prior_s)
+
+        found = least_squares(
+            function, x0, bounds=(low, high), x_scale=scale, diff_step=1e-4, max_nfev=25, ftol=1e-5, xtol=1e-5
+        )
+        return SpeedFit(chain, found.x[:-1], float(found.x[-1]), 2 * found.cost)
+
+    def with_covariance(self, fit: SpeedFit) -> SpeedFit:
+        """The fit with a covariance that is robust against what whitening left (blocks of a second)."""
+        x = np.append(fit.values, fit.shift_s)
+        base = self.whitened(fit.chain, x[:-1], x[-1])
+        columns = []
+        for j in range(len(x)):
+            step = 1e-4 * max(abs(x[j]), 1e-2 if j < len(x) - 1 else self.shift_prior_s)
+            up = x.copy()
+            up[j] += step
+            moved = self.whitened(fit.chain, up[:-1], up[-1])
+            columns.append([(b - a) / step for a, b in zip(base, moved, strict=True)])
+        per = max(2, int(round(self.rate_hz)))
+        gram = np.zeros((len(x), len(x)))
+        scores = []
+        for k, residual in enumerate(base):
+            jacobian = np.stack([c[k] for c in columns], axis=-1)
+            for part in np.array_split(np.arange(len(residual)), max(1, len(residual) // per)):
+                flat = jacobian[part].reshape(-1, len(x))
+                gram += flat.T @ flat
+                scores.append(flat.T @ residual[part].ravel())
+        gram[-1, -1] += 1.0 / self.shift_prior_s**2
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        inverse = np.linalg.pinv(gram * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
+        scores = np.array(scores)
+        robust = inverse @ (scores.T @ scores) @ inverse
+        covariance = at_least(robust, inverse)
+        ratio = np.diag(covariance)[:-1] / np.maximum(np.diag(inverse)[:-1], 1e-300)
+        inflation = float(np.median(ratio)) if len(ratio) else 1.0
+        return replace(fit, covariance=covariance[:-1, :-1], inflation=max(1.0, inflation))
+
+
+class MeasuredSpeed(SpeedProblem):
+    """Response: the measured rotor speeds."""
+
+    def __init__(self, segments, full_speed, full_voltage):
+        super().__init__(segments, full_speed, full_voltage)
+        self.rate_hz = segments[0].rate_hz
+        spread = np.concatenate([(s.motion.rotor_speed - s.command).ravel() for s in segments]).std()
+        self.scale = max(float(spread), 1e-9)
+
+    def raw(self, chain, values, shift_s):
+        return [s.motion.rotor_speed - self.path(s, chain, values, shift_s) for s in self.segments]
+
+
+class WrenchOnly(SpeedProblem):
+    """Response: force and moment; `residual_of(segment, speed)` gives thinned rows (n, c) and columns (n, c, q)."""
+
+    def __init__(self, segments, full_speed, full_voltage, rate_hz, residual_of: Callable, precision: np.ndarray):
+        super().__init__(segments, full_speed, full_voltage)
+        self.rate_hz, self.residual_of, self.precision = rate_hz, residual_of, precision
+        self.columns = [residual_of(s, s.command, True)[1] for s in segments]
+        rows = np.concatenate([residual_of(s, s.command, False)[0] for s in segments])
+        self.scale = np.maximum(rows.std(axis=0), 1e-12)
+
+    def refresh(self, fit: SpeedFit) -> None:
+        """Recompute the believed values' columns at the path found."""
+        self.columns = [
+            self.residual_of(s, self.path(s, fit.chain, fit.values, fit.shift_s), True)[1] for s in self.segments
+        ]
+
+    def raw(self, chain, values, shift_s):
+        return [self.residual_of(s, self.path(s, chain, values, shift_s), False)[0] for s in self.segments]
+
+    def whitened(self, chain, values, shift_s):
+        rows = super().whitened(chain, values, shift_s)
+        columns = self._white_columns()
+        size = columns[0].shape[-1]
+        gram = sum(np.einsum("ncp,ncq->pq", c, c) for c in columns) + np.diag(self.precision)
+        cross = sum(np.einsum("ncp,nc->p", c, r) for c, r in zip(columns, rows, strict=True))
+        beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) / size * np.eye(size), cross)
+        return [r - c @ beta for r, c in zip(rows, columns, strict=True)]
+
+    def _white_columns(self):
+        key = (id(self.filters), id(self.columns))
+        if getattr(self, "_cached_key", None) != key:
+            out = []
+            for part in self.columns:
+                if self.filters is None:
+                    out.append(part / self.scale[:, None])
+                    continue
+                longest = max(len(f) for f in self.filters) - 1
+                white = np.stack([lfilter(f, [1.0], part[:, j], axis=0) for j, f in enumerate(self.filters)], axis=1)
+                out.append(white[longest:])
+            self._cached, self._cached_key = out, key
+        return self._cached
+
+    def learn_noise(self, chain, values, shift_s):
+        parts = self.raw(chain, values, shift_s)
+        # The believed values must not count as noise.
+        weight = 1.0 / self.scale
+        size = self.columns[0].shape[-1]
+        gram = np.diag(self.precision) + 1e-12 * np.eye(size)
+        cross = np.zeros(size)
+        for c, r in zip(self.columns, parts, strict=True):
+            gram = gram + np.einsum("ncp,ncq,c->pq", c, c, weight**2)
+            cross = cross + np.einsum("ncp,nc,c->p", c, r, weight**2)
+        beta = np.linalg.solve(gram, cross)
+        left = [r - c @ beta for r, c in zip(parts, self.columns, strict=True)]
+        self.filters = [autoregression([p[:, j] for p in left]) for j in range(left[0].shape[1])]
+
+
+def candidate_forms(segments: list[Segment]) -> list[tuple[str, SpeedForm]]:
+    """Every speed form that this set can test."""
+    voltage = all(s.motion.voltage is not None for s in segments)
+    return [
+        (effect.id, form)
+        for effect in catalogue().values()
+        for form in effect.speed_forms
+        if voltage or "voltage" not in form.requires
+    ]
+
+
+def starts_of(form: SpeedForm) -> list[np.ndarray]:
+    """Starting values: the grid of nonlinear parameters (kept equal where there are several), else neutral."""
+    grids = [p.starts if p.nonlinear and p.starts else (n,) for p, n in zip(form.parameters, form.neutral, strict=True)]
+    if sum(len(g) > 1 for g in grids) > 1:
+        return [np.array(v) for v in zip(*grids, strict=True)]
+    return [np.array(v) for v in product(*grids)]
+
+
+class SpeedSearch:
+    """Grow the chain one id at a time, replace forms, prune, and look for alternatives."""
+
+    def __init__(self, problem: SpeedProblem, forms: list[tuple[str, SpeedForm]]):
+        self.problem, self.forms = problem, forms
+
+    def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
+        """The chain of `base` plus one form, from each of the form's starts; the cheapest."""
+        fits = []
+        ordered = sorted(starts_of(added), key=lambda s: self._quick(chain, np.append(base.values, s), base.shift_s))
+        for start in ordered[:1]:
+            fits.append(self.problem.fit(chain, np.append(base.values, start), base.shift_s))
+        return min(fits, key=lambda f: f.cost)
+
+    def _quick(self, chain, values, shift_s) -> float:
+        return sum(float((w**2).sum()) for w in self.problem.whitened(chain, values, shift_s))
+
+    def rich_noise(self) -> None:
+        """Learn the noise from the richest chain: one form of every id, in two rounds."""
+        rich = {}
+        for key, form in self.forms:
+            if key in ("motor_lag", "throttle_curve", "battery_sag") and key not in rich:
+                rich[key] = form
+        fit = self.problem.fit((), np.zeros(0))
+        for key, form in rich.items():
+            fit = self.best_fit((*fit.chain, (key, form)), fit, form)
+        if isinstance(self.problem, WrenchOnly):
+            self.problem.refresh(fit)
+        self.problem.learn_noise(fit.chain, fit.values, fit.shift_s)
+
+    def size(self, fit: SpeedFit, key: str) -> float:
+        """Change that an id makes to the whitened residual's own noise, strongest tenth of the seconds."""
+        kept = tuple((k, f) for k, f in fit.chain if k != key)
+        where = fit.slice_of(key)
+        values = np.delete(fit.values, np.arange(where.start, where.stop))
+        with_it = self.problem.raw(fit.chain, fit.values, fit.shift_s)
+        without = self.problem.raw(kept, values, fit.shift_s)
+        noise = np.sqrt(np.mean([np.mean(w**2, axis=0) for w in with_it], axis=0))
+        per = max(2, int(self.problem.rate_hz))
+        best = 0.0
+        for a, b in zip(with_it, without, strict=True):
+            count = len(a) // per
+            if count:
+                local = np.sqrt(((b - a)[: count * per].reshape(count, per, -1) ** 2).mean(axis=1))
+                best = max(best, float(np.quantile(local / np.maximum(noise, 1e-12), 0.9, axis=0).max()))
+        return best
+
+    def judge(self, base: SpeedFit, fit: SpeedFit, key: str) -> tuple[float, float, float]:
+        """p-value, score and inflation of an id that `fit` has and `base` has not."""
+        own = fit.slice_of(key)
+        count = own.stop - own.start
+        inflation = fit.inflation
+        gain = (base.cost - fit.cost) / inflation
+        return float(chi2.sf(max(gain, 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
+
+    def run(self) -> SpeedResult:
+        """The whole search."""
+        self.rich_noise()
+        current = self.problem.fit((), np.zeros(0))
+        dropped: dict[str, str] = {}
+        for _ in range(5):
+            taken = {k for k, _ in current.chain}
+            options = []
+            for key, form in self.forms:
+                if key in taken or key in dropped:
+                    continue
+                fit = self.problem.with_covariance(self.best_fit((*current.chain, (key, form)), current, form))
+                p, score, _ = self.judge(current, fit, key)
+                options.append((score, p, key, fit))
+            options.sort(key=lambda o: -o[0])
+            grown = False
+            for score, p, key, fit in options:
+                if score <= 0:
+                    break
+                if p > ENTER_P:
+                    continue
+                size = self.size(fit, key)
+                if size < SMALLEST_SIZE:
+                    dropped[key] = f"its size is {size:.2g} of the noise"
+                    continue
+                current, grown = fit, True
+                break
+            if not grown:
+                break
+            current = self._better_forms(current)
+            if isinstance(self.problem, WrenchOnly):
+                self.problem.refresh(current)
+                current = self.problem.fit(current.chain, current.values, current.shift_s)
+                current = self.problem.with_covariance(current)
+        current = self._pruned(current, dropped)
+        if current.covariance is None:
+            current = self.problem.with_covariance(current)
+        p_values, alternatives, sizes = {}, {}, {}
+        for key, _ in current.chain:
+            base = self._without(current, key)
+            p_values[key] = self.judge(base, current, key)[0]
+            sizes[key] = self.size(current, key)
+            alternatives[key] = self._alternatives(current, base, key)
+        noise = None
+        if isinstance(self.problem, MeasuredSpeed):
+            parts = self.problem.raw(current.chain, current.values, current.shift_s)
+            noise = float(np.sqrt(np.mean([np.mean(p**2) for p in parts])))
+        return SpeedResult(current, p_values, alternatives, sizes, dropped, noise)
+
+    def _without(self, fit: SpeedFit, key: str) -> SpeedFit:
+        where = fit.slice_of(key)
+        chain = tuple((k, f) for k, f in fit.chain if k != key)
+        values = np.delete(fit.values, np.arange(where.start, where.stop))
+        return self.problem.fit(chain, values, fit.shift_s)
+
+    def _better_forms(self, fit: SpeedFit) -> SpeedFit:
+        """Try the other forms of each id in the chain; the cheapest for its parameters stays."""
+        for key in [k for k, _ in fit.chain]:
+            base = self._without(fit, key)
+            best = fit
+            for other, form in self.forms:
+                if other != key or form is fit.of(key)[0]:
+                    continue
+                tried = self.problem.with_covariance(self.best_fit((*base.chain, (key, form)), base, form))
+                if self.judge(base, tried, key)[1] > self.judge(base, best, key)[1]:
+                    best = tried
+            fit = best
+        return fit
+
+    def _pruned(self, fit: SpeedFit, dropped: dict[str, str]) -> SpeedFit:
+        changed = True
+        while changed and fit.chain:
+            changed = False
+            for key, _ in fit.chain:
+                base = self._without(fit, key)
+                if fit.covariance is None:
+                    fit = self.problem.with_covariance(fit)
+                p, score, _ = self.judge(base, fit, key)
+                if p > ENTER_P or score <= 0:
+                    dropped[key] = f"p = {p:.2g} beside the others"
+                    fit, changed = self.problem.with_covariance(base) if base.chain else base, True
+                    break
+        return fit
+
+    def _alternatives(self, fit: SpeedFit, base: SpeedFit, key: str) -> tuple[str, ...]:
+        """Ids that explain as much in the place of `key`: not worse by more than a coin's doubt."""
+        own = base.cost - fit.cost
+        taken = {k for k, _ in fit.chain}
+        found = []
+        for other, form in self.forms:
+            if other in taken or other in found:
+                continue
+            tried = self.best_fit((*base.chain, (other, form)), base, form)
+            lost = (own - (base.cost - tried.cost)) / fit.inflation
+            if lost < 9.0 and base.cost - tried.cost > 0.5 * own:
+                found.append(other)
+        return tuple(found)
+
+
+def smoothed_acceleration(speed: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
+    """Derivative of rotor speeds (n, k) at full length, rad/s2; the ends repeat the nearest full value."""
+    kernel = kernels.derivative(rate_hz, min(0.45 * rate_hz, 1.6 * cutoff_hz))
+    half = (len(kernel) - 1) // 2
+    inner = kernels.apply(kernel, speed)
+    return np.concatenate([np.repeat(inner[:1], half, axis=0), inner, np.repeat(inner[-1:], half, axis=0)])

@@ -1,0 +1,147 @@
+"""Numbers and names as a pilot reads them: the words of the verdict and of its page."""
+
+from __future__ import annotations
+
+import math
+
+from rotorid.effects.catalogue import catalogue
+
+AXIS = {"x": 0, "y": 1, "z": 2}
+FORCE_WORDS = ("forward force", "sideways force", "vertical force")
+MOMENT_WORDS = ("roll moment", "pitch moment", "yaw moment")
+FORWARD_WORDS = {
+    "position": "position after half a second",
+    "velocity": "velocity after half a second",
+    "attitude": "attitude after half a second",
+    "angular_velocity": "body rates after half a second",
+}
+REGIME_WORDS = {
+    "airspeed_m_s": ("airspeed", "m/s"),
+    "forward_speed_m_s": ("forward speed", "m/s"),
+    "sideward_speed_m_s": ("sideward speed", "m/s"),
+    "vertical_speed_over_hover_inflow": ("speed of descent over hover inflow", ""),
+    "height_over_rotor_radius": ("height over rotor radius", ""),
+    "height_m": ("height", "m"),
+    "rotor_speed_rad_s": ("mean rotor speed", "rad/s"),
+    "rotor_acceleration_rad_s2": ("rate of the rotor speed", "rad/s²"),
+    "tilt_rad": ("tilt", "rad"),
+    "body_rate_rad_s": ("body rate", "rad/s"),
+    "battery_voltage_v": ("battery voltage", "V"),
+    "voltage_v": ("battery voltage", "V"),
+    "time_s": ("time", "s"),
+}
+"""Regime variables in words, with their unit; any other is named from its column."""
+UNIT_SUFFIXES = (
+    ("_rad_s2", "rad/s²"),
+    ("_rad_s", "rad/s"),
+    ("_m_s2", "m/s²"),
+    ("_m_s", "m/s"),
+    ("_n_m", "N m"),
+    ("_rad", "rad"),
+    ("_hz", "Hz"),
+    ("_n", "N"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_v", "V"),
+    ("_a", "A"),
+    ("_c", "°C"),
+)
+PARAMETER_WORDS = {
+    "mass_kg": ("mass", "kg"),
+    "thrust_coefficient_n_s2": ("thrust coefficient", "N s²"),
+    "torque_coefficient_n_m_s2": ("torque coefficient", "N m s²"),
+    "inertia_xx_kg_m2": ("roll inertia", "kg m²"),
+    "inertia_yy_kg_m2": ("pitch inertia", "kg m²"),
+    "inertia_zz_kg_m2": ("yaw inertia", "kg m²"),
+    "arm_scale": ("rotors' distances, as a factor on those believed,", ""),
+    "rotor_speed_limits_rad_s": ("rotor speed at full throttle", "rad/s"),
+}
+
+
+def channel_words(channel: str) -> str:
+    """A channel's name for a person: `force_y` is the sideways force."""
+    if channel in FORWARD_WORDS:
+        return FORWARD_WORDS[channel]
+    group, _, last = channel.rpartition("_")
+    if group == "force" and last in AXIS:
+        return FORCE_WORDS[AXIS[last]]
+    if group == "moment" and last in AXIS:
+        return MOMENT_WORDS[AXIS[last]]
+    if group == "rotor_speed":
+        return f"speed of rotor {last}"
+    return channel.replace("_", " ")
+
+
+def regime_words(variable: str) -> tuple[str, str]:
+    """Name and unit of a regime variable."""
+    if variable in REGIME_WORDS:
+        return REGIME_WORDS[variable]
+    for suffix, unit in UNIT_SUFFIXES:
+        if variable.endswith(suffix):
+            return variable.removesuffix(suffix).replace("_", " "), unit
+    return variable.replace("_", " "), ""
+
+
+def parameter_words(name: str) -> tuple[str, str]:
+    """Name and unit of a value of vehicle.yaml."""
+    return PARAMETER_WORDS[name] if name in PARAMETER_WORDS else regime_words(name)
+
+
+def effect_words(effect_id: str) -> str:
+    """What a pilot calls an id, fits before "was left out"."""
+    effect = catalogue().get(effect_id)
+    return effect.name if effect else effect_id.replace("_", " ")
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """A number to so many significant digits: plain from 0.0001 to 99 999, else with an exponent."""
+    if value is None or not math.isfinite(value):
+        return "unknown"
+    if value == 0:
+        return "0"
+    value = float(f"{value:.{digits - 1}e}")
+    exponent = math.floor(math.log10(abs(value)))
+    if -4 <= exponent < 5:
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    return f"{value / 10.0**exponent:.{digits - 1}f}e{exponent}"
+
+
+def plus_minus(value: float, low: float | None, high: float | None) -> str:
+    """`5.1e-5 ± 0.2e-5`: half the interval to one digit (two below a 3), the value to the same place.
+
+    An interval many times the value says that the recordings do not determine it.
+    """
+    if low is None or high is None or not all(map(math.isfinite, (value, low, high))) or high <= low:
+        return number(value, 3)
+    half = (high - low) / 2
+    if half > 5 * max(abs(value), abs(low + high) / 2):
+        return "not determined"
+    place = math.floor(math.log10(half))
+    if half / 10.0**place < 3:
+        place -= 1
+    exponent = math.floor(math.log10(max(abs(value), half)))
+    if -3 <= exponent < 5:
+        exponent = 0
+    decimals = max(exponent - place, 0)
+    tail = f"e{exponent}" if exponent else ""
+    scale = 10.0**exponent
+    return f"{value / scale:.{decimals}f}{tail} ± {half / scale:.{decimals}f}{tail}"
+
+
+def sure(p_value: float) -> str:
+    """How sure a p-value makes one: never more than 99.9 %, which no model of noise deserves."""
+    if p_value < 1e-3:
+        return "more than 99.9 % sure"
+    return f"{100 * (1 - p_value):.{1 if p_value < 0.1 else 0}f} % sure"
+
+
+def listed(names: list[str], last: str = "and") -> str:
+    """`a, b and c`."""
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} {last} {names[-1]}"
+
+
+def capital(text: str) -> str:
+    """The text with its first letter raised."""
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,397 @@
+"""The model of force, moment and sensor effects: rows, whitening, search and refinement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter
+
+from rotorid.effects.contract import Form
+from rotorid.mismatch.bursts import gust_terms, windows
+from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
+from rotorid.mismatch.regression import AGREEMENT, Regression, autoregression, build, full_fit_residuals
+from rotorid.mismatch.rows import Rows, Term, residual
+from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.speedpath import (
+    MeasuredSpeed,
+    SpeedResult,
+    SpeedSearch,
+    WrenchOnly,
+    candidate_forms,
+    commanded_path,
+    smoothed_acceleration,
+)
+
+LONGEST_BLOCKS = 400
+
+
+@dataclass
+class WrenchModel:
+    """Rows, regression and selection of the wrench and sensor effects."""
+
+    prepared: Prepared
+    terms: list[Term]
+    rows: list[Rows]
+    regression: Regression
+    search: Search
+    selection: Selection
+    noise: np.ndarray
+    """Noise of each of the twelve channels in the band of the rows."""
+    wind: np.ndarray | None = None
+    """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
+    wind_sd: np.ndarray | None = None
+
+
+def block_seconds(rows: list[Rows], rate_hz: float) -> float:
+    """Length of a block: a second, longer where a recording would give more than LONGEST_BLOCKS."""
+    seconds = sum(len(r.y) for r in rows) / rate_hz
+    return max(1.0 if seconds > 40 else 0.5, seconds / LONGEST_BLOCKS)
+
+
+def channel_floor() -> np.ndarray:
+    """Smallest noise ever assumed per channel: what two instruments must differ by to be worth a word."""
+    floor = np.zeros(12)
+    floor[6:9], floor[9:12] = AGREEMENT["accelerometer"], AGREEMENT["gyroscope"]
+    return floor
+
+
+def wrench_model(
+    prepared: Prepared,
+    terms: list[Term],
+    effects: list[tuple[Form, np.ndarray]] | None = None,
+    start: list[str] | None = None,
+    segments: list[Segment] | None = None,
+    noisy_segments: list[Segment] | None = None,
+    known_sizes: np.ndarray | None = None,
+) -> WrenchModel:
+    """Assemble, whiten, reduce and search."""
+    segments = prepared.segments if segments is None else segments
+    noisy_segments = prepared.noisy_segments if noisy_segments is None else noisy_segments
+    rows = assemble_rows(prepared, terms, segments, effects)
+    noisy = assemble_rows(prepared, terms, noisy_segments, effects) if noisy_segments else None
+    precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
+    left, _ = full_fit_residuals(rows, precision)
+    present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
+    floor = channel_floor()
+    filters = {c: autoregression([r[:, c] for r in left], floor[c]) for c in present}
+    noise = np.full(12, np.nan)
+    for c in present:
+        noise[c] = np.hypot(np.concatenate([r[:, c] for r in left]).std(), floor[c])
+    rate = prepared.thinner.rate_hz
+    regression = build(
+        rows, terms, filters, training_rule(prepared.split, segments), block_seconds(rows, rate), rate, noisy
+    )
+    per = max(2, int(rate))
+
+    def sizes_of(key: str, beta: np.ndarray) -> np.ndarray:
+        short = any(t.key == key and t.run for t in terms)
+        return local_sizes(rows, regression.columns([key]), beta, noise, per, 1.0 if short else 0.9)
+
+    search = Search(regression, sizes_of, known_sizes)
+    return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
+
+
+def local_sizes(
+    rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray, per: int, quantile: float = 0.9
+) -> np.ndarray:
+    """Strongest tenth of the seconds of a contribution per channel, in units of the channel's noise, (12,)."""
+    return sizes_of_parts([r.x[:, :, cols] @ beta for r in rows], noise, per, quantile)
+
+
+def sizes_of_parts(parts: list[np.ndarray], noise: np.ndarray, per: int, quantile: float = 0.9) -> np.ndarray:
+    """Quantile over seconds of the rms of contributions (n, 12), in units of the noise; the largest of all parts."""
+    best = np.zeros(12)
+    for part in parts:
+        count = len(part) // per
+        if count:
+            local = np.sqrt((part[: count * per].reshape(count, per, 12) ** 2).mean(axis=1))
+            best = np.fmax(best, np.quantile(local, quantile, axis=0) / noise)
+    return np.nan_to_num(best)
+
+
+def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full_voltage, cutoff_hz) -> list[Segment]:
+    """Segments whose rotor speeds are what the chain makes of the commands."""
+    out = []
+    for s in segments:
+        fit = result.fit
+        speed = commanded_path(s, fit.chain, fit.values, fit.shift_s, full_speed, full_voltage)
+        acceleration = smoothed_acceleration(speed, s.rate_hz, cutoff_hz)
+        out.append(replace(s, motion=replace(s.motion, rotor_speed=speed, rotor_acceleration=acceleration)))
+    return out
+
+
+def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None = None):
+    """Search between command and rotor speed; None where no command is recorded, or nothing can show it."""
+    segments = [s for s in prepared.segments if s.run in prepared.split.training]
+    if not segments or any(s.command is None for s in segments):
+        return None
+    vehicle = prepared.vehicle
+    limits = vehicle.rotor_speed_limits_rad_s
+    full_speed = limits[1] if limits else max(float(s.command.max()) for s in segments)
+    voltages = [s.motion.voltage for s in prepared.segments]
+    full_voltage = max(float(v.max()) for v in voltages) if all(v is not None for v in voltages) else None
+    if segments[0].measured_speed:
+        problem = MeasuredSpeed(segments, full_speed, full_voltage)
+    else:
+        groups = [g for g in ("force", "moment") if g in prepared.groups]
+        if not groups:
+            return None
+        terms = [t for t in prepared.terms if t.kind != "effect"]
+        precision = np.concatenate([1 / np.square(np.array(t.prior_sd)) for t in terms])
+        keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
+
+        def residual_of(segment: Segment, speed: np.ndarray, columns: bool):
+            moved = replace(segment, motion=replace(segment.motion, rotor_speed=speed))
+            if columns:
+                r = assemble_rows(prepared, terms, [moved], known)[0]
+                return r.y[:, keep], r.x[:, keep]
+            parts = residual(moved, vehicle)
+            for form, values in known or []:
+                extra = form.contribution(moved.motion, vehicle, values)
+                for name in groups:
+                    if getattr(extra, name) is not None:
+                        parts[name] = parts[name] - getattr(extra, name)
+            return np.concatenate([prepared.thinner(parts[g]) for g in groups], axis=1), None
+
+        problem = WrenchOnly(segments, full_speed, full_voltage, prepared.thinner.rate_hz, residual_of, precision)
+    return SpeedSearch(problem, candidate_forms(segments)).run(), full_speed, full_voltage
+
+
+def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:
+    """Forms in the model with their parameter values (nonlinear ones at their present point)."""
+    found = []
+    for key in model.selection.active:
+        term = model.search.terms[key]
+        cols = model.regression.columns([key])
+        where = [list(model.selection.fit.columns).index(c) for c in cols]
+        values = np.array(term.values, float)
+        if term.form.linear:
+            values[list(term.form.linear)] = model.selection.fit.beta[where]
+        found.append((term.form, values))
+    return found
+
+
+def refine_nonlinear(prepared: Prepared, model: WrenchModel, segments) -> dict[str, np.ndarray]:
+    """Best nonlinear parameters of the active terms by a profile over each (others linear, free), bounded."""
+    active = model.selection.active
+    refined = {}
+    for key in active:
+        term = model.search.terms[key]
+        others = [t for t in model.terms if t.kind != "effect" or (t.key in active and t.key != key)]
+        values = np.array(term.values, float)
+        for index in term.form.nonlinear:
+            values[index] = _profiled(prepared, model, others, term, values, index, segments)
+        if term.form.nonlinear:
+            refined[key] = values
+    return refined
+
+
+def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: int, segments) -> float:
+    """The value of one nonlinear parameter that leaves the least, searched within a factor of six of its start."""
+    parameter, start = term.form.parameters[index], values[index]
+
+    def cost(log_factor: float) -> float:
+        trial = values.copy()
+        trial[index] = start * np.exp(log_factor)
+        moved = replace(term, values=tuple(trial))
+        return profile_cost(prepared, model, [*others, moved], segments, fixed_gain=not term.form.linear)
+
+    low = np.log(max(parameter.low, start / 6, 1e-9) / start)
+    high = np.log(min(parameter.high, start * 6) / start)
+    found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
+    return float(start * np.exp(found.x))
+
+
+def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Values and one-sigma of every parameter of the active terms that have nonlinear ones.
+
+    One Gauss-Newton step with the slopes of the nonlinear parameters as columns; a form without linear parameters
+    has its contribution at gain one.
+    """
+    active = [model.search.terms[k] for k in model.selection.active]
+    if not any(t.form.nonlinear for t in active):
+        return {}
+    values = dict(zip([t.key for t in active], [v for _, v in chosen(model)], strict=True))
+    terms = [t for t in model.terms if t.kind != "effect"]
+    fixed = []
+    for term in active:
+        at = tuple(float(v) for v in values[term.key])
+        if term.form.linear:
+            terms.append(replace(term, values=at))
+        else:
+            fixed.append(replace(term, values=at))
+        terms += [
+            Term(f"slope:{term.key}/{i}", "slope", term.effect, term.form, at, 1, (np.inf,), slope_of=i)
+            for i in term.form.nonlinear
+        ]
+    rows = assemble_rows(prepared, terms + fixed, segments, chosen(model))
+    width = sum(t.size for t in terms)
+    rows = [replace(r, y=r.y - r.x[:, :, width:].sum(axis=2), x=r.x[:, :, :width]) for r in rows]
+    rate = prepared.thinner.rate_hz
+    regression = build(
+        rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
+    )
+    fit = regression.fit([t.key for t in terms], jackknife=True)
+    out = {}
+    for term in active:
+        if not term.form.nonlinear:
+            continue
+        centre, sd = values[term.key].copy(), np.zeros(len(term.form.parameters))
+        if term.form.linear:
+            cols = regression.columns([term.key])
+            centre[list(term.form.linear)] = fit.beta[cols]
+            sd[list(term.form.linear)] = np.sqrt(np.diag(fit.covariance)[cols])
+        for i in term.form.nonlinear:
+            col = regression.columns([f"slope:{term.key}/{i}"])[0]
+            sd[i] = np.sqrt(fit.covariance[col, col])
+        out[term.key] = (centre, sd)
+    return out
+
+
+def profile_cost(prepared: Prepared, model: WrenchModel, terms: list[Term], segments, fixed_gain: bool) -> float:
+    """Whitened training squares with the linear coefficients of `terms` free (the last at gain one if asked)."""
+    training = [s for s in segments if s.run in prepared.split.training]
+    rows = assemble_rows(prepared, terms, training, chosen(model))
+    size = rows[0].x.shape[2]
+    gram, cross, square = np.zeros((size, size)), np.zeros(size), 0.0
+    for r in rows:
+        for c, taps in model_filters(model).items():
+            y = lfilter(taps, [1.0], r.y[:, c])[12:]
+            x = lfilter(taps, [1.0], r.x[:, c], axis=0)[12:]
+            if fixed_gain:
+                y = y - x[:, -1]
+                x = x[:, :-1]
+                gram[:-1, :-1] += x.T @ x
+                cross[:-1] += x.T @ y
+            else:
+                gram += x.T @ x
+                cross += x.T @ y
+            square += float(y @ y)
+    precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
+    gram += np.diag(precision) + 1e-9 * np.diag(np.diag(gram)) + 1e-12 * np.eye(size)
+    return square - float(cross @ np.linalg.solve(gram, cross))
+
+
+FEELS_THE_AIR = (
+    "rotor_drag",
+    "frame_drag",
+    "translational_lift",
+    "axial_inflow",
+    "flapping_moment",
+    "rotor_interference",
+)
+
+
+def in_wind(segments: list[Segment], wind: np.ndarray) -> list[Segment]:
+    """Segments whose air moves over ground by `wind` (north, east), m/s."""
+    air = np.array([wind[0], wind[1], 0.0])
+    return [replace(s, motion=replace(s.motion, wind=air)) for s in segments]
+
+
+def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
+    """The model with drag and lift built on airspeed, where a steady wind and drag were both found.
+
+    The wind is fitted by Gauss-Newton through every effect that feels the air (a linear wind column would leave
+    part of the drag and lift to other names); then the search is repeated in that wind.
+    """
+    active = model.selection.active
+    wind_key = next((k for k in active if k.startswith("steady_wind/")), None)
+    felt = [k for k in active if model.search.terms[k].effect in FEELS_THE_AIR]
+    if wind_key is None or not felt:
+        return model
+    wind = first_wind(model, wind_key)
+    if wind is None:
+        return model
+    kept = [t for t in terms if t.effect != "steady_wind"]
+    active = [k for k in active if k != wind_key]
+    always = [t for t in terms if t.kind != "effect"]
+    wind_term = Term("wind", "wind", "steady_wind", size=2, prior_sd=(np.inf, np.inf))
+    effects = [c for k, c in zip(model.selection.active, chosen(model), strict=True) if k != wind_key]
+    rate = prepared.thinner.rate_hz
+    for _ in range(4):
+        moved = in_wind(segments, wind)
+        own = [*always, *[model.search.terms[k] for k in active], wind_term]
+        rows = assemble_rows(prepared, own, moved, effects)
+        regression = build(
+            rows, own, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
+        )
+        fit = regression.fit([t.key for t in own], jackknife=True)
+        step = fit.beta[-2:]
+        wind = wind + np.clip(step, -3.0, 3.0)
+        at = len(fit.beta) - 2 - sum(model.search.terms[k].size for k in active)
+        updated = []
+        for k, (form, values) in zip(active, effects, strict=True):
+            size = model.search.terms[k].size
+            values = values.copy()
+            if form.linear:
+                values[list(form.linear)] = fit.beta[at : at + size]
+            updated.append((form, values))
+            at += size
+        effects = updated
+        if np.abs(step).max() < 0.01:
+            break
+    sd = np.sqrt(np.diag(fit.covariance)[-2:])
+    again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
+    if not any(again.search.terms[k].effect in FEELS_THE_AIR for k in again.selection.active):
+        return model
+    again.wind, again.wind_sd = wind, sd
+    return again
+
+
+def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
+    """Wind (north, east), m/s, from a linear wind column and the drag beside it; None without a drag to divide by."""
+    values = dict(zip(model.selection.active, chosen(model), strict=True))
+    form, force = values[wind_key]
+    drag = next((values[k] for k in values if k.startswith("rotor_drag/")), None)
+    speed = np.mean([r for s in model.prepared.segments for r in s.motion.rotor_speed.sum(axis=1)[::50]])
+    if form.name == "on the airframe":
+        force = force / speed
+    if drag is not None:
+        k_d = np.mean(drag[1]) if "independent" not in drag[0].name else drag[1][0] / speed
+        return force / k_d if k_d > 0 else None
+    return np.zeros(2) + 0.5 * np.sign(force)
+
+
+def after_residual(model: WrenchModel) -> list[np.ndarray]:
+    """Residual rows with the selected effects, (n, 12) per segment."""
+    full = model.regression.fit(model.search.always + model.selection.active)
+    return [r.y - r.x[:, :, full.columns] @ full.beta for r in model.rows]
+
+
+def with_gusts(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
+    """The model with gusts in the windows that its residual shows; the same model where there are none."""
+    if "force" not in prepared.groups or any(s.motion.rotation is None for s in segments):
+        return model
+    gusts = []
+    for rows, left, segment in zip(model.rows, after_residual(model), segments, strict=True):
+        index = np.searchsorted(segment.motion.time_s, rows.time_s).clip(0, segment.motion.size - 1)
+        found = windows(left[:, :3], segment.motion.rotation[index], rows.time_s)
+        gusts += gust_terms(segment.run, found)
+    if not gusts:
+        return model
+    again = wrench_model(prepared, terms + gusts, chosen(model), model.selection.active, segments, noisy)
+    again.wind, again.wind_sd = model.wind, model.wind_sd
+    return again
+
+
+def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
+    """Whitening filters that the model's regression was built with."""
+    return model.regression.filters
+
+
+def reverse_regression(prepared: Prepared, model: WrenchModel, segments) -> Regression:
+    """The values and selected effects with the measured moments as regressors instead of the predicted ones.
+
+    Noise in the rotor speeds pulls the usual estimate one way, noise in the body rates pulls this one the other
+    way: the truth lies between (Frisch bounds).
+    """
+    active = [model.search.terms[k] for k in model.selection.active]
+    terms = [t for t in model.terms if t.kind != "effect"] + active
+    rows = assemble_rows(prepared, terms, segments, chosen(model), measured_moment=True)
+    rate = prepared.thinner.rate_hz
+    return build(
+        rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
+    )

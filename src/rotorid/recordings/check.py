@@ -1,0 +1,181 @@
+"""What a recording set contains and what it lacks, in words for a person.
+
+For each run: samples, duration, rate, gaps and the share of empty cells; for the set: which columns are
+there, which are not and what that means for testing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rotorid.recordings import columns as c
+from rotorid.recordings.files import read_set
+from rotorid.recordings.run import RecordingSet, Run
+
+GAP_FACTOR = 3.0
+"""A step of the clock longer than this many median steps is a gap."""
+
+
+@dataclass(frozen=True)
+class RunCheck:
+    """Sampling of one run."""
+
+    name: str
+    samples: int
+    duration_s: float
+    rate_hz: float
+    gaps: int
+    longest_gap_s: float
+    empty: dict[str, float]
+    """Share of empty cells of each column that has any, 0 to 1."""
+    value_rate_hz: dict[str, float]
+    """How often a column with empty cells has a value."""
+
+
+@dataclass(frozen=True)
+class SetCheck:
+    """Contents of a set."""
+
+    name: str
+    kind: str
+    rotors: int
+    runs: tuple[RunCheck, ...]
+    columns: tuple[str, ...]
+    other_columns: tuple[str, ...]
+    lacks: tuple[str, ...]
+    """One sentence for each thing that is missing: what it is and what cannot be tested without it."""
+
+    def as_dict(self) -> dict:
+        return asdict(self)
+
+
+def check_run(run: Run) -> RunCheck:
+    """Sampling of one run."""
+    steps = np.diff(run.time_s)
+    median = float(np.median(steps))
+    gaps = steps[steps > GAP_FACTOR * median]
+    duration = float(run.time_s[-1] - run.time_s[0])
+    empty = {n: float(run.table[n].isna().mean()) for n in run.table.columns if run.table[n].isna().any()}
+    return RunCheck(
+        name=run.name,
+        samples=len(run.table),
+        duration_s=duration,
+        rate_hz=1 / median,
+        gaps=len(gaps),
+        longest_gap_s=float(gaps.max()) if len(gaps) else 0.0,
+        empty=empty,
+        value_rate_hz={n: (1 - share) * len(run.table) / duration for n, share in empty.items()},
+    )
+
+
+def _lacks_of_flight(has, count: int) -> list[str]:
+    lacks = []
+    speeds = has(*c.rotor_columns("rotor_speed", count))
+    commands = has(*c.rotor_columns("rotor_command", count))
+    throttles = has(*c.rotor_columns("throttle", count))
+    if not speeds and not commands and not throttles:
+        lacks.append("No rotor speeds, commands or throttles: no thrust can be predicted.")
+    elif not speeds:
+        lacks.append(
+            "No measured rotor speeds: a lag of the motors shows only through the forces, and battery sag, "
+            "throttle curve and thrust curve cannot be told apart well."
+        )
+    elif not commands and not throttles:
+        lacks.append("No commands: motor lag, throttle curve, saturation and delays of the motors cannot be tested.")
+    force = has(*c.SPECIFIC_FORCE)
+    moving = has(*c.VELOCITY) or has(*c.POSITION)
+    attitude = has(*c.QUATERNION)
+    if not force and moving and attitude:
+        lacks.append("No accelerometer: forces come from the derivative of the velocity, with its noise.")
+    elif not force and not (moving and attitude):
+        partly = [name for name in c.SPECIFIC_FORCE if has(name)]
+        known = f" except {', '.join(partly)}" if partly else ""
+        lacks.append(f"No accelerometer, no velocity with attitude: force channels are missing{known}.")
+    if not has(*c.ANGULAR_VELOCITY):
+        lacks.append(
+            "No body rates: moments come from the second derivative of the attitude, with its noise."
+            if attitude
+            else "Neither body rates nor attitude: moment channels are missing."
+        )
+    if not attitude:
+        lacks.append("No attitude: wind and forces in world axes cannot be told from forces in body axes.")
+    if not moving:
+        lacks.append(
+            "No velocity or position: rotor drag, frame drag, translational lift, axial inflow and wind "
+            "cannot be tested."
+        )
+    if not has(c.HEIGHT) and not has("position_z_m"):
+        lacks.append("No height: ground effect cannot be tested.")
+    if not has(c.BATTERY_VOLTAGE):
+        lacks.append("No battery voltage: battery sag shows only as a drift in time.")
+    return lacks
+
+
+def check_set(recordings: RecordingSet) -> SetCheck:
+    """What a set contains and lacks."""
+    vehicle = recordings.vehicle
+
+    def has(*names: str) -> bool:
+        return any(run.has(*names) for run in recordings.runs)
+
+    lacks: list[str] = []
+    if vehicle.kind == "flight":
+        lacks = _lacks_of_flight(has, vehicle.rotor_count)
+        if vehicle.ground_z_m is None and not has(c.HEIGHT):
+            lacks.append("vehicle.yaml has no ground_z_m and no run has height_m: height is unknown.")
+    elif vehicle.kind == "stand":
+        if not any(has(name) for name in c.FORCE + c.MOMENT):
+            lacks.append("No force or moment: nothing can be compared.")
+        if not has(*c.rotor_columns("rotor_speed", vehicle.rotor_count)):
+            lacks.append("No rotor speeds: unequal rotors and a displaced sensor cannot be told apart.")
+        if not has(*c.MOUNT):
+            lacks.append("No roll and pitch of the mount: it is taken as level.")
+        if not has(c.BATTERY_VOLTAGE):
+            lacks.append("No battery voltage: battery sag shows only as a drift in time.")
+    else:
+        for force, reference in zip(c.FORCE, c.REFERENCE_FORCE, strict=True):
+            if has(force) != has(reference):
+                lacks.append(f"{force} and {reference} are not both there: that axis cannot be compared.")
+    if len(recordings.runs) == 1:
+        lacks.append("One run only: blocks of it are held out, and repeatability between runs is unknown.")
+    columns = list(dict.fromkeys(name for run in recordings.runs for name in run.table.columns))
+    return SetCheck(
+        name=recordings.name,
+        kind=vehicle.kind,
+        rotors=vehicle.rotor_count,
+        runs=tuple(check_run(run) for run in recordings.runs),
+        columns=tuple(name for name in columns if c.is_known(name)),
+        other_columns=tuple(name for name in columns if not c.is_known(name)),
+        lacks=tuple(lacks),
+    )
+
+
+def as_text(check: SetCheck) -> str:
+    """A page of plain text."""
+    lines = [f"{check.name}: kind {check.kind}, {check.rotors} rotors, {len(check.runs)} runs", ""]
+    width = max(len(run.name) for run in check.runs)
+    for run in check.runs:
+        gaps = f", {run.gaps} gaps (longest {run.longest_gap_s:.3g} s)" if run.gaps else ", no gaps"
+        lines.append(
+            f"  {run.name:<{width}}  {run.samples} samples, {run.duration_s:.2f} s at {run.rate_hz:.4g} Hz{gaps}"
+        )
+        groups: dict[tuple[float, float], list[str]] = {}
+        for name, share in run.empty.items():
+            groups.setdefault((round(share, 3), round(run.value_rate_hz[name], 1)), []).append(name)
+        for (share, rate), names in groups.items():
+            listed = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} like it"
+            lines.append(f"  {'':<{width}}  {listed}: {share:.0%} empty, a value {rate:g} times a second")
+    lines += ["", "Columns: " + ", ".join(check.columns)]
+    if check.other_columns:
+        lines.append("Kept as regime variables: " + ", ".join(check.other_columns))
+    lines.append("")
+    lines += [f"- {sentence}" for sentence in check.lacks] or ["Nothing that the contract knows is missing."]
+    return "\n".join(lines) + "\n"
+
+
+def check_folder(folder: Path) -> SetCheck:
+    """Read a set and check it; InputError if it does not fit the contract."""
+    return check_set(read_set(Path(folder)))

@@ -1,0 +1,163 @@
+"""Rigid-body residuals of a flight: measured wrench minus the believed rotors' wrench, channel by channel.
+
+Measured (body axes, forward-right-down): force m f with the specific force f, moment J Ω̇ + Ω × J Ω (thesis
+eqs 4.10 to 4.19). Believed: F = (0, 0, -Σ C_F ω²), M = Σ (r_i × F_i) + Σ s_i C_Q ω_i² along z.
+
+Measured and modelled wrench pass the same zero-phase filter, so neither amplitude nor delay differs between
+the two sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from rotorid.errors import InputError
+from rotorid.recordings import Run, Vehicle
+from rotorid.recordings import columns as c
+
+CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+TOTALS = ("force", "moment")
+"""Over three axes: sqrt(mean of the three squares), the convention of the NeuroBEM paper's table."""
+ORDER = 2
+
+
+def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
+    """Zero-phase Butterworth low-pass along the first axis, shape kept; -3 dB at `cutoff_hz`.
+
+    Forward and backward passes each attenuate, so the one-way filter's corner is set higher by
+    (√2 - 1)^(-1/4) for the second order used here.
+    """
+    corner = cutoff_hz * (np.sqrt(2) - 1) ** (-1 / (2 * ORDER))
+    if corner >= rate_hz / 2:
+        raise InputError(f"cutoff {cutoff_hz:g} Hz is too high for samples at {rate_hz:g} Hz")
+    return sosfiltfilt(butter(ORDER, corner, fs=rate_hz, output="sos"), values, axis=0)
+
+
+def measured_wrench(run: Run, vehicle: Vehicle, angular_acceleration: np.ndarray) -> np.ndarray:
+    """Force (N) and moment (N m) that act on the vehicle beside gravity, body axes, shape (n, 6).
+
+    Parameters
+    ----------
+    run
+        With `specific_force_*` and `angular_velocity_*`.
+    vehicle
+        Believed mass and inertia.
+    angular_acceleration
+        Ω̇, rad/s², body axes, shape (n, 3).
+    """
+    rates = run.array(c.ANGULAR_VELOCITY)
+    inertia = vehicle.inertia_kg_m2.matrix()
+    moment = angular_acceleration @ inertia + np.cross(rates, rates @ inertia)
+    return np.hstack([vehicle.mass_kg * run.array(c.SPECIFIC_FORCE), moment])
+
+
+def rotor_wrench(rotor_speeds: np.ndarray, vehicle: Vehicle) -> np.ndarray:
+    """Force (N) and moment (N m) of the believed rotors at speeds (n, rotors) in rad/s, shape (n, 6)."""
+    squared = rotor_speeds**2
+    thrust = squared * vehicle.thrust_coefficients_n_s2()
+    torque = squared * vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs()
+    x, y, _ = vehicle.rotor_positions_m().T
+    zero = np.zeros(len(thrust))
+    return np.column_stack([zero, zero, -thrust.sum(axis=1), -thrust @ y, thrust @ x, torque.sum(axis=1)])
+
+
+def airspeed(run: Run) -> np.ndarray:
+    """Speed in still air, m/s, shape (n,)."""
+    return np.linalg.norm(run.array(c.VELOCITY), axis=1)
+
+
+def rmse(residual: np.ndarray) -> dict[str, float]:
+    """Root mean square of each channel and of the totals, residual of shape (n, 6)."""
+    squares = np.mean(_squares(residual), axis=0)
+    return {name: float(np.sqrt(v)) for name, v in zip(CHANNELS + TOTALS, squares, strict=True)}
+
+
+def _squares(residual: np.ndarray) -> np.ndarray:
+    """Squares of the channels and, as columns 7 and 8, of the totals; shape (n, 8)."""
+    squares = residual**2
+    return np.column_stack([squares, squares[:, :3].mean(axis=1), squares[:, 3:].mean(axis=1)])
+
+
+@dataclass(frozen=True)
+class Binned:
+    """RMS residual in bins of airspeed with 95 % intervals; rows are bins, columns
+    the six channels and the two totals."""
+
+    low_m_s: np.ndarray
+    high_m_s: np.ndarray
+    samples: np.ndarray
+    rms: np.ndarray
+    rms_low: np.ndarray
+    rms_high: np.ndarray
+    growth: np.ndarray
+    """RMS in the fastest bin over RMS in the slowest, per channel."""
+    growth_95: np.ndarray
+    """Its 95 % interval, shape (8, 2)."""
+
+
+def by_airspeed(
+    residuals: Mapping[str, np.ndarray],
+    airspeeds: Mapping[str, np.ndarray],
+    times_s: Mapping[str, np.ndarray],
+    edges_m_s: Sequence[float],
+    block_s: float,
+    rng: np.random.Generator,
+    repeats: int = 400,
+    fewest_blocks: int = 5,
+) -> Binned:
+    """RMS residual against airspeed over all runs, intervals by resampling blocks of time.
+
+    Residuals are correlated in time, so whole blocks of `block_s` are drawn, not samples.
+
+    Parameters
+    ----------
+    residuals
+        Per run, shape (n, 6).
+    airspeeds, times_s
+        Per run, shape (n,).
+    edges_m_s
+        Edges of the bins.
+    block_s
+        Length of a block.
+    fewest_blocks
+        A bin seen in fewer blocks is left out.
+    """
+    edges = np.asarray(edges_m_s, float)
+    bins = len(edges) - 1
+    squares, counts = [], []
+    for name, residual in residuals.items():
+        which = np.digitize(airspeeds[name], edges) - 1
+        block = ((times_s[name] - times_s[name][0]) // block_s).astype(int)
+        inside = (which >= 0) & (which < bins)
+        total = np.zeros((block.max() + 1, bins, 8))
+        number = np.zeros((block.max() + 1, bins))
+        np.add.at(total, (block[inside], which[inside]), _squares(residual[inside]))
+        np.add.at(number, (block[inside], which[inside]), 1.0)
+        squares.append(total)
+        counts.append(number)
+    squares, counts = np.concatenate(squares), np.concatenate(counts)
+    kept = (counts > 0).sum(axis=0) >= fewest_blocks
+    squares, counts = squares[:, kept], counts[:, kept]
+    blocks = len(counts)
+    draws = rng.multinomial(blocks, np.full(blocks, 1 / blocks), size=repeats).astype(float)
+    number = draws @ counts
+    total = np.einsum("rb,bkc->rkc", draws, squares)
+    spread = np.sqrt(total / np.where(number > 0, number, np.nan)[:, :, None])
+    centre = np.sqrt(squares.sum(axis=0) / counts.sum(axis=0)[:, None])
+    low, high = np.nanpercentile(spread, [2.5, 97.5], axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a channel may have nothing left over
+        ratio, growth = spread[:, -1] / spread[:, 0], centre[-1] / centre[0]
+    return Binned(
+        low_m_s=edges[:-1][kept],
+        high_m_s=edges[1:][kept],
+        samples=counts.sum(axis=0).astype(int),
+        rms=centre,
+        rms_low=low,
+        rms_high=high,
+        growth=growth,
+        growth_95=np.nanpercentile(ratio, [2.5, 97.5], axis=0).T,
+    )

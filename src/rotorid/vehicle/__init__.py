@@ -1,0 +1,1 @@
+"""Vehicles in motion: rigid body, rotors, mixing, integration, simulation in windows."""

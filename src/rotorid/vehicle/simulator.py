@@ -1,0 +1,372 @@
+"""The general simulator: vehicles with motors, effects, disturbances, sensors and a controller, n at a time.
+
+Rigid body by quaternion inside, Euler angles outside. The controller and the disturbance are held over each
+step; the motion between is integrated by the classical Runge-Kutta method: compiled where no effect is
+switched on, by array code that calls the effects' own functions otherwise. A test holds that both fly the
+same.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import pandas as pd
+
+from rotorid.effects.contract import Form, Motion
+from rotorid.errors import InputError
+from rotorid.recordings import Run
+from rotorid.recordings import columns as c
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.attitude import (
+    euler_from_quaternion,
+    normalised,
+    quaternion_from_euler,
+    quaternion_rate,
+    rotation_from_quaternion,
+)
+from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
+from rotorid.vehicle.integrate import rk4_step
+
+MEMORY_ROUNDS = 4
+"""Flights simulated in a row where an effect has a memory of its own; each takes its wrench from the last."""
+
+
+class Controller(Protocol):
+    """Anything that turns time and measured attitude into rotor commands."""
+
+    def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
+        """Commanded rotor speeds (n, k), rad/s, from attitudes (n, 3), rad."""
+
+
+@dataclass(frozen=True)
+class Commands:
+    """A controller that plays commanded rotor speeds (m, k), rad/s, each held until the next time (m,), s."""
+
+    time_s: np.ndarray
+    rotor_speed: np.ndarray
+
+    def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
+        index = max(int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1, 0)
+        return np.broadcast_to(self.rotor_speed[index], (len(euler_rad), self.rotor_speed.shape[1]))
+
+
+@dataclass(frozen=True)
+class Motors:
+    """First-order lag of the rotor speeds behind their commands; 0 follows at once."""
+
+    time_up_s: float = 0.0
+    time_down_s: float | None = None
+    limits_rad_s: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Random force and moment on the airframe: Gauss-Markov, one sigma and correlation time."""
+
+    force_n: float = 0.0
+    moment_n_m: float = 0.0
+    correlation_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One sigma of white noise on each reading; 0 reads the truth."""
+
+    attitude_rad: float = 0.0
+    angular_velocity_rad_s: float = 0.0
+    angular_acceleration_rad_s2: float = 0.0
+    specific_force_m_s2: float = 0.0
+    velocity_m_s: float = 0.0
+    position_m: float = 0.0
+    rotor_speed_relative: float = 0.0
+
+
+@dataclass(frozen=True)
+class Start:
+    """States at the beginning, each (n, ...); the attitude as Euler angles, rad."""
+
+    position_m: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    velocity_m_s: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    euler_rad: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    angular_velocity_rad_s: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
+    rotor_speed_rad_s: np.ndarray | None = None
+    """(n, k); None starts at the first command."""
+
+    @property
+    def size(self) -> int:
+        return len(self.position_m)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What n vehicles did at m + 1 instants: arrays (n, m + 1, ...), SI units, the truth without noise.
+
+    Accelerations and moments are those at each instant under the rotor speeds of that instant.
+    """
+
+    time_s: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    quaternion: np.ndarray
+    angular_velocity: np.ndarray
+    angular_acceleration: np.ndarray
+    specific_force: np.ndarray
+    rotor_speed: np.ndarray
+    rotor_command: np.ndarray
+
+    @property
+    def euler_rad(self) -> np.ndarray:
+        """Roll, pitch, yaw, (n, m + 1, 3), rad; yaw unwound."""
+        euler = euler_from_quaternion(self.quaternion)
+        euler[..., 2] = np.unwrap(euler[..., 2], axis=1)
+        return euler
+
+
+def simulate(
+    vehicle: Vehicle,
+    controller: Controller,
+    duration_s: float,
+    step_s: float = 0.001,
+    start: Start | None = None,
+    motors: Motors | None = None,
+    effects: Sequence[tuple[Form, Sequence[float]]] = (),
+    disturbance: Disturbance | None = None,
+    noise: Noise | None = None,
+    rng: np.random.Generator | None = None,
+    wind_m_s: np.ndarray | None = None,
+    voltage_v: float | None = None,
+) -> Trace:
+    """Fly n vehicles (as many as `start` has) for `duration_s` in steps of `step_s`.
+
+    `effects` as from `rotorid.vehicle.improved.active_forms`. `noise` reaches the controller through the
+    measured attitude; readings with noise are made of the trace by `recording`. `rng` is needed with noise or
+    disturbance. `wind_m_s` (3,) is the velocity of the air, world axes. Heights come from the vehicle's
+    `ground_z_m`.
+    """
+    start, motors = start or Start(), motors or Motors()
+    noise, disturbance = noise or Noise(), disturbance or Disturbance()
+    random = noise.attitude_rad > 0 or disturbance.force_n > 0 or disturbance.moment_n_m > 0
+    if random and rng is None:
+        raise InputError("a simulation with noise or disturbance needs a random generator (rng)")
+    steps = int(round(duration_s / step_s))
+    if steps < 1:
+        raise InputError(f"duration_s {duration_s} is shorter than one step of {step_s} s")
+    instant = [(form, values) for form, values in effects if not has_memory(form)]
+    slow = [(form, values) for form, values in effects if has_memory(form)]
+    known = {"rotation", "velocity", "rotor_acceleration"}
+    known |= {"height"} if vehicle.ground_z_m is not None else set()
+    known |= {"voltage"} if voltage_v is not None else set()
+    check_effects(effects, known)
+    pushes = _pushes(disturbance, start.size, steps, step_s, rng)
+    readings = np.zeros((steps + 1, start.size, 3))
+    if noise.attitude_rad > 0:
+        readings = rng.normal(0.0, noise.attitude_rad, readings.shape)
+    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v)
+    trace = flight.fly(_fresh(controller), pushes, readings)
+    for _ in range(MEMORY_ROUNDS if slow else 0):
+        added = _wrench_of_memory(trace, vehicle, slow, flight)
+        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v)
+        trace = flight.fly(_fresh(controller), pushes + added, readings)
+    return trace
+
+
+def _fresh(controller: Controller) -> Controller:
+    """A copy of the controller as it is before the flight, so that a flight can be repeated."""
+    return copy.copy(controller)
+
+
+def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
+    """Force and moment of the disturbance, (steps + 1, n, 6), N and N m, body axes, held over each step."""
+    out = np.zeros((steps + 1, n, 6))
+    sigma = np.repeat([disturbance.force_n, disturbance.moment_n_m], 3)
+    if not sigma.any():
+        return out
+    keep = np.exp(-step_s / disturbance.correlation_s) if disturbance.correlation_s > 0 else 0.0
+    white = rng.normal(size=out.shape) * sigma
+    out[0] = white[0]
+    for i in range(steps):
+        out[i + 1] = keep * out[i] + np.sqrt(1 - keep**2) * white[i + 1]
+    return out
+
+
+class _Flight:
+    """One simulation: state columns rates 0:3, quaternion 3:7, velocity 7:10, position 10:13, rotors 13:."""
+
+    def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, voltage_v):
+        self.vehicle, self.motors, self.step_s = vehicle, motors, step_s
+        self.start, self.size = start, start.size
+        self.dynamics = Dynamics(vehicle, effects, start.size)
+        self.wind = None if wind_m_s is None else np.asarray(wind_m_s, float)
+        self.voltage = None if voltage_v is None else np.full(start.size, float(voltage_v))
+
+    def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
+        steps, k = len(pushes) - 1, self.vehicle.rotor_count
+        state = np.zeros((self.size, 13 + k))
+        state[:, 0:3] = self.start.angular_velocity_rad_s
+        state[:, 3:7] = quaternion_from_euler(self.start.euler_rad)
+        state[:, 7:10] = self.start.velocity_m_s
+        state[:, 10:13] = self.start.position_m
+        states = np.empty((steps + 1, self.size, 13 + k))
+        accelerations = np.empty((steps + 1, self.size, 6))
+        commands = np.empty((steps + 1, self.size, k))
+        for i in range(steps + 1):
+            time_s = i * self.step_s
+            euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[i]
+            command = np.asarray(controller.rotor_command(time_s, euler), float)
+            if command.shape != (self.size, k):
+                raise InputError(f"the controller gave commands {command.shape}, expected {(self.size, k)}")
+            if self.motors.limits_rad_s is not None:
+                command = np.clip(command, *self.motors.limits_rad_s)
+            if i == 0 and self.start.rotor_speed_rad_s is not None:
+                state[:, 13:] = self.start.rotor_speed_rad_s
+            elif i == 0 or self.motors.time_up_s == 0.0:
+                state[:, 13:] = command
+            self.command, self.push, self.now_s = command, pushes[i], time_s
+            rounds = 3 if i == 0 and self.dynamics.effects else 1
+            for _ in range(rounds):
+                self.derivative(0.0, state)
+            accelerations[i, :, :3] = self.dynamics.last_acceleration
+            accelerations[i, :, 3:] = self.dynamics.last_specific_force
+            states[i], commands[i] = state, command
+            if i < steps:
+                state = rk4_step(self.derivative, 0.0, state, self.step_s)
+                state[:, 3:7] = normalised(state[:, 3:7])
+        if not np.isfinite(states).all():
+            raise InputError(
+                "the simulation ran away (values not finite): check gains, inertia and the size of the step"
+            )
+        states, accelerations = np.moveaxis(states, 0, 1), np.moveaxis(accelerations, 0, 1)
+        return Trace(
+            time_s=self.step_s * np.arange(steps + 1),
+            position=states[..., 10:13],
+            velocity=states[..., 7:10],
+            quaternion=states[..., 3:7],
+            angular_velocity=states[..., 0:3],
+            angular_acceleration=accelerations[..., :3],
+            specific_force=accelerations[..., 3:],
+            rotor_speed=states[..., 13:],
+            rotor_command=np.moveaxis(commands, 0, 1),
+        )
+
+    def derivative(self, share: float, state: np.ndarray) -> np.ndarray:
+        rates, rotors = state[:, 0:3], state[:, 13:]
+        rotation = rotation_from_quaternion(state[:, 3:7])
+        out = np.empty_like(state)
+        out[:, 13:] = self._rotor_acceleration(rotors)
+        around = {}
+        if self.dynamics.effects:
+            ground = self.vehicle.ground_z_m
+            around = dict(
+                time_s=np.full(self.size, self.now_s + share * self.step_s),
+                rotor_acceleration=out[:, 13:],
+                rotation=rotation,
+                velocity=np.einsum("nji,nj->ni", rotation, state[:, 7:10]),
+                wind=self.wind,
+                height=None if ground is None else ground - state[:, 12],
+                voltage=self.voltage,
+            )
+        out[:, 0:3], specific_force = self.dynamics.accelerations(
+            rates, rotors, around, self.push[:, :3], self.push[:, 3:]
+        )
+        out[:, 3:7] = quaternion_rate(state[:, 3:7], rates)
+        out[:, 7:10] = np.einsum("nij,nj->ni", rotation, specific_force)
+        out[:, 9] += self.dynamics.body.gravity_m_s2
+        out[:, 10:13] = state[:, 7:10]
+        return out
+
+    def _rotor_acceleration(self, rotors: np.ndarray) -> np.ndarray:
+        if self.motors.time_up_s == 0.0:
+            return np.zeros_like(rotors)
+        down = self.motors.time_up_s if self.motors.time_down_s is None else self.motors.time_down_s
+        gap = self.command - rotors
+        return gap / np.where(gap > 0, self.motors.time_up_s, down)
+
+
+def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage_v=None) -> Motion:
+    """The true flight of one vehicle of a trace as the effects of the catalogue see it."""
+    rotation = rotation_from_quaternion(trace.quaternion[index])
+    ground = vehicle.ground_z_m
+    return Motion(
+        time_s=trace.time_s,
+        rotor_speed=trace.rotor_speed[index],
+        rotor_acceleration=np.gradient(trace.rotor_speed[index], trace.time_s, axis=0),
+        angular_velocity=trace.angular_velocity[index],
+        angular_acceleration=trace.angular_acceleration[index],
+        specific_force=trace.specific_force[index],
+        accelerometer=trace.specific_force[index],
+        gyroscope=trace.angular_velocity[index],
+        rotation=rotation,
+        velocity=np.einsum("nji,nj->ni", rotation, trace.velocity[index]),
+        wind=None if wind_m_s is None else np.asarray(wind_m_s, float),
+        height=None if ground is None else ground - trace.position[index, :, 2],
+        voltage=None if voltage_v is None else np.full(len(trace.time_s), float(voltage_v)),
+    )
+
+
+def _wrench_of_memory(trace: Trace, vehicle: Vehicle, slow, flight: _Flight) -> np.ndarray:
+    """Wrench of the forms with memory along a trace, (m + 1, n, 6)."""
+    out = np.zeros((len(trace.time_s), flight.size, 6))
+    voltage = None if flight.voltage is None else flight.voltage[0]
+    for index in range(flight.size):
+        motion = motion_of(trace, index, vehicle, flight.wind, voltage)
+        for form, values in slow:
+            added = form.contribution(motion, vehicle, np.asarray(values, float))
+            if added.force is not None:
+                out[:, index, :3] += added.force
+            if added.moment is not None:
+                out[:, index, 3:] += added.moment
+    return out
+
+
+def recording(
+    trace: Trace,
+    vehicle: Vehicle,
+    name: str,
+    noise: Noise | None = None,
+    rng: np.random.Generator | None = None,
+    index: int = 0,
+    effects: Sequence[tuple[Form, Sequence[float]]] = (),
+    every: int = 1,
+) -> Run:
+    """What the sensors wrote of one vehicle of a trace: a run in the contract's columns, every `every`-th
+    instant.
+
+    White `noise` on each reading; `effects` that act on sensors (bias, misalignment, lever arm) are added
+    first.
+    """
+    noise = noise or Noise()
+    rng = rng or np.random.default_rng(0)
+    specific_force, rates = trace.specific_force[index].copy(), trace.angular_velocity[index].copy()
+    motion = motion_of(trace, index, vehicle)
+    for form, values in effects:
+        added = form.contribution(motion, vehicle, np.asarray(values, float))
+        if added.specific_force is not None:
+            specific_force += added.specific_force
+        if added.angular_velocity is not None:
+            rates += added.angular_velocity
+
+    def read(values, sigma):
+        values = values[::every]
+        return values + rng.normal(0.0, 1.0, values.shape) * sigma
+
+    k = vehicle.rotor_count
+    speeds = read(trace.rotor_speed[index], noise.rotor_speed_relative * trace.rotor_speed[index][::every])
+    euler = rng.normal(0.0, 1.0, (len(trace.time_s[::every]), 3)) * noise.attitude_rad
+    quaternion = trace.quaternion[index][::every]
+    quaternion = normalised(quaternion + quaternion_rate(quaternion, euler))
+    columns = {
+        (c.TIME,): trace.time_s[::every, None],
+        c.rotor_columns("rotor_speed", k): speeds,
+        c.rotor_columns("rotor_command", k): trace.rotor_command[index][::every],
+        c.POSITION: read(trace.position[index], noise.position_m),
+        c.VELOCITY: read(trace.velocity[index], noise.velocity_m_s),
+        c.QUATERNION: quaternion,
+        c.ANGULAR_VELOCITY: read(rates, noise.angular_velocity_rad_s),
+        c.SPECIFIC_FORCE: read(specific_force, noise.specific_force_m_s2),
+    }
+    table = {n: values[:, i] for names, values in columns.items() for i, n in enumerate(names)}
+    return Run(name, pd.DataFrame(table))

@@ -1,0 +1,70 @@
+"""Emulated instruments on real pseudo-terminals, and recorders that do not wait long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from acquire.clock import SystemClock, VirtualClock
+from acquire.emulators.build import build
+from acquire.emulators.faults import Faults
+from acquire.emulators.ports import EmulatedPorts
+from acquire.emulators.truth import Truth
+from acquire.recorder import Recorder, Timings
+from acquire.transport import LoopbackTransport, SerialTransport
+from rotorid.io.wire import INSTRUMENTS
+
+QUICK = Timings(poll_s=0.02, reply_s=0.5, tries=3, silence_s=2.0, retry_open_s=0.002, reconnect_s=5.0)
+
+
+@pytest.fixture
+def plugged(tmp_path: Path) -> Iterator[Callable[..., EmulatedPorts]]:
+    """Plug an emulator in: `plugged("bench", Faults(...))` gives running ports with stable names."""
+    with ExitStack() as stack:
+
+        def plug(what: str, faults: Faults | None = None, truth: Truth | None = None, **options) -> EmulatedPorts:
+            world = build(what, truth or Truth(), faults=faults)
+            links = [tmp_path / f"tty{line.device.instrument.name}" for line in world.lines]
+            return stack.enter_context(EmulatedPorts(world, links, **options))
+
+        yield plug
+
+
+@pytest.fixture
+def recorder_on(tmp_path: Path) -> Callable[..., Recorder]:
+    """A recorder for a port, as the command line makes it, but without waiting for more bytes."""
+
+    def make(instrument: str, port: str, timings: Timings = QUICK, **options) -> Recorder:
+        known = INSTRUMENTS[instrument]
+        transport = SerialTransport(port, known.baud_rate, gather_s=0)
+        return Recorder(known, transport, SystemClock(), tmp_path, "run", timings=timings, **options)
+
+    return make
+
+
+@pytest.fixture
+def loopback(tmp_path: Path) -> Callable[..., tuple]:
+    """A world, and recorders on it, on a virtual clock."""
+
+    def make(what: str, faults: Faults | None = None, truth: Truth | None = None, **options) -> tuple:
+        world = build(what, truth or Truth(), faults=faults, **options)
+        clock = VirtualClock(datetime(2024, 3, 4, 15, tzinfo=UTC))
+        clock.follow(world.run_until)
+        recorders = [
+            Recorder(
+                line.device.instrument,
+                LoopbackTransport(line, clock),
+                clock,
+                tmp_path,
+                f"run-{line.device.instrument.name}",
+                durable=False,
+            )
+            for line in world.lines
+        ]
+        return world, *recorders
+
+    return make

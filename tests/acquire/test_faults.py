@@ -1,0 +1,366 @@
+"""Everything that goes wrong on a serial line, through real pseudo-terminals."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquire import procedures
+from acquire.emulators.faults import Faults
+from acquire.errors import (
+    DeviceReset,
+    DeviceSilent,
+    DiskFull,
+    Interrupted,
+    PortBusy,
+    PortLost,
+    PortMissing,
+    Refused,
+)
+from acquire.transport import SerialTransport
+from rotorid.io.logs import read_log
+from rotorid.io.sequence import Quality
+from rotorid.io.session import Ended, read_session
+from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
+from tests.acquire.conftest import QUICK
+
+SAMPLES = 300
+
+
+def record(recorder, samples=SAMPLES, interval_s=0.0):
+    """Record, and read back what is on disk."""
+    with recorder:
+        procedures.stream(recorder, samples, interval_s)
+    return read_log(recorder.log_path)
+
+
+def frame_numbers(log):
+    """Which of the device's data frames are in the table (all other frames come before the first)."""
+    return (log.table["index"] - log.table["index"].iloc[0]).to_numpy()
+
+
+def assert_metadata_agree(log):
+    """The recorder's live account and the parser's later one are the same."""
+    counts = log.session.counts
+    assert counts.samples == len(log.table)
+    assert counts.missing == log.missing
+    assert counts.repeated == log.repeated
+    assert counts.resets == log.resets
+    assert (counts.checksum_errors, counts.broken_frames) == (log.checksum_errors, log.broken_frames)
+    assert [(g.segment, g.first_index, g.count) for g in log.session.gaps] == [
+        (g.segment, g.first_index, g.count) for g in log.gaps
+    ]
+
+
+def test_a_good_line_loses_nothing(plugged, recorder_on):
+    log = record(recorder_on("bench", plugged("bench").names[0]))
+    assert log.complete and log.end.sent == len(log.table) >= SAMPLES
+    assert (log.table.quality == 0).all()
+    np.testing.assert_allclose(np.diff(log.table.time_s), 0.02, atol=2e-6)
+    assert log.session.ended == Ended.FINISHED
+    assert log.session.warnings == []
+    assert_metadata_agree(log)
+
+
+def test_port_missing(recorder_on, tmp_path):
+    with pytest.raises(PortMissing, match="no such port.*rotorid-acquire ports"):
+        with recorder_on("bench", str(tmp_path / "nothing")):
+            pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_port_busy(plugged, recorder_on, tmp_path):
+    port = plugged("bench").names[0]
+    other = SerialTransport(port, 115200)
+    other.open()
+    with pytest.raises(PortBusy, match="another program holds this port"):
+        with recorder_on("bench", port):
+            pass
+    other.close()
+    assert record(recorder_on("bench", port)).complete
+
+
+def pull_at(ports, recorder, samples):
+    """Pull the plug, once, as soon as the recorder has seen so many samples."""
+
+    def watch(row):
+        if recorder.progress == samples:
+            ports.pull()
+
+    recorder.on_row = watch
+
+
+def test_port_vanishes_and_comes_back(plugged, recorder_on):
+    ports = plugged("bench", replug_after_s=0.02)
+    recorder = recorder_on("bench", ports.names[0])
+    pull_at(ports, recorder, 100)
+    wanted = 5000  # more than all buffers on the way hold, so that the plug is out before the recording is over
+    log = record(recorder, wanted)
+    assert log.resets == 1 and log.session.counts.port_losses == 1
+    before, after = (log.table[log.table.segment == segment] for segment in (0, 1))
+    # what was in the cable's buffers when it was pulled is lost; what was received is there without a gap
+    assert len(before) >= 100 and len(before) + len(after) >= wanted and log.missing == 0
+    assert Quality(int(after.quality.iloc[0])) & Quality.AFTER_RESET
+    assert (np.diff(log.table.time_s) > 0).all()
+    assert [e.what for e in log.session.events] == ["port_lost", "port_back", "reset"]
+    assert log.session.ended == Ended.FINISHED
+    assert_metadata_agree(log)
+
+
+def test_port_vanishes_for_good(plugged, recorder_on):
+    ports = plugged("bench", replug_after_s=None)
+    recorder = recorder_on("bench", ports.names[0], replace(QUICK, reconnect_s=0.02))
+    pull_at(ports, recorder, 100)
+    with pytest.raises(PortLost, match="did not come back.*what came before is in the log"):
+        record(recorder, None)
+    log = read_log(recorder.log_path)
+    assert len(log.table) >= 100 and log.missing == 0
+    assert log.session.ended == Ended.DEVICE_LOST
+    assert_metadata_agree(log)
+
+
+def test_garbage_and_half_frames(plugged, recorder_on):
+    faults = Faults(garbage=frozenset({20, 150}), half=frozenset({60, 151, 200}))
+    log = record(recorder_on("bench", plugged("bench", faults).names[0]))
+    # a frame without its end runs into the next: both are lost. Garbage may take the frame behind it.
+    lost = {60, 61, 151, 152, 200, 201}
+    missing = set(range(SAMPLES)) - set(frame_numbers(log))
+    assert lost <= missing <= lost | {20, 150}
+    assert log.checksum_errors + log.broken_frames >= 3
+    assert any("damaged" in warning for warning in log.session.warnings)
+    assert_metadata_agree(log)
+
+
+def test_wrong_checksum(plugged, recorder_on):
+    bad = frozenset({10, 11, 170})
+    log = record(recorder_on("bench", plugged("bench", Faults(corrupt=bad)).names[0]))
+    assert set(range(SAMPLES)) - set(frame_numbers(log)) == bad
+    # a flipped bit may also make or break a delimiter's neighbour, but never let a wrong value through
+    assert log.checksum_errors + log.broken_frames >= len(bad)
+    assert [(gap.first_index - log.table["index"].iloc[0], gap.count) for gap in log.gaps] == [
+        (10, 2),
+        (170, 1),
+    ]
+    assert_metadata_agree(log)
+
+
+def test_dropped_repeated_and_reordered_frames(plugged, recorder_on):
+    faults = Faults(drop=frozenset({30, 31, 32, 100}), repeat=frozenset({40, 41, 200}), swap=frozenset({50, 150}))
+    log = record(recorder_on("bench", plugged("bench", faults).names[0]))
+    numbers = frame_numbers(log)
+    assert (np.diff(numbers) > 0).all()
+    assert set(range(SAMPLES)) - set(numbers) == {30, 31, 32, 100}
+    assert log.repeated == 3 and log.session.counts.late == 2
+    flags = dict(zip(numbers, log.table.quality, strict=True))
+    assert {n for n, flag in flags.items() if flag & Quality.LATE} == {50, 150}
+    assert {33, 101} <= {n for n, flag in flags.items() if flag & Quality.AFTER_GAP}
+    np.testing.assert_allclose(log.table.time_s, 0.02 * numbers, atol=2e-6)
+    assert_metadata_agree(log)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_everything_at_once_at_random(plugged, recorder_on, seed):
+    ports = plugged("bench", Faults(share=0.01))
+    line = ports._world.lines[0].line
+    line.rng = np.random.default_rng(seed)
+    log = record(recorder_on("bench", ports.names[0]), samples=1000)
+    done = line.done
+    numbers = frame_numbers(log)
+    assert (np.diff(numbers) > 0).all()
+    # what cannot arrive: dropped, corrupted, halved (with its neighbour), and at most one frame per garbage
+    worst = done["drop"] + done["corrupt"] + 2 * done["half"] + done["garbage"] + done["swap"]
+    assert line.count - len(log.table) <= worst
+    assert_metadata_agree(log)
+
+
+def test_device_resets_and_the_recording_goes_on(plugged, recorder_on):
+    log = record(recorder_on("bench", plugged("bench", Faults(reset_at=frozenset({120}))).names[0]))
+    assert log.resets == 1
+    assert (log.table.segment == 0).sum() == 120
+    assert (np.diff(log.table.time_s) > 0).all()
+    assert log.session.ended == Ended.FINISHED
+    assert [event.what for event in log.session.events] == ["reset"]
+    assert_metadata_agree(log)
+
+
+def test_a_reset_makes_a_thrust_test_void(plugged, recorder_on):
+    port = plugged("rotor", Faults(reset_at=frozenset({80}))).names[0]
+    with pytest.raises(DeviceReset, match="void.*record again"):
+        with recorder_on("rotor", port) as recorder:
+            procedures.thrust_test(recorder, 0.2, 1.0, 2.0)
+    log = read_log(recorder.log_path)
+    assert len(log.table) == 80
+    assert log.session.ended == Ended.DEVICE_RESET
+
+
+def test_clock_rollover(plugged, recorder_on):
+    faults = Faults(clock_start_us=(1 << 32) - 2_000_000)  # rolls over two seconds into the stream
+    log = record(recorder_on("bench", plugged("bench", faults).names[0]))
+    assert log.session.counts.clock_rollovers == 1
+    assert log.resets == 0 and log.missing == 0
+    np.testing.assert_allclose(np.diff(log.table.time_s), 0.02, atol=2e-6)
+
+
+@pytest.mark.parametrize(("pace", "word", "rate"), [(0.8, "slower", 40.0), (1.25, "faster", 62.5)])
+def test_device_slower_or_faster_than_promised(plugged, recorder_on, pace, word, rate):
+    log = record(recorder_on("bench", plugged("bench", Faults(pace=pace)).names[0]))
+    assert log.missing == 0
+    assert log.session.promised_rate_hz == 50.0
+    assert log.session.measured_rate_hz == pytest.approx(rate, rel=1e-3)
+    assert any(f"{word} than promised" in warning for warning in log.session.warnings)
+
+
+def test_silent_device(plugged, recorder_on):
+    port = plugged("bench", Faults(silent_from=100)).names[0]
+    with pytest.raises(DeviceSilent, match="gone silent.*power and cable"):
+        record(recorder_on("bench", port, replace(QUICK, silence_s=0.03, reply_s=0.03)))
+    log = read_log(Path(port).with_name("run.rlog"))
+    assert len(log.table) == 100 and log.session.ended == Ended.DEVICE_SILENT
+
+
+def test_port_without_a_device(recorder_on, tmp_path):
+    master, slave = os.openpty()
+    try:
+        with pytest.raises(DeviceSilent, match="nothing on it answers"):
+            with recorder_on("bench", os.ttyname(slave), replace(QUICK, reply_s=0.01)):
+                pass
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert read_session(tmp_path / "run.yaml").ended == Ended.DEVICE_SILENT
+
+
+def test_another_instrument_on_the_port(plugged, recorder_on):
+    with pytest.raises(Refused, match="is a 'bench'.*not a 'rotor'"):
+        with recorder_on("rotor", plugged("bench").names[0]):
+            pass
+
+
+def test_refused_command(plugged, recorder_on):
+    port = plugged("wrench", Faults(refuse=frozenset("I"))).names[0]
+    with pytest.raises(Refused, match="refused 'I'"):
+        with recorder_on("wrench", port) as recorder:
+            procedures.measure_wrench(recorder, 0.01, samples=10)
+    assert read_session(recorder.session_path).ended == Ended.REFUSED
+
+
+def test_sensor_that_resets_is_powered_and_initialised_again(plugged, recorder_on):
+    port = plugged("wrench", Faults(reset_at=frozenset({50}))).names[0]
+    with recorder_on("wrench", port) as recorder:
+        procedures.measure_wrench(recorder, 0.005, samples=200)
+    log = read_log(recorder.log_path)
+    assert log.resets == 1 and log.session.ended == Ended.FINISHED
+    after = log.table[log.table.segment == 1]
+    np.testing.assert_allclose(np.diff(after.time_s), 0.005, atol=2e-6)
+
+
+def test_a_programme_whose_end_record_is_lost_still_ends(plugged, recorder_on):
+    port = plugged("quadrotor", Faults(lose_end=True)).names[0]
+    programme = Programme(TRAPEZOID, (0.1, 0.1, 0.1, 0.1), 0.5, 1.0, 0.0)
+    with recorder_on("quadrotor", port, replace(QUICK, silence_s=0.05)) as recorder:
+        procedures.fly_programme(recorder, "h", programme)
+    log = read_log(recorder.log_path)
+    assert log.end is None and log.table.throttle_1.max() == pytest.approx(0.1)
+    assert log.table.throttle_1.iloc[-1] == 0 and log.session.ended == Ended.FINISHED
+    assert [event.what for event in log.session.events] == ["silence", "end_lost"]
+
+
+def test_disk_full(plugged, recorder_on):
+    """The kernel refuses to let the file grow (EFBIG), as a full disk does (ENOSPC)."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    port = plugged("bench").names[0]
+    limit = 80_000
+    try:
+        with pytest.raises(DiskFull, match="Free some space"):
+            with recorder_on("bench", port) as recorder:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+                procedures.stream(recorder, 100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert recorder.log_path.stat().st_size == limit  # filled to the last byte
+    log = read_log(recorder.log_path)
+    assert log.cut_at is not None and len(log.table) > 1000 and log.missing == 0
+    assert log.session.ended == Ended.DISK_FULL
+    # the device was told to stop, and its answer was still listened to
+    assert recorder.ended is not None
+    assert not recorder.log_path.with_name("run.rlog.ballast").exists()
+
+
+def test_a_recording_is_never_overwritten(plugged, recorder_on):
+    port = plugged("bench").names[0]
+    first = record(recorder_on("bench", port))
+    with pytest.raises(FileExistsError):
+        record(recorder_on("bench", port))
+    assert len(read_log(first.path).table) == len(first.table)
+
+
+def test_stop_asked_from_outside(plugged, recorder_on):
+    recorder = recorder_on("bench", plugged("bench").names[0])
+    recorder.on_row = lambda row: recorder.stop_asked.set() if row.index > 50 else None
+    with pytest.raises(Interrupted):
+        record(recorder, None)
+    log = read_log(recorder.log_path)
+    assert log.complete  # the device was stopped and everything up to its end record is there
+    assert log.session.ended == Ended.INTERRUPTED
+
+
+def start_recorder(port: str, folder: Path, *more: str) -> subprocess.Popen:
+    """The command line in a process of its own."""
+    command = [
+        sys.executable,
+        "-m",
+        "acquire",
+        "bench",
+        "--port",
+        port,
+        "--out",
+        str(folder),
+        "--id",
+        "run",
+        *more,
+    ]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for_bytes(process: subprocess.Popen, path: Path, count: int) -> None:
+    """Until the log has so many bytes; fails at once if the recorder ended."""
+    while not path.exists() or path.stat().st_size < count:
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.002)
+
+
+def test_ctrl_c(plugged, tmp_path):
+    process = start_recorder(plugged("bench", speed=20.0).names[0], tmp_path)
+    wait_for_bytes(process, tmp_path / "run.rlog", 3000)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "stopped at your wish" in err and "samples, 0 missing" in out
+    log = read_log(tmp_path / "run.rlog")
+    assert log.complete and log.session.ended == Ended.INTERRUPTED
+    assert_metadata_agree(log)
+
+
+def test_sigkill(plugged, tmp_path):
+    ports = plugged("bench", speed=20.0)
+    process = start_recorder(ports.names[0], tmp_path)
+    wait_for_bytes(process, tmp_path / "run.rlog", 3000)
+    process.kill()
+    process.communicate(timeout=20)
+    log = read_log(tmp_path / "run.rlog")
+    assert len(log.table) > 10 and log.missing == 0
+    assert log.session.ended == Ended.RECORDING and "killed" in log.session.message
+    check = subprocess.run(
+        [sys.executable, "-m", "acquire", "check", str(tmp_path / "run.rlog")], capture_output=True, text=True
+    )
+    assert check.returncode == 0 and "completed now" in check.stdout
+    assert read_session(tmp_path / "run.yaml").counts.samples == len(log.table)

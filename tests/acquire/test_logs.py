@@ -1,0 +1,168 @@
+"""Raw logs and their metadata: readable up to any cut, atomic, validated, indexed."""
+
+from __future__ import annotations
+
+import gzip
+import os
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from acquire import procedures
+from acquire.emulators.faults import Faults
+from acquire.log_writer import LogWriter
+from rotorid.io import rawlog
+from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.index import COLUMNS, read_index, write_index
+from rotorid.io.logs import LogError, read_log
+from rotorid.io.rawlog import NotALog, read_raw
+from rotorid.io.session import Air, Session, SessionError, read_session, session_path, write_session
+
+
+def short_log(loopback, samples):
+    """A short recording with a few faults in it."""
+    _, recorder = loopback("bench", Faults(drop=frozenset({5}), repeat=frozenset({9}), swap=frozenset({12})))
+    with recorder:
+        procedures.stream(recorder, samples)
+    return recorder.log_path
+
+
+@pytest.fixture
+def log_path(loopback):
+    return short_log(loopback, 30)
+
+
+def test_a_log_cut_anywhere_is_read_up_to_the_cut(loopback, tmp_path):
+    log_path = short_log(loopback, 15)
+    whole = read_log(log_path)
+    data = log_path.read_bytes()
+    cut = tmp_path / "cut.rlog"
+    write_session(whole.session, session_path(cut))
+    chunks = read_raw(log_path).chunks
+    longest = 0
+    for length in range(len(data)):
+        cut.write_bytes(data[:length])
+        kept = read_raw(cut).chunks
+        assert kept == chunks[: len(kept)]
+        if length % 7 and length != len(data) - 1:
+            continue  # tables cost more: every seventh cut, and the last
+        log = read_log(cut)
+        rows = len(log.table)
+        assert rows >= longest - 1  # a late frame may wait for its place, a row is never lost again
+        longest = max(longest, rows)
+        same = whole.table.merge(log.table, on=["segment", "index"])
+        assert len(same) == rows
+        np.testing.assert_array_equal(same.cell_1_v_x, same.cell_1_v_y)
+    assert longest == len(whole.table)
+
+
+def test_gzipped_logs_whole_and_cut(log_path, tmp_path):
+    whole = read_log(log_path)
+    packed = log_path.with_name(log_path.name + ".gz")
+    packed.write_bytes(gzip.compress(log_path.read_bytes()))
+    pd.testing.assert_frame_equal(read_log(packed).table, whole.table)
+    packed.write_bytes(packed.read_bytes()[:600])
+    log = read_log(packed)
+    assert log.cut_at is not None and len(log.table) <= len(whole.table)
+
+
+def test_a_damaged_chunk_ends_the_log(log_path):
+    data = bytearray(log_path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    log_path.write_bytes(data)
+    log = read_log(log_path)
+    assert log.cut_at <= len(data) // 2 and 0 < len(log.table) < 30
+
+
+def test_no_log_at_all(tmp_path):
+    path = tmp_path / "table.rlog"
+    path.write_text("time_s,force_x_n\n0,1\n")
+    with pytest.raises(NotALog, match="table.rlog: does not begin with"):
+        read_log(path)
+    with pytest.raises(FileNotFoundError):
+        read_log(tmp_path / "nothing.rlog")
+
+
+def test_nothing_says_which_instrument(tmp_path):
+    path = tmp_path / "bare.rlog"
+    path.write_bytes(rawlog.MAGIC)
+    with pytest.raises(LogError, match="nothing says which instrument"):
+        read_log(path)
+
+
+def test_long_reads_are_split_into_chunks(tmp_path):
+    path = tmp_path / "long.rlog"
+    writer = LogWriter(path)
+    data = os.urandom(150_000)
+    writer.write(rawlog.RECEIVED, 42, data)
+    writer.close()
+    chunks = read_raw(path).chunks
+    assert [len(chunk.data) for chunk in chunks] == [65535, 65535, 18930]
+    assert b"".join(chunk.data for chunk in chunks) == data and chunks[2].host_ns == 42
+
+
+def test_saturated_samples_are_flagged(loopback, tmp_path):
+    world, recorder = loopback("wrench")
+    world.physics.sensor._zero = np.array([0, 0, 500.0, 0, 0, 0])
+    with recorder:
+        procedures.measure_wrench(recorder, 0.01, samples=5)
+    table = read_log(recorder.log_path).table
+    assert (table.quality == 8).all() and (table.force_z_n == 200.0).all()
+
+
+def test_metadata_are_written_atomically(tmp_path, monkeypatch):
+    session = Session(id="a", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log="a.rlog")
+    path = tmp_path / "a.yaml"
+    write_session(session, path)
+    before = path.read_bytes()
+
+    def refuse(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(OSError):
+        write_session(session.model_copy(update={"message": "x"}), path)
+    assert path.read_bytes() == before and sorted(p.name for p in tmp_path.iterdir()) == ["a.yaml"]
+
+
+def test_metadata_errors_name_file_and_key(tmp_path):
+    path = tmp_path / "a.yaml"
+    with pytest.raises(SessionError, match="a.yaml: no such file"):
+        read_session(path)
+    path.write_text("id: a\ninstrument: bench\nstarted: x\nhost_start_ns: soon\nlog: a.rlog\n")
+    with pytest.raises(SessionError, match="a.yaml: host_start_ns: Input should be a valid integer"):
+        read_session(path)
+    path.write_text("id: a\ninstrument: bench\nstarted: x\nhost_start_ns: 1\nlog: a.rlog\nbatery: 4S\n")
+    with pytest.raises(SessionError, match="batery"):
+        read_session(path)
+
+
+def test_air_density():
+    # dry air at 15 °C and 101,325 Pa: 1.225 kg/m³; moist air is lighter
+    assert Air(temperature_c=15, pressure_pa=101325, relative_humidity=0).density_kg_m3 == pytest.approx(
+        1.225, abs=1e-3
+    )
+    assert Air(temperature_c=30, pressure_pa=101325, relative_humidity=1).density_kg_m3 == pytest.approx(
+        1.146, abs=2e-3
+    )
+
+
+def test_index(log_path):
+    raw = log_path.parent
+    (raw / "vehicle.yaml").write_text("name: not a session\n")
+    rows = write_index(raw)
+    assert len(rows) == 1 and list(rows[0]) == COLUMNS
+    assert rows == read_index(raw)
+    assert rows[0]["file"] == "run-bench.rlog" and rows[0]["missing"] == "1" and rows[0]["ended"] == "finished"
+
+
+def test_table_a1_spot_checks():
+    # read off the thesis's table A.1
+    assert EXPERIMENTS[4].maxima == (0.05, 0.2, 0.2, 0.05) and EXPERIMENTS[4].dynamics == "Roll +"
+    assert EXPERIMENTS[13].maxima == (0.05, 0.05, 0.2, 0.2) and EXPERIMENTS[13].dynamics == "Pitch -"
+    assert EXPERIMENTS[18].maxima == (0.2, 0.15, 0.2, 0.15)
+    assert (EXPERIMENTS[23].signal, EXPERIMENTS[23].frequency_hz) == ("sine", 0.4)
+    assert (EXPERIMENTS[30].roll_deg, EXPERIMENTS[30].pitch_deg) == (-15, 0)
+    assert (EXPERIMENTS[46].roll_deg, EXPERIMENTS[46].pitch_deg, EXPERIMENTS[46].maxima[0]) == (0, -30, 0.1)
+    assert len(EXPERIMENTS) == 48

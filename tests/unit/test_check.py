@@ -1,0 +1,94 @@
+"""What the check of a recording set says, and its command."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from rotorid.cli import app
+from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
+from rotorid.recordings.check import as_text, check_set
+
+FLIGHT = Vehicle(
+    name="x",
+    kind="flight",
+    mass_kg=1.0,
+    inertia_kg_m2={"xx": 1e-3, "yy": 1e-3, "zz": 2e-3},
+    rotors=[{"x_m": 0.1, "y_m": 0.1, "spin": "ccw"}],
+    thrust_coefficient_n_s2=1e-6,
+    torque_coefficient_n_m_s2=1e-8,
+)
+
+
+def flight(**columns: np.ndarray) -> RecordingSet:
+    time = np.arange(100) * 0.01
+    time[50:] += 0.1
+    return RecordingSet("flight", FLIGHT, (Run("a", pd.DataFrame({"time_s": time, **columns})),))
+
+
+def test_rate_duration_gaps_and_empty_cells() -> None:
+    voltage = np.full(100, np.nan)
+    voltage[::10] = 12.0
+    run = check_set(flight(battery_voltage_v=voltage)).runs[0]
+    assert run.samples == 100
+    assert run.rate_hz == pytest.approx(100.0)
+    assert run.duration_s == pytest.approx(1.09)
+    assert run.gaps == 1
+    assert run.longest_gap_s == pytest.approx(0.11)
+    assert run.empty == {"battery_voltage_v": pytest.approx(0.9)}
+    assert run.value_rate_hz["battery_voltage_v"] == pytest.approx(10 / 1.09)
+
+
+def test_what_is_missing_is_said_with_what_it_means() -> None:
+    lacks = " ".join(check_set(flight()).lacks)
+    assert "No rotor speeds, commands or throttles" in lacks
+    assert "force channels are missing" in lacks
+    assert "moment channels are missing" in lacks
+    assert "ground effect cannot be tested" in lacks
+    assert "One run only" in lacks
+
+
+def test_a_full_flight_lacks_only_a_second_run() -> None:
+    ones = np.ones(100)
+    names = [f"{kind}_{axis}_{unit}" for axis in "xyz" for kind, unit in
+             (("specific_force", "m_s2"), ("angular_velocity", "rad_s"), ("velocity", "m_s"))]  # fmt: skip
+    names += [f"quaternion_{axis}" for axis in "wxyz"]
+    names += ["rotor_speed_1_rad_s", "rotor_command_1_rad_s", "height_m", "battery_voltage_v"]
+    found = check_set(flight(**{name: ones for name in names}, odd=ones))
+    assert found.lacks == ("One run only: blocks of it are held out, and repeatability between runs is unknown.",)
+    assert found.other_columns == ("odd",)
+
+
+def test_a_bench_needs_force_and_reference_together() -> None:
+    table = pd.DataFrame({"time_s": [0.0, 1.0], "force_x_n": [1.0, 2.0]})
+    vehicle = Vehicle(name="b", kind="bench", tared=True)
+    found = check_set(RecordingSet("b", vehicle, (Run("a", table), Run("b", table))))
+    assert found.lacks == ("force_x_n and reference_force_x_n are not both there: that axis cannot be compared.",)
+
+
+def test_the_text_names_runs_columns_and_gaps() -> None:
+    text = as_text(check_set(flight(odd=np.ones(100))))
+    assert "flight: kind flight, 1 rotors, 1 runs" in text
+    assert "100 samples, 1.09 s at 100 Hz, 1 gaps (longest 0.11 s)" in text
+    assert "Kept as regime variables: odd" in text
+
+
+def test_the_command_checks_one_set_or_a_folder_of_them(tmp_path: Path) -> None:
+    write_set(flight(), tmp_path)
+    runner = CliRunner()
+    one = runner.invoke(app, ["check", str(tmp_path / "flight")])
+    assert one.exit_code == 0
+    assert runner.invoke(app, ["check", str(tmp_path)]).stdout == one.stdout
+    listed = json.loads(runner.invoke(app, ["check", "--json", str(tmp_path)]).stdout)
+    assert listed[0]["runs"][0]["samples"] == 100
+
+
+def test_the_command_fails_with_the_sentence_of_the_fault(tmp_path: Path) -> None:
+    folder = write_set(flight(), tmp_path)
+    (folder / "vehicle.yaml").write_text("name: x\n")
+    done = CliRunner().invoke(app, ["check", str(folder)])
+    assert done.exit_code == 1
+    assert "kind: is missing" in done.output

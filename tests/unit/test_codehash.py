@@ -1,0 +1,108 @@
+"""The code hash reacts to what runs and to nothing else."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rotorid.codehash import Code
+
+FILES = {
+    "src/rotorid/__init__.py": "",
+    "src/rotorid/fit.py": '"""Fit."""\nfrom rotorid.constants import G\n\ndef fit(x):\n    return x * G\n',
+    "src/rotorid/constants.py": "G = 9.81\n",
+    "src/rotorid/lazy.py": "def draw():\n    from rotorid.plots import style\n    return style.SIZE\n",
+    "src/rotorid/plots/__init__.py": "",
+    "src/rotorid/plots/style.py": "SIZE = 3\n",
+    "src/rotorid/effects/__init__.py": "import pkgutil\n",
+    "src/rotorid/effects/drag.py": "D = 1\n",
+    "src/rotorid/effects/lag.py": "from .drag import D\n",
+    "src/rotorid/other.py": "X = 1\n",
+    "workflow/scripts/fit.py": "from rotorid import fit\n\ndef main(x):\n    return fit.fit(x)\n",
+    "workflow/scripts/draw.py": "import rotorid.lazy\n",
+    "workflow/scripts/choose.py": "from rotorid.effects import chosen\n",
+    "workflow/scripts/late.py": "import importlib\nimportlib.import_module('rotorid.other')\n",
+}
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    for name, text in FILES.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path
+
+
+def edit(project: Path, name: str, old: str, new: str) -> None:
+    path = project / name
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def hashes(project: Path) -> dict[str, str]:
+    code = Code(project)
+    return {name: code.of(f"workflow/scripts/{name}.py") for name in ("fit", "draw", "choose", "late")}
+
+
+def changed(project: Path, name: str, old: str, new: str) -> set[str]:
+    before = hashes(project)
+    edit(project, name, old, new)
+    after = hashes(project)
+    return {script for script in before if before[script] != after[script]}
+
+
+def test_a_constant_two_imports_away_counts(project: Path) -> None:
+    assert changed(project, "src/rotorid/constants.py", "9.81", "9.82") == {"fit"}
+
+
+def test_a_comment_or_a_docstring_or_layout_does_not(project: Path) -> None:
+    assert changed(project, "src/rotorid/constants.py", "G = 9.81", "G = 9.81  # gravity") == set()
+    assert changed(project, "src/rotorid/fit.py", '"""Fit."""', '"""Fit a line."""\n\n') == set()
+    assert changed(project, "workflow/scripts/fit.py", "def main", "# here\ndef main") == set()
+
+
+def test_a_docstring_added_where_there_was_none_does_not(project: Path) -> None:
+    assert changed(project, "src/rotorid/fit.py", "(x):\n", '(x):\n    """Say what."""\n') == set()
+
+
+def test_an_import_inside_a_function_counts(project: Path) -> None:
+    assert changed(project, "src/rotorid/plots/style.py", "3", "4") == {"draw"}
+
+
+def test_a_package_that_looks_up_its_modules_is_reached_whole(project: Path) -> None:
+    assert changed(project, "src/rotorid/effects/drag.py", "1", "2") == {"choose"}
+    new = project / "src/rotorid/effects/sag.py"
+    before = hashes(project)
+    new.write_text("S = 1\n")
+    assert {name for name, value in hashes(project).items() if value != before[name]} == {"choose"}
+
+
+def test_import_module_with_a_constant_name_counts(project: Path) -> None:
+    assert changed(project, "src/rotorid/other.py", "1", "2") == {"late"}
+
+
+def test_a_relative_import_is_followed(project: Path) -> None:
+    script = project / "workflow/scripts/relative.py"
+    script.write_text("import rotorid.effects.lag\n")
+    names = [path.name for path in Code(project).reached_modules(script)]
+    assert names.count("drag.py") == 1
+
+
+def test_a_notebooks_code_cells_count_and_its_text_does_not(project: Path) -> None:
+    notebook = project / "notebooks/fit.ipynb"
+    notebook.parent.mkdir()
+    text = {"cell_type": "markdown", "source": ["# TEXT"]}
+    code = {"cell_type": "code", "source": ["import rotorid.fit"]}
+    notebook.write_text(json.dumps({"cells": [text, code]}))
+    before = Code(project).of("notebooks/fit.ipynb")
+    edit(project, "notebooks/fit.ipynb", "TEXT", "Other text")
+    assert Code(project).of("notebooks/fit.ipynb") == before
+    edit(project, "src/rotorid/constants.py", "9.81", "9.82")
+    assert Code(project).of("notebooks/fit.ipynb") != before
+
+
+def test_a_script_that_is_not_there_is_named(project: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*nowhere\.py"):
+        Code(project).of("workflow/scripts/nowhere.py")

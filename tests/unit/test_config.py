@@ -1,0 +1,90 @@
+"""The configuration: what is accepted, and one sentence naming the key for what is not."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from rotorid.config import SCHEMA_PATH, Config, ConfigError, check, schema_text
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def values() -> dict[str, Any]:
+    return yaml.safe_load((ROOT / "config.yaml").read_text())
+
+
+def merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """As Snakemake lays one configuration file over another."""
+    both = dict(base)
+    for key, value in over.items():
+        both[key] = merged(base[key], value) if isinstance(value, dict) and key in base else value
+    return both
+
+
+def test_the_projects_own_files_are_valid(values: dict[str, Any]) -> None:
+    check(values)
+    for path in (ROOT / "tests" / "configs").glob("*.yaml"):
+        check(merged(values, yaml.safe_load(path.read_text())), source=path.name)
+
+
+def test_an_unknown_key_is_named_with_what_was_meant(values: dict[str, Any]) -> None:
+    values["report"]["titel"] = "x"
+    with pytest.raises(ConfigError) as error:
+        check(values)
+    assert str(error.value) == "config.yaml: report.titel is not a known key; did you mean title?"
+
+
+def test_an_unknown_key_like_no_other_gets_the_known_ones(values: dict[str, Any]) -> None:
+    values["report"]["zzz"] = 1
+    with pytest.raises(ConfigError, match=r"report\.zzz is not a known key; known here are chapters, subtitle"):
+        check(values)
+
+
+def test_a_missing_key_is_named(values: dict[str, Any]) -> None:
+    del values["report"]["title"]
+    with pytest.raises(ConfigError, match=r"^config\.yaml: report\.title is missing\.$"):
+        check(values)
+
+
+def test_a_wrong_type_is_named_with_value_and_what_is_expected(values: dict[str, Any]) -> None:
+    values["recordings"] = 7
+    with pytest.raises(ConfigError, match=r"^config\.yaml: recordings is 7, but it must be string\.$"):
+        check(values)
+
+
+def test_an_impossible_value_is_named(values: dict[str, Any]) -> None:
+    values["report"]["chapters"] = ["introduction", "introduction"]
+    with pytest.raises(ConfigError, match=r"chapters must not name a chapter twice, but introduction is\.$"):
+        check(values)
+
+
+def test_every_wrong_key_gets_its_own_line(values: dict[str, Any]) -> None:
+    values["recordings"] = 7
+    values["more"] = 1
+    with pytest.raises(ConfigError) as error:
+        check(values)
+    assert len(str(error.value).splitlines()) == 2
+
+
+def test_the_committed_schema_is_the_models_own() -> None:
+    assert SCHEMA_PATH.read_text() == schema_text(), "run: python -m rotorid.config --write-schema"
+
+
+def leaves(schema: dict[str, Any], whole: dict[str, Any], at: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    for key, entry in schema.get("properties", {}).items():
+        if "$ref" in entry:
+            yield from leaves(whole["$defs"][entry["$ref"].rsplit("/", 1)[-1]], whole, f"{at}{key}.")
+        else:
+            yield f"{at}{key}", entry
+
+
+def test_every_key_is_described_with_its_unit() -> None:
+    schema = Config.model_json_schema()
+    found = dict(leaves(schema, schema))
+    assert found
+    bare = [key for key, entry in found.items() if not entry.get("description", "").endswith("].")]
+    assert not bare, f"these keys' descriptions do not end in their unit, like '... [Hz].': {bare}"

@@ -1,0 +1,38 @@
+"""Figures come out with the same bytes, and thinned traces keep their extremes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotorid.plots import style
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png", ".pdf"])
+def test_the_same_data_give_the_same_bytes(tmp_path: Path, suffix: str) -> None:
+    for name in ("one", "two"):
+        fig, axes = style.figure(2.0)
+        axes.plot([0, 1, 2], [0, 1, 4], label=r"$\omega^2$")
+        axes.legend()
+        style.save(fig, tmp_path / f"{name}{suffix}")
+    assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
+
+
+def test_thinning_keeps_order_and_extremes() -> None:
+    trace = np.sin(np.linspace(0, 40, 100_000))
+    trace[51_234] = 9.0
+    kept = style.thin(trace, 1000)
+    assert len(kept) <= 1000
+    assert np.all(np.diff(kept) > 0)
+    assert trace[kept].max() == 9.0
+    assert trace[kept].min() == trace.min()
+
+
+def test_thinning_leaves_short_traces_and_bears_missing_samples() -> None:
+    assert style.thin(np.arange(5.0), 10).tolist() == [0, 1, 2, 3, 4]
+    assert len(style.thin(np.full(100, np.nan), 10)) == 5
+
+
+def test_a_placeholder_says_why(tmp_path: Path) -> None:
+    style.placeholder(tmp_path / "empty.svg", "recordings not obtained")
+    assert (tmp_path / "empty.svg").stat().st_size > 1000

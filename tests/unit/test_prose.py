@@ -1,0 +1,79 @@
+"""A chapter's text: numbers, tables and figures from files, and a stop where one is missing."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rotorid import prose
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, str]:
+    fit = tmp_path / "fit.json"
+    fit.write_text(json.dumps({"c_f": 1.38771e-6, "a0": -0.07434, "share": 0.0213, "ends": [39.751, 39.762]}))
+    cells = tmp_path / "cells.csv"
+    cells.write_text("cell,a1,note\n1,39.7564,a_b\n2,37.2655,\n")
+    return {"fit": str(fit), "cells": str(cells), "lines": "results/report/x/lines.svg"}
+
+
+def rendered(tmp_path: Path, text: str, files: dict[str, str]) -> str:
+    path = tmp_path / "hover.md"
+    path.write_text(text)
+    return prose.render(path, files)
+
+
+def test_numbers_come_from_the_file_with_the_asked_digits(tmp_path: Path, files: dict[str, str]) -> None:
+    text = "{{ fit.c_f | sci(4) }}; {{ fit.a0 | fix(3) }}; {{ fit.share | percent(1) }} %"
+    assert rendered(tmp_path, text, files) == "1.3877\u00a0×\u00a010^−6^; −0.074; 2.1 %"
+    assert rendered(tmp_path, "{{ fit.ends | interval(2) }}", files) == "39.75 to 39.76"
+
+
+def test_a_zero_after_rounding_has_no_sign_and_nothing_is_a_dash() -> None:
+    assert prose.fix(-0.0004, 2) == "0.00"
+    assert prose.fix(None, 2) == "–"
+    assert prose.sci(float("nan"), 2) == "–"
+
+
+def test_a_table_has_heading_numbers_caption_and_label(tmp_path: Path, files: dict[str, str]) -> None:
+    text = '{{ table("cells", "Cells.", [("cell", "Cell"), ("a1", "$a_1$", "fix2"), ("note", "Note")]) }}'
+    assert rendered(tmp_path, text, files).splitlines() == [
+        "| Cell | $a_1$ | Note |",
+        "| :---- | -----: | :---- |",
+        "| 1 | 39.76 | a\\_b |",
+        "| 2 | 37.27 | – |",
+        "",
+        ": Cells. {#tbl:hover-cells}",
+    ]
+
+
+def test_a_figure_has_caption_path_and_label(tmp_path: Path, files: dict[str, str]) -> None:
+    text = rendered(tmp_path, '{{ figure("lines", "All lines.") }}', files)
+    assert text == "![All lines.](results/report/x/lines.svg){#fig:hover-lines width=100%}"
+
+
+def test_pandocs_identifiers_are_not_comments(tmp_path: Path, files: dict[str, str]) -> None:
+    assert rendered(tmp_path, "# Hover {#sec:hover}\n<# unseen #>", files) == "# Hover {#sec:hover}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("one\n\n{{ fit.c_q | fix(2) }}", r"hover\.md, line 3: .*c_q"),
+        ("{{ fat.c_f }}", r"hover\.md, line 1: 'fat' is undefined"),
+        ("a\n{{ fit.c_f", r"hover\.md, line 2: "),
+        ('{{ figure("cells", "x") }}', r"there is no figure called cells"),
+        ('{{ table("fit", "x", [("a", "A")]) }}', r"there is no table called fit"),
+        ('{{ table("cells", "x", [("a9", "A")]) }}', r"the table cells has no column 'a9'"),
+        ('{{ table("cells", "x", [("a1", "A", "round2")]) }}', r"round2 is not a form of a number"),
+    ],
+)
+def test_what_is_missing_stops_the_report(tmp_path: Path, files: dict[str, str], text: str, message: str) -> None:
+    with pytest.raises(prose.ProseError, match=message):
+        rendered(tmp_path, text, files)
+
+
+def test_columns_of_long_text_get_more_room(tmp_path: Path) -> None:
+    rows = [{"what": "a" * 60, "n": 1.0}, {"what": "b", "n": 22.0}]
+    lines = prose.table_of(rows, "All.", [("what", "What"), ("n", "Number of them", "fix0")], "tbl:x")
+    assert lines.splitlines()[1] == f"| :{'-' * 40} | {'-' * 6}: |"

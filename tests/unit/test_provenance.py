@@ -1,0 +1,46 @@
+"""The provenance of a run."""
+
+import hashlib
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy
+import pytest
+
+from rotorid import provenance
+
+
+def test_versions_are_those_installed_of_what_is_locked() -> None:
+    lock = "numpy==0.0 \\\n    --hash=sha256:00\nno-such-package==1.0 \\\n"
+    assert provenance.installed_versions(lock) == {"numpy": numpy.__version__}
+
+
+def test_raw_files_are_named_with_their_hash(tmp_path: Path) -> None:
+    (tmp_path / "requirements.lock").write_text("numpy==0.0\n")
+    (tmp_path / "log.csv").write_bytes(b"1,2\n")
+    record = provenance.gather([tmp_path / "log.csv"], tmp_path / "requirements.lock", {"a": 1})
+    assert record["raw_sha256"] == {str(tmp_path / "log.csv"): hashlib.sha256(b"1,2\n").hexdigest()}
+    assert record["config"] == {"a": 1}
+
+
+def test_outside_of_git_the_commit_is_said_to_be_unknown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert provenance.commit(tmp_path) == "unknown: not a git checkout"
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
+def test_a_changed_file_marks_the_commit_dirty(tmp_path: Path) -> None:
+    def git(*arguments: str) -> str:
+        identity = ["-c", "user.name=t", "-c", "user.email=t@example.org"]
+        command = ["git", "-C", str(tmp_path), *identity, *arguments]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    git("init", "-q")
+    (tmp_path / "a").write_text("1")
+    git("add", "a")
+    git("commit", "-q", "-m", "one")
+    head = git("rev-parse", "HEAD")
+    assert provenance.commit(tmp_path) == head
+    (tmp_path / "a").write_text("2")
+    assert provenance.commit(tmp_path) == f"{head}-dirty"

@@ -1,0 +1,41 @@
+"""Load cells of the bench: from known weights and readings to coefficients."""
+
+
+rule calibrate_load_cells:
+    """Line of each cell through the thesis's printed readings, beside the coefficients it prints."""
+    message:
+        "Calibration: load cells of the thesis"
+    input:
+        weights="raw/thesis/table_2_6.csv",
+        readings="raw/thesis/table_2_7.csv",
+        printed="raw/thesis/table_2_8.csv",
+    output:
+        coefficients="results/calibration/thesis.json",
+    params:
+        code=code_of("calibrate_load_cells"),
+    log:
+        "results/logs/calibrate_load_cells/thesis.log",
+    script:
+        "../scripts/calibrate_load_cells.py"
+
+
+rule chapter_loadcell:
+    """Figures and tables of the load-cell chapter."""
+    message:
+        "Chapter loadcell: figures and tables"
+    input:
+        notebook="notebooks/loadcell.ipynb",
+        weights="raw/thesis/table_2_6.csv",
+        readings="raw/thesis/table_2_7.csv",
+        calibration=rules.calibrate_load_cells.output.coefficients,
+    output:
+        lines="results/report/loadcell/lines.svg",
+        printed="results/report/loadcell/printed.svg",
+        coefficients="results/report/loadcell/coefficients.csv",
+    params:
+        code=code_of_chapter("loadcell"),
+    log:
+        "results/logs/chapter_loadcell/run.log",
+        notebook="results/logs/chapter_loadcell/loadcell.ipynb",
+    script:
+        "../scripts/run_notebook.py"

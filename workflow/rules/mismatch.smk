@@ -1,0 +1,49 @@
+"""Where a simulation and recordings part, why, and a better model: `results/mismatch/<set>/verdict.json`."""
+
+
+def set_folder(name):
+    """Folder of a set: below `recordings`, else among the imported public ones."""
+    own = Path(CONFIG.recordings) / name
+    public = {s for names in PUBLIC_SETS_OF.values() for s in names}
+    if own.is_dir() or name not in public:
+        return str(own)
+    return public_set(name)
+
+
+def set_files(wildcards):
+    """Files of a set, each watched by content; of a public set its folder, which a rule makes."""
+    folder = set_folder(wildcards.set)
+    if folder == public_set(wildcards.set):
+        return [folder]
+    files = sorted(str(path) for path in Path(folder).glob("*") if path.is_file())
+    if not files:
+        raise WorkflowError(f"{folder}: no such recording set (a folder with vehicle.yaml and runs)")
+    return files
+
+
+def set_folder_of(wildcards):
+    """Folder that the script reads."""
+    return set_folder(wildcards.set)
+
+
+rule mismatch:
+    """Locate, explain, model, improve: the verdict on one recording set, its page and the improved vehicle."""
+    message:
+        "Mismatch: {wildcards.set}"
+    input:
+        files=set_files,
+    output:
+        verdict="results/mismatch/{set}/verdict.json",
+        page="results/mismatch/{set}/report.html",
+        improved="results/mismatch/{set}/improved_vehicle.yaml",
+    params:
+        folder=set_folder_of,
+        code=code_of("mismatch"),
+    log:
+        "results/logs/mismatch/{set}.log",
+    benchmark:
+        "results/logs/mismatch/{set}.benchmark.tsv"
+    wildcard_constraints:
+        set="[^/]+",
+    script:
+        "../scripts/mismatch.py"

@@ -1,0 +1,37 @@
+"""The verdict on one recording set.
+
+- Reads the set, analyses it, runs the simulation forward with the believed, refitted and improved vehicle.
+- Writes the verdict, the improved vehicle (read back and simulated to prove that it holds the model) and the page.
+- Bad input ends the job with one sentence.
+"""
+
+import sys
+from pathlib import Path
+
+from rotorid import log
+from rotorid.errors import InputError
+from rotorid.mismatch.deliver import deliver
+from rotorid.recordings import read_set
+
+
+def main(folder: str, verdict: str, page: str, improved: str) -> None:
+    """Analyse the set in `folder` and write the three files."""
+    deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), progress=report_progress)
+
+
+def report_progress(text: str) -> None:
+    """One line for the person who waits."""
+    print(f"  {text}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        try:
+            main(
+                folder=snakemake.params.folder,
+                verdict=snakemake.output.verdict,
+                page=snakemake.output.page,
+                improved=snakemake.output.improved,
+            )
+        except InputError as error:
+            sys.exit(f"rotorid: {error}")

@@ -1,0 +1,38 @@
+"""Rigid-body residuals of the NeuroBEM flights, beside what NeuroBEM itself leaves over.
+
+- Measured wrench minus the believed rotors' wrench, and minus NeuroBEM's own prediction; equal filters.
+- RMS of each flight and channel; RMS against airspeed with block-bootstrap intervals.
+- Where the recordings are not there, the result says so.
+"""
+
+import json
+from pathlib import Path
+
+from rotorid import log
+from rotorid.importers.report import read_report
+from rotorid.neurobem_comparison import compare, nothing
+from rotorid.recordings import read_set
+
+
+def main(folder: str, settings: dict, summary: str, flights: str, bins: str, points: str) -> None:
+    """Compare the flights in `folder`; `settings` holds cutoff_hz, airspeed_bin_m_s, block_s and seed."""
+    report = read_report(Path(folder))
+    found = compare(read_set(folder), **settings) if report["available"] else nothing()
+    result = {"available": report["available"], "reason": report["reason"], **settings, **found.summary}
+    Path(summary).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    found.flights.to_csv(flights, index=False)
+    found.bins.to_csv(bins, index=False)
+    found.points.to_csv(points, index=False, float_format="%.6g")
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        names = ("cutoff_hz", "airspeed_bin_m_s", "block_s", "seed")
+        main(
+            folder=snakemake.input.recordings,
+            settings={name: snakemake.params[name] for name in names},
+            summary=snakemake.output.summary,
+            flights=snakemake.output.flights,
+            bins=snakemake.output.bins,
+            points=snakemake.output.points,
+        )
