@@ -32,9 +32,9 @@ def all_errors(motion, vehicle, values):
 
 def forms(vehicle):
     needs = ("accelerometer",)
-    b = tuple(Parameter(f"b_{a}", "m/s2", -20.0, 20.0) for a in "xyz")
-    s = tuple(Parameter(f"s_{a}", "1", -0.9, 2.0) for a in "xyz")
-    t = tuple(Parameter(f"theta_{a}", "rad", -0.5, 0.5) for a in "xyz")
+    b = tuple(Parameter(f"b_{a}", "m/s2", -20.0, 20.0, negligible=0.01) for a in "xyz")
+    s = tuple(Parameter(f"s_{a}", "1", -0.9, 2.0, negligible=0.003) for a in "xyz")
+    t = tuple(Parameter(f"theta_{a}", "rad", -0.5, 0.5, negligible=0.001) for a in "xyz")
     return (
         Form("bias", "a_m = a + b", b, bias, needs),
         Form("scale", "a_m = (1 + s) a", s, scale, needs),

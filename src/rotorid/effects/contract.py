@@ -118,6 +118,8 @@ class Parameter:
     nonlinear: bool = False
     starts: tuple[float, ...] = ()
     meaning: str = ""
+    negligible: float = 0.0
+    """No instrument is better than this: a form whose parameters are all below it is not worth a word."""
 
 
 Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]

@@ -30,18 +30,24 @@ def misalignment(motion, vehicle, values):
 def forms(vehicle):
     needs = ("gyroscope", "rotation")
     return (
-        Form("bias", "Ω_m = Ω + b", tuple(Parameter(f"b_{a}", "rad/s") for a in "xyz"), bias, needs),
+        Form(
+            "bias",
+            "Ω_m = Ω + b",
+            tuple(Parameter(f"b_{a}", "rad/s", -5.0, 5.0, negligible=0.001) for a in "xyz"),
+            bias,
+            needs,
+        ),
         Form(
             "scale",
             "Ω_m = (1 + s) Ω",
-            tuple(Parameter(f"s_{a}", "1", -0.9, 2.0) for a in "xyz"),
+            tuple(Parameter(f"s_{a}", "1", -0.9, 2.0, negligible=0.005) for a in "xyz"),
             scale,
             needs,
         ),
         Form(
             "misalignment",
             "Ω_m = Ω + θ × Ω",
-            tuple(Parameter(f"theta_{a}", "rad", -0.5, 0.5) for a in "xyz"),
+            tuple(Parameter(f"theta_{a}", "rad", -0.5, 0.5, negligible=0.003) for a in "xyz"),
             misalignment,
             needs,
         ),

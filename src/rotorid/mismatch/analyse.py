@@ -99,6 +99,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         reverse_regression(prepared, model, segments),
         size,
     )
+    findings = [payload_or_offset(f, values) for f in findings]
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
     if model.wind is None:
@@ -213,6 +214,15 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
                 Finding(id=key, status="not_established", sentence=f"{effects[key].name} did not hold: {reason}")
             )
     return out
+
+
+def payload_or_offset(finding: Finding, values: dict) -> Finding:
+    """A centre of mass off its place on a vehicle that is heavier than believed may be a payload as well."""
+    heavier = values.get("mass", (0.0, 0.0))[0] > 0 or values.get("thrust", (0.0, 0.0))[0] < 0
+    if finding.id != "com_offset" or finding.status not in ("established", "ambiguous") or not heavier:
+        return finding
+    both = tuple(sorted({"com_offset", "payload", *finding.alternatives}))
+    return replace(finding, status="ambiguous", alternatives=both)
 
 
 def throttle_or_thrust(finding: Finding) -> Finding:

@@ -209,15 +209,18 @@ class Regression:
         grams = self.gram[np.ix_(np.flatnonzero(mask), with_it.columns, with_it.columns)]
         return float(((grams @ shift) @ shift).sum())
 
+    def beyond(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Columns and coefficients of a term's own part: what `keys` would absorb of it is taken off."""
+        others, own = self.columns(keys), self.columns([key])
+        gram = self._total_gram
+        inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
+        taken = -inner @ gram[np.ix_(others, own)] @ beta
+        return np.concatenate([others, own]), np.concatenate([taken, beta])
+
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
         """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
-        others = self.columns([k for k in keys if k != key])
-        own = self.columns([key])
-        cols = np.concatenate([others, own])
-        gram = self._total_gram
-        bias = self.bias_gram * self.training.mean()
-        inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
-        direction = np.concatenate([-inner @ gram[np.ix_(others, own)] @ beta, beta])
+        cols, direction = self.beyond([k for k in keys if k != key], key, beta)
+        gram, bias = self._total_gram, self.bias_gram * self.training.mean()
         energy = direction @ gram[np.ix_(cols, cols)] @ direction
         noise = direction @ bias[np.ix_(cols, cols)] @ direction
         return float(NOISE_SAFETY * noise / max(energy, 1e-300))

@@ -24,6 +24,9 @@ ALTERNATIVE_P = 0.01
 """A term that beside an alternative is less significant than this could be that alternative instead."""
 MOST_EXTRA_PARAMETERS = 3
 """An alternative with more further parameters than this explains by its freedom, not by its cause."""
+SHARE_OF_LARGEST_BURST = 0.15
+BURST_SIZE = 3.0
+"""A burst must be this many times larger than an effect that acts throughout."""
 MOST_EFFECTS = 10
 EXPECTED_HELD_OUT = 25.0
 """Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
@@ -86,7 +89,8 @@ class Search:
                 return False
             if index in term.form.must_show and abs(value) < 2.0 * sd:
                 return False
-        return True
+        limits = [term.form.parameters[i].negligible for i in term.form.linear]
+        return any(abs(value) > limit for value, limit in zip(beta, limits, strict=True))
 
     def judge(self, key: str, active: list[str], base: Fit, jackknife: bool = False) -> Candidate:
         """A term added to (or, if in `active`, kept in) the model."""
@@ -114,8 +118,10 @@ class Search:
                 cols = self.regression.columns([k])
                 where = [list(fit.columns).index(c) for c in cols]
                 largest = np.maximum(largest, self.sizes_of(k, fit.beta[where]))
-        counted = np.where(own >= SHARE_OF_LARGEST * largest, own, 0.0)
-        return float(counted.max())
+        if self.terms[key].run:
+            # A burst is easily imitated by what the form of a strong effect leaves over.
+            return float(np.where(own >= SHARE_OF_LARGEST_BURST * largest, own, 0.0).max()) / BURST_SIZE
+        return float(np.where(own >= SHARE_OF_LARGEST * largest, own, 0.0).max())
 
     def without(self, key: str, active: list[str]) -> Fit:
         return self.regression.fit(self.always + [k for k in active if k != key])
@@ -269,7 +275,10 @@ class Search:
                 continue
             without = self.without(key, active)
             expected = self.regression.expected_gain(with_it, without, mask)
-            gain = float((without.residual_square - with_it.residual_square)[mask].sum())
+            gains = np.sort((without.residual_square - with_it.residual_square)[mask])
+            # A gust in a held-out run must not decide about everything else: the outermost blocks do not count.
+            cut = max(1, len(gains) // 8)
+            gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
             if expected > EXPECTED_HELD_OUT and gain < worst:
                 worst, found = gain, key
         return found

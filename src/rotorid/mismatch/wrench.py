@@ -86,9 +86,14 @@ def wrench_model(
     )
     per = max(2, int(rate))
 
+    values = [t.key for t in terms if t.kind == "value"]
+
     def sizes_of(key: str, beta: np.ndarray) -> np.ndarray:
+        # What refitted values would absorb of a term does not count as its size.
         short = any(t.key == key and t.run for t in terms)
-        return local_sizes(rows, regression.columns([key]), beta, noise, per, 1.0 if short else 0.9)
+        own = regression.columns([key])
+        cols, coefficients = regression.beyond(values, key, beta) if key not in values else (own, beta)
+        return local_sizes(rows, cols, coefficients, noise, per, 1.0 if short else 0.9)
 
     search = Search(regression, sizes_of, known_sizes)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
@@ -139,7 +144,8 @@ def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None =
         groups = [g for g in ("force", "moment") if g in prepared.groups]
         if not groups:
             return None
-        terms = [t for t in prepared.terms if t.kind != "effect"]
+        # The chain has a bounded shift of its own; a free time offset of the rotors would swallow any lag.
+        terms = [t for t in prepared.terms if t.kind != "effect" and not t.key.startswith("offset:rotors")]
         precision = np.concatenate([1 / np.square(np.array(t.prior_sd)) for t in terms])
         keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
 
@@ -335,7 +341,10 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
             break
     sd = np.sqrt(np.diag(fit.covariance)[-2:])
     again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
-    if not any(again.search.terms[k].effect in FEELS_THE_AIR for k in again.selection.active):
+    drags = ("rotor_drag", "frame_drag")
+    had = {model.search.terms[k].effect for k in model.selection.active if model.search.terms[k].effect in drags}
+    has = {again.search.terms[k].effect for k in again.selection.active}
+    if not has & set(FEELS_THE_AIR) or (had and not had & has):
         return model
     again.wind, again.wind_sd = wind, sd
     return again
