@@ -32,11 +32,11 @@ from acquire.emulators.devices import (
 )
 from acquire.emulators.faults import Faults
 from acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics
+from acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
 from acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
 from acquire.emulators.truth import Truth, draw_truth, write_truth
 from acquire.emulators.wire import WireHalf, World
-from acquire.procedures import SteadyRule
+from acquire.procedures import STEADY_JR3, SteadyRule
 from acquire.programmes import programme_of
 from acquire.recorder import Recorder, Timings
 from acquire.transport import LoopbackTransport
@@ -49,7 +49,6 @@ from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 SEED = 2024
 REPEATS = 10
 PLATFORMS_Z = ("al", "pla", "jr3")
-STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)
 PROPELLER = "5040 three-blade"
 FIRST_DAY = datetime(2024, 3, 4, 9, 0, tzinfo=timezone(timedelta(hours=-6)))
 TESTS_PER_BATTERY = 6
@@ -188,9 +187,7 @@ def calibration(campaign: Campaign) -> None:
                     physics.place_load("z", load)
                     return lambda: True
 
-                setup = Setup(
-                    platform="clamp", cell=cell, load_gf=load, load_items=list(items), repeat=repeat
-                )
+                setup = Setup(platform="clamp", cell=cell, load_gf=load, load_items=list(items), repeat=repeat)
                 campaign.record(
                     "calibration",
                     f"cal-cell{cell}",
@@ -216,17 +213,13 @@ def static(campaign: Campaign) -> None:
                 rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
                 reaction = int(rng.integers(60, 120))
                 prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, reaction)
-                setup = Setup(
-                    platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat
-                )
+                setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
                 campaign.record(
                     "static",
                     f"static-{platform}-{axis}",
                     world,
                     {name: setup},
-                    lambda recorder, prompt=prompt, rule=rule: procedures.static_test(
-                        recorder, prompt, 50, rule
-                    ),
+                    lambda recorder, prompt=prompt, rule=rule: procedures.static_test(recorder, prompt, 50, rule),
                     {"name": "static_test", "samples": 50, **vars(rule)},
                 )
 
@@ -251,14 +244,8 @@ def dynamic(campaign: Campaign) -> None:
                 "dynamic",
                 f"dynamic-set{repeat}",
                 world,
-                {
-                    name: Setup(
-                        platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand"
-                    )
-                },
-                lambda recorder, prompt=prompt, rule=rule: procedures.dynamic_test(
-                    recorder, prompt, 1500, rule
-                ),
+                {name: Setup(platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand")},
+                lambda recorder, prompt=prompt, rule=rule: procedures.dynamic_test(recorder, prompt, 1500, rule),
                 {"name": "dynamic_test", "samples": 1500, **vars(rule)},
                 pause_s=300,
             )
@@ -317,28 +304,14 @@ def thrust(campaign: Campaign) -> None:
         )
 
 
-class TorqueRig:
-    """Vehicle on the wrench sensor, motor 1 driven and counted by the thrust tester."""
-
-    def __init__(self, campaign: Campaign, battery: Battery, rng: np.random.Generator) -> None:
-        truth = campaign.truth
-        self.rotors = Rotors(truth.rotor, battery, 4)
-        level = truth.wrench.model_copy(update={"tilt_rad": [0.0, 0.0]})  # a fixture of its own, levelled
-        self.stand = StandPhysics(truth.vehicle, truth.rotor, level, self.rotors, 0.0, 0.0, rng)
-        self.tester = TesterPhysics(self.rotors, truth.rotor, truth.tester, rng, loaded=False)
-
-    def process(self, dt_s: float) -> None:
-        """Advance by `dt_s`; the stand advances the rotors that both look at."""
-        self.stand.process(dt_s)
-
-
 def torque(campaign: Campaign) -> None:
     """Motor 1 on the vehicle on the wrench sensor at 2 to 40 % (20 tests)."""
+    truth = campaign.truth
     for percent in range(2, 41, 2):
         if percent % 10 == 2:
-            battery = Battery(campaign.truth.battery)
+            battery = Battery(truth.battery)
         name = f"torque-{percent:02d}"
-        rig = TorqueRig(campaign, battery, campaign.rng(name))
+        rig = TorqueRig(truth, battery, campaign.rng(name))
         common = Setup(
             axis="z",
             motor=1,
@@ -454,16 +427,16 @@ def run_campaign(
     truth: Truth | None = None,
     say: Callable[[str], None] = print,
 ) -> list[Session]:
-    """Record all parts into `raw/campaign` (written anew), the index, and the sealed truth. Returns
+    """Record parts into `raw/campaign/<part>` (written anew), the index, and the sealed truth. Returns
     the recordings. The sealed file must lie outside `raw`; raises ValueError otherwise."""
     if sealed.resolve().is_relative_to(raw.resolve()):
         raise ValueError(f"{sealed}: the truth must lie outside {raw}, or it is not concealed")
     campaign = Campaign(raw, truth or draw_truth(seed), seed)
-    shutil.rmtree(raw / "campaign", ignore_errors=True)
     for name in parts:
+        shutil.rmtree(raw / "campaign" / name, ignore_errors=True)
+        campaign.date = FIRST_DAY + timedelta(days=list(PARTS).index(name))  # a day each, whichever are made
         PARTS[name](campaign)
         say(f"{name}: {sum(s.setup.kind == name for s in campaign.recordings)} recordings")
-        campaign.date = datetime.combine(campaign.date.date() + timedelta(days=1), FIRST_DAY.timetz())
     write_index(raw)
     write_truth(campaign.truth, sealed, seed)
     return campaign.recordings
@@ -481,9 +454,7 @@ def main() -> None:
     given = parser.parse_args()
     recordings = run_campaign(given.raw, given.sealed, given.seed, given.part or PARTS)
     size = sum(file.stat().st_size for file in (given.raw / "campaign").rglob("*") if file.is_file())
-    print(
-        f"{len(recordings)} recordings, {size / 1e6:.1f} MB in {given.raw}/campaign; truth in {given.sealed}"
-    )
+    print(f"{len(recordings)} recordings, {size / 1e6:.1f} MB in {given.raw}/campaign; truth in {given.sealed}")
 
 
 if __name__ == "__main__":

@@ -30,9 +30,7 @@ Out = Annotated[Path, typer.Option(help="folder for the log and its metadata")]
 Name = Annotated[str | None, typer.Option("--id", help="name of the recording; default: instrument and time")]
 Plotted = Annotated[str | None, typer.Option("--plot", help="also draw this column, e.g. cell_1_v")]
 Operator = Annotated[str | None, typer.Option(help="who records")]
-AirText = Annotated[
-    str | None, typer.Option("--air", help="temperature °C, pressure Pa, humidity: 23,95400,0.5")
-]
+AirText = Annotated[str | None, typer.Option("--air", help="temperature °C, pressure Pa, humidity: 23,95400,0.5")]
 Propeller = Annotated[str | None, typer.Option(help="propeller, e.g. '5040 three-blade'")]
 BatteryName = Annotated[str | None, typer.Option("--battery", help="battery, e.g. '4S 1500 mAh no. 1'")]
 PlaceS = Annotated[
@@ -48,9 +46,7 @@ def ports() -> None:
 
     found = sorted(list_ports.comports())
     if not found:
-        typer.echo(
-            "no serial port found. Plug the instrument in; for an emulator: rotorid-acquire emulate --help"
-        )
+        typer.echo("no serial port found. Plug the instrument in; for an emulator: rotorid-acquire emulate --help")
     for port in found:
         typer.echo(f"{port.device}\t{port.description}\t{port.hwid}")
 
@@ -59,12 +55,10 @@ def ports() -> None:
 def bench(
     port: Port,
     test: Annotated[str, typer.Option(help="stream, calibrate, static or dynamic")] = "stream",
-    samples: Annotated[
-        int | None, typer.Option(help="how many; default: 400, 50, 1500, or until Ctrl-C")
-    ] = None,
+    samples: Annotated[int | None, typer.Option(help="how many; default: 400, 50, 1500, or until Ctrl-C")] = None,
     rate: Annotated[float | None, typer.Option(help="samples a second, for stream")] = None,
     cell: Annotated[int | None, typer.Option(help="cell that is calibrated, 1–6")] = None,
-    platform: Annotated[str, typer.Option(help="al or pla")] = "al",
+    platform: Annotated[str, typer.Option(help="al, pla, or jr3: the reference sensor")] = "al",
     axis: Annotated[str | None, typer.Option(help="x, y or z")] = None,
     load_gf: Annotated[float | None, typer.Option(help="the weight, gf")] = None,
     repeat: Annotated[int | None, typer.Option(help="number of the repeat")] = None,
@@ -76,25 +70,24 @@ def bench(
     plot: Plotted = None,
 ) -> None:
     """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
+    instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
     kind = {"calibrate": "calibration", "stream": "free"}.get(test, test)
-    setup = Setup(
-        kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=operator
-    )
+    setup = Setup(kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=operator)
 
     def run(recorder: Recorder) -> None:
         prompt = _prompt(recorder, place_s)
         if test == "calibrate":
             procedures.calibrate_cell(recorder, prompt, samples or 400)
         elif test == "static":
-            procedures.static_test(recorder, prompt, samples or 50)
+            procedures.static_test(recorder, prompt, samples or 50, rule)
         elif test == "dynamic":
-            procedures.dynamic_test(recorder, prompt, samples or 1500)
+            procedures.dynamic_test(recorder, prompt, samples or 1500, rule)
         elif test == "stream":
             procedures.stream(recorder, samples, 1 / rate if rate else 0.0)
         else:
             raise typer.BadParameter(f"--test is stream, calibrate, static or dynamic, not {test!r}")
 
-    _record({"bench": port}, {"bench": setup}, run, {"name": test}, out, name, air, plot)
+    _record({instrument: port}, {instrument: setup}, run, {"name": test}, out, name, air, plot)
 
 
 @app.command()
@@ -112,9 +105,7 @@ def rotor(
     plot: Plotted = None,
 ) -> None:
     """Record the thrust tester: rest, throttle, rest. Keep clear of the propeller."""
-    setup = Setup(
-        kind="thrust", throttle=throttle, propeller=propeller, battery=battery, operator=operator, motor=1
-    )
+    setup = Setup(kind="thrust", throttle=throttle, propeller=propeller, battery=battery, operator=operator, motor=1)
     procedure = {"name": "thrust_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s}
     _record(
         {"rotor": port},
@@ -225,8 +216,7 @@ def experiment(
     row = EXPERIMENTS[number]
     letter, programme = programme_of(row)
     typer.echo(
-        f"experiment {number}: {row.dynamics}, {row.signal}, "
-        f"mount at roll {row.roll_deg}°, pitch {row.pitch_deg}°",
+        f"experiment {number}: {row.dynamics}, {row.signal}, mount at roll {row.roll_deg}°, pitch {row.pitch_deg}°",
         err=True,
     )
     setup = Setup(
@@ -248,6 +238,46 @@ def experiment(
         {"name": "experiment", "number": number, "letter": letter, "duration_s": programme.duration_s},
         out,
         name or f"exp-{number:02d}-{datetime.now():%Y%m%d-%H%M%S}",
+        air,
+        plot,
+    )
+
+
+@app.command()
+def torque(
+    throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
+    rotor_port: Annotated[str, typer.Option(help="serial port of the thrust tester, which drives motor 1")],
+    wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor below the vehicle")],
+    rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 2.0,
+    hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 6.0,
+    propeller: Propeller = None,
+    battery: BatteryName = None,
+    out: Out = DEFAULT_OUT,
+    name: Name = None,
+    operator: Operator = None,
+    air: AirText = None,
+    plot: Plotted = None,
+) -> None:
+    """Record the torque of motor 1 by thrust tester and six-axis sensor. Keep clear of the propeller."""
+    setup = Setup(
+        kind="torque",
+        axis="z",
+        motor=1,
+        throttle=throttle,
+        mount_roll_deg=0.0,
+        mount_pitch_deg=0.0,
+        tared=False,
+        propeller=propeller,
+        battery=battery,
+        operator=operator,
+    )
+    _record(
+        {"rotor": rotor_port, "wrench": wrench_port},
+        {"rotor": setup, "wrench": setup},
+        lambda tester, sensor: procedures.torque_test(tester, sensor, throttle, rest_s, hold_s),
+        {"name": "torque_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s},
+        out,
+        name,
         air,
         plot,
     )
@@ -307,9 +337,7 @@ def check(
     table = parsed.table
     typer.echo(f"{log}: {parsed.instrument.title} ({parsed.start.firmware}), {len(table)} samples", nl=False)
     typer.echo(f", {table.time_s.iloc[-1]:.2f} s of device time" if len(table) else "")
-    typer.echo(
-        f"missing {parsed.missing} in {len(parsed.gaps)} gaps, repeated {parsed.repeated}, damaged ", nl=False
-    )
+    typer.echo(f"missing {parsed.missing} in {len(parsed.gaps)} gaps, repeated {parsed.repeated}, damaged ", nl=False)
     typer.echo(f"{parsed.checksum_errors + parsed.broken_frames}, resets {parsed.resets}")
     if parsed.cut_at is not None:
         typer.echo(f"cut off at byte {parsed.cut_at}; everything before that is there")
@@ -336,12 +364,13 @@ def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = 
 
 @app.command()
 def emulate(
-    what: Annotated[str, typer.Argument(help="bench, rotor, wrench, quadrotor, stand, jr3 or tensile")],
-    link: Annotated[list[Path], typer.Option(help="name for the port; stand: two, quadrotor then wrench")],
+    what: Annotated[str, typer.Argument(help="bench, rotor, wrench, quadrotor, stand, torque, jr3 or tensile")],
+    link: Annotated[
+        list[Path],
+        typer.Option(help="name for the port; stand (quadrotor, wrench) and torque (rotor, wrench) need two"),
+    ],
     material: Annotated[str, typer.Option(help="of the bench: al or pla")] = "al",
-    load: Annotated[
-        str | None, typer.Option(help="put a weight on: AXIS:GF@SECONDS, e.g. z:500.48@6")
-    ] = None,
+    load: Annotated[str | None, typer.Option(help="put a weight on: AXIS:GF@SECONDS, e.g. z:500.48@6")] = None,
     number: Annotated[int, typer.Option("--experiment", help="stand: mount angle of this experiment")] = 1,
     infill_percent: Annotated[int, typer.Option(help="of the tensile specimen")] = 100,
     speed: Annotated[float, typer.Option(help="device seconds per second")] = 1.0,

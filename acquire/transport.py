@@ -49,9 +49,7 @@ class SerialTransport:
     def open(self) -> None:
         """Raises PortMissing or PortBusy."""
         try:
-            self._serial = serial.Serial(
-                self.name, self.baud_rate, timeout=0, write_timeout=1, exclusive=True
-            )
+            self._serial = serial.Serial(self.name, self.baud_rate, timeout=0, write_timeout=1, exclusive=True)
         except (serial.SerialException, OSError) as error:
             raise _port_error(self.name, error) from error
 
@@ -106,9 +104,7 @@ def _port_error(name: str, error: Exception) -> PortMissing | PortBusy:
             f"{name}: you may not open this port. On Linux: `sudo usermod -aG dialout $USER`, log in again."
         )
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in text:
-        return PortBusy(
-            f"{name}: another program holds this port. Close it there (a serial monitor?), try again."
-        )
+        return PortBusy(f"{name}: another program holds this port. Close it there (a serial monitor?), try again.")
     return PortMissing(f"{name}: cannot be opened ({text}). Unplug the instrument, plug it in, try again.")
 
 

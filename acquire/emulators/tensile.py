@@ -18,9 +18,7 @@ class TensilePhysics:
     """Strain ε = σ/E + 0.002 ((σ − σ_p)/(σ_y − σ_p))^n beyond the proportional limit σ_p, so that the stress
     at 0.2 % plastic strain is the yield strength; it breaks a little after the ultimate strength."""
 
-    def __init__(
-        self, plastic: PlasticTruth, scale: float, slack_mm: float, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, plastic: PlasticTruth, scale: float, slack_mm: float, rng: np.random.Generator) -> None:
         """`scale` multiplies all strengths and the modulus; `slack_mm` is taken up before the force rises."""
         self._rng = rng
         stress = np.linspace(0, plastic.ultimate_pa * scale, 2000)

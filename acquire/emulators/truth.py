@@ -215,9 +215,7 @@ def draw_truth(seed: int) -> Truth:
             resonance_hz=60.0,
         ),
         specimen_scatter=0.012,
-        clocks=ClockTruth(
-            **dict(zip(ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))
-        ),
+        clocks=ClockTruth(**dict(zip(ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))),
     )
 
 
@@ -233,9 +231,7 @@ def _crosstalk(rng: np.random.Generator) -> list[list[float]]:
     """
     matrix = np.eye(6)
     off = ~np.eye(6, dtype=bool)
-    scale = np.block(
-        [[np.full((3, 3), 0.015), np.full((3, 3), 0.3)], [np.full((3, 3), 8e-4), np.full((3, 3), 0.015)]]
-    )
+    scale = np.block([[np.full((3, 3), 0.015), np.full((3, 3), 0.3)], [np.full((3, 3), 8e-4), np.full((3, 3), 0.015)]])
     matrix[off] += (rng.uniform(-1, 1, (6, 6)) * scale)[off]
     matrix[5, :5] = 0.0
     return matrix.round(6).tolist()

@@ -26,9 +26,7 @@ def plugged(tmp_path: Path) -> Iterator[Callable[..., EmulatedPorts]]:
     """Plug an emulator in: `plugged("bench", Faults(...))` gives running ports with stable names."""
     with ExitStack() as stack:
 
-        def plug(
-            what: str, faults: Faults | None = None, truth: Truth | None = None, **options
-        ) -> EmulatedPorts:
+        def plug(what: str, faults: Faults | None = None, truth: Truth | None = None, **options) -> EmulatedPorts:
             world = build(what, truth or Truth(), faults=faults)
             links = [tmp_path / f"tty{line.device.instrument.name}" for line in world.lines]
             return stack.enter_context(EmulatedPorts(world, links, **options))

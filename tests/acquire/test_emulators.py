@@ -131,9 +131,7 @@ def test_rotor_lag_curve_and_battery():
 def stand(roll=0.0, pitch=0.0, vehicle=None, speeds=(0, 0, 0, 0)):
     rotors = Rotors(RotorTruth(), Battery(BatteryTruth()), 4)
     rotors.speed = np.array(speeds, dtype=float)
-    return StandPhysics(
-        vehicle or VehicleTruth(), RotorTruth(), SensorTruth(), rotors, roll, pitch, RNG(0)
-    ).wrench()
+    return StandPhysics(vehicle or VehicleTruth(), RotorTruth(), SensorTruth(), rotors, roll, pitch, RNG(0)).wrench()
 
 
 def test_stand_carries_the_weight():

@@ -48,6 +48,7 @@ def forms(vehicle):
             ),
             rigid,
             ("specific_force",),
+            must_show=(0,),
         ),
         Form(
             "slung",

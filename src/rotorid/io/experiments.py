@@ -52,6 +52,4 @@ def _rows() -> list[tuple]:
     return rows
 
 
-EXPERIMENTS: dict[int, Experiment] = {
-    number: Experiment(number, *row) for number, row in enumerate(_rows(), start=1)
-}
+EXPERIMENTS: dict[int, Experiment] = {number: Experiment(number, *row) for number, row in enumerate(_rows(), start=1)}

@@ -72,13 +72,14 @@ class Answer(NamedTuple):
 @dataclass(frozen=True)
 class Channel:
     """One number of a sample. `column` carries the unit; value = scale × count. `low` and `high` are the
-    counts at which the channel saturates."""
+    counts at which the channel saturates; a command or a state (`reading=False`) does not saturate."""
 
     column: str
     code: str  # struct format of the count
     scale: float
     low: int
     high: int
+    reading: bool = True
 
 
 @dataclass(frozen=True)
@@ -106,9 +107,7 @@ class Instrument:
 
     def encode(self, counts: tuple[int, ...] | list[int]) -> bytes:
         """Payload of a data frame. Counts beyond a channel's range stand at its end, as a converter's do."""
-        return self.layout.pack(
-            *(min(max(n, c.low), c.high) for n, c in zip(counts, self.channels, strict=True))
-        )
+        return self.layout.pack(*(min(max(n, c.low), c.high) for n, c in zip(counts, self.channels, strict=True)))
 
     def decode(self, payload: bytes) -> tuple[float, ...]:
         """Values in the columns' units. Raises struct.error where the payload has another length."""
