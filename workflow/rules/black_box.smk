@@ -73,7 +73,7 @@ rule chapter_black_box:
     message:
         "Chapter black box: figures and tables"
     input:
-        notebook=ROOT / "notebooks" / "black_box.ipynb",
+        notebook="notebooks/black_box.ipynb",
         history=rules.train_black_box.output.history,
         tested=rules.train_black_box.output.tested,
         metrics=rules.compare_black_box.output.metrics,

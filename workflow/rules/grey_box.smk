@@ -135,7 +135,7 @@ rule chapter_grey_box:
     message:
         "Chapter grey box: figures and tables"
     input:
-        notebook=ROOT / "notebooks" / "grey_box.ipynb",
+        notebook="notebooks/grey_box.ipynb",
         thrust=rules.fit_white_box.output.thrust,
         torque=rules.fit_white_box.output.torque,
         rotor=rules.train_rotor_networks.output.fits,

@@ -59,7 +59,7 @@ rule chapter_white_box:
     message:
         "Chapter white box: figures and tables"
     input:
-        notebook=ROOT / "notebooks" / "white_box.ipynb",
+        notebook="notebooks/white_box.ipynb",
         thrust=rules.fit_white_box.output.thrust,
         torque=rules.fit_white_box.output.torque,
         parameters=rules.fit_white_box.output.parameters,

@@ -90,14 +90,14 @@ def main(
             "difference_percent": 100 * fit["difference"],
             "how": "least squares through the origin",
         }
-        for name, unit, fit in (("$C_F$", "N s²", found["c_f"]), ("$C_Q$", "N m s²", found["c_q"]))
+        for name, unit, fit in (("C_F", "N s²", found["c_f"]), ("C_Q", "N m s²", found["c_q"]))
     ]
     for axis in ("xx", "yy", "zz"):
         believed = thesis.WHITE_BOX[f"inertia_{axis}_kg_m2"]
         value = found["inertia_kg_m2"][axis]
         rows.append(
             {
-                "parameter": f"$J_{{{axis}}}$",
+                "parameter": f"J_{axis}",
                 "unit": "kg m²",
                 "thesis": believed,
                 "value": value,
