@@ -18,7 +18,7 @@ SOURCES := $(shell find Snakefile config.yaml pyproject.toml README.md .pre-comm
 	src acquire workflow notebooks tests raw docs \
 	-type f ! -path '*/__pycache__/*' ! -name '* *' 2>/dev/null)
 
-.PHONY: help report test check environment lock
+.PHONY: help report campaign test check environment lock
 .DEFAULT_GOAL := help
 
 help: ## say what there is
@@ -27,6 +27,9 @@ help: ## say what there is
 report: $(READY) ## make the report from raw measurements
 	@$(BIN)/snakemake --cores $(CORES) $(OPTIONS)
 	@echo "The report: results/report/report.pdf and results/report/report.html"
+
+campaign: $(READY) ## record the emulated campaign anew into raw/campaign
+	@$(BIN)/python -m acquire.campaign
 
 test: $(TESTED) ## run every check; does nothing when nothing has changed since it last passed
 	@echo "Every check has passed on these files."

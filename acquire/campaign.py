@@ -32,11 +32,11 @@ from acquire.emulators.devices import (
 )
 from acquire.emulators.faults import Faults
 from acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics
+from acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
 from acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
 from acquire.emulators.truth import Truth, draw_truth, write_truth
 from acquire.emulators.wire import WireHalf, World
-from acquire.procedures import SteadyRule
+from acquire.procedures import STEADY_JR3, SteadyRule
 from acquire.programmes import programme_of
 from acquire.recorder import Recorder, Timings
 from acquire.transport import LoopbackTransport
@@ -49,7 +49,6 @@ from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 SEED = 2024
 REPEATS = 10
 PLATFORMS_Z = ("al", "pla", "jr3")
-STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)
 PROPELLER = "5040 three-blade"
 FIRST_DAY = datetime(2024, 3, 4, 9, 0, tzinfo=timezone(timedelta(hours=-6)))
 TESTS_PER_BATTERY = 6
@@ -305,28 +304,14 @@ def thrust(campaign: Campaign) -> None:
         )
 
 
-class TorqueRig:
-    """Vehicle on the wrench sensor, motor 1 driven and counted by the thrust tester."""
-
-    def __init__(self, campaign: Campaign, battery: Battery, rng: np.random.Generator) -> None:
-        truth = campaign.truth
-        self.rotors = Rotors(truth.rotor, battery, 4)
-        level = truth.wrench.model_copy(update={"tilt_rad": [0.0, 0.0]})  # a fixture of its own, levelled
-        self.stand = StandPhysics(truth.vehicle, truth.rotor, level, self.rotors, 0.0, 0.0, rng)
-        self.tester = TesterPhysics(self.rotors, truth.rotor, truth.tester, rng, loaded=False)
-
-    def process(self, dt_s: float) -> None:
-        """Advance by `dt_s`; the stand advances the rotors that both look at."""
-        self.stand.process(dt_s)
-
-
 def torque(campaign: Campaign) -> None:
     """Motor 1 on the vehicle on the wrench sensor at 2 to 40 % (20 tests)."""
+    truth = campaign.truth
     for percent in range(2, 41, 2):
         if percent % 10 == 2:
-            battery = Battery(campaign.truth.battery)
+            battery = Battery(truth.battery)
         name = f"torque-{percent:02d}"
-        rig = TorqueRig(campaign, battery, campaign.rng(name))
+        rig = TorqueRig(truth, battery, campaign.rng(name))
         common = Setup(
             axis="z",
             motor=1,
@@ -442,16 +427,16 @@ def run_campaign(
     truth: Truth | None = None,
     say: Callable[[str], None] = print,
 ) -> list[Session]:
-    """Record all parts into `raw/campaign` (written anew), the index, and the sealed truth. Returns
+    """Record parts into `raw/campaign/<part>` (written anew), the index, and the sealed truth. Returns
     the recordings. The sealed file must lie outside `raw`; raises ValueError otherwise."""
     if sealed.resolve().is_relative_to(raw.resolve()):
         raise ValueError(f"{sealed}: the truth must lie outside {raw}, or it is not concealed")
     campaign = Campaign(raw, truth or draw_truth(seed), seed)
-    shutil.rmtree(raw / "campaign", ignore_errors=True)
     for name in parts:
+        shutil.rmtree(raw / "campaign" / name, ignore_errors=True)
+        campaign.date = FIRST_DAY + timedelta(days=list(PARTS).index(name))  # a day each, whichever are made
         PARTS[name](campaign)
         say(f"{name}: {sum(s.setup.kind == name for s in campaign.recordings)} recordings")
-        campaign.date = datetime.combine(campaign.date.date() + timedelta(days=1), FIRST_DAY.timetz())
     write_index(raw)
     write_truth(campaign.truth, sealed, seed)
     return campaign.recordings

@@ -58,7 +58,7 @@ def bench(
     samples: Annotated[int | None, typer.Option(help="how many; default: 400, 50, 1500, or until Ctrl-C")] = None,
     rate: Annotated[float | None, typer.Option(help="samples a second, for stream")] = None,
     cell: Annotated[int | None, typer.Option(help="cell that is calibrated, 1–6")] = None,
-    platform: Annotated[str, typer.Option(help="al or pla")] = "al",
+    platform: Annotated[str, typer.Option(help="al, pla, or jr3: the reference sensor")] = "al",
     axis: Annotated[str | None, typer.Option(help="x, y or z")] = None,
     load_gf: Annotated[float | None, typer.Option(help="the weight, gf")] = None,
     repeat: Annotated[int | None, typer.Option(help="number of the repeat")] = None,
@@ -70,6 +70,7 @@ def bench(
     plot: Plotted = None,
 ) -> None:
     """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
+    instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
     kind = {"calibrate": "calibration", "stream": "free"}.get(test, test)
     setup = Setup(kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=operator)
 
@@ -78,15 +79,15 @@ def bench(
         if test == "calibrate":
             procedures.calibrate_cell(recorder, prompt, samples or 400)
         elif test == "static":
-            procedures.static_test(recorder, prompt, samples or 50)
+            procedures.static_test(recorder, prompt, samples or 50, rule)
         elif test == "dynamic":
-            procedures.dynamic_test(recorder, prompt, samples or 1500)
+            procedures.dynamic_test(recorder, prompt, samples or 1500, rule)
         elif test == "stream":
             procedures.stream(recorder, samples, 1 / rate if rate else 0.0)
         else:
             raise typer.BadParameter(f"--test is stream, calibrate, static or dynamic, not {test!r}")
 
-    _record({"bench": port}, {"bench": setup}, run, {"name": test}, out, name, air, plot)
+    _record({instrument: port}, {instrument: setup}, run, {"name": test}, out, name, air, plot)
 
 
 @app.command()
@@ -243,6 +244,46 @@ def experiment(
 
 
 @app.command()
+def torque(
+    throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
+    rotor_port: Annotated[str, typer.Option(help="serial port of the thrust tester, which drives motor 1")],
+    wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor below the vehicle")],
+    rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 2.0,
+    hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 6.0,
+    propeller: Propeller = None,
+    battery: BatteryName = None,
+    out: Out = DEFAULT_OUT,
+    name: Name = None,
+    operator: Operator = None,
+    air: AirText = None,
+    plot: Plotted = None,
+) -> None:
+    """Record the torque of motor 1 by thrust tester and six-axis sensor. Keep clear of the propeller."""
+    setup = Setup(
+        kind="torque",
+        axis="z",
+        motor=1,
+        throttle=throttle,
+        mount_roll_deg=0.0,
+        mount_pitch_deg=0.0,
+        tared=False,
+        propeller=propeller,
+        battery=battery,
+        operator=operator,
+    )
+    _record(
+        {"rotor": rotor_port, "wrench": wrench_port},
+        {"rotor": setup, "wrench": setup},
+        lambda tester, sensor: procedures.torque_test(tester, sensor, throttle, rest_s, hold_s),
+        {"name": "torque_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s},
+        out,
+        name,
+        air,
+        plot,
+    )
+
+
+@app.command()
 def tensile(
     port: Port,
     infill_percent: Annotated[int, typer.Option(help="infill density of the specimen")],
@@ -323,8 +364,11 @@ def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = 
 
 @app.command()
 def emulate(
-    what: Annotated[str, typer.Argument(help="bench, rotor, wrench, quadrotor, stand, jr3 or tensile")],
-    link: Annotated[list[Path], typer.Option(help="name for the port; stand: two, quadrotor then wrench")],
+    what: Annotated[str, typer.Argument(help="bench, rotor, wrench, quadrotor, stand, torque, jr3 or tensile")],
+    link: Annotated[
+        list[Path],
+        typer.Option(help="name for the port; stand (quadrotor, wrench) and torque (rotor, wrench) need two"),
+    ],
     material: Annotated[str, typer.Option(help="of the bench: al or pla")] = "al",
     load: Annotated[str | None, typer.Option(help="put a weight on: AXIS:GF@SECONDS, e.g. z:500.48@6")] = None,
     number: Annotated[int, typer.Option("--experiment", help="stand: mount angle of this experiment")] = 1,

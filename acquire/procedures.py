@@ -28,6 +28,9 @@ class SteadyRule:
     tolerance: float = 2e-7
 
 
+STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)  # in N: the reference sensor is noisy
+
+
 def stream(recorder: Recorder, samples: int | None, interval_s: float = 0.0) -> None:
     """Record `samples` samples, or until interrupted."""
     recorder.start(interval_s)
@@ -148,6 +151,7 @@ def start_programme(recorder: Recorder, letter: str, programme: quadrotor.Progra
     recorder.command(letter, programme.pack())
     recorder.begin_stream()
     recorder.resume = None
+    recorder.ends_by_itself = True
     recorder.phase = quadrotor.DYNAMICS[letter]
     recorder.wanted = round((programme.duration_s + 0.5) * 1e6 / recorder.instrument.interval_us)
 
@@ -165,7 +169,7 @@ def experiment(
     _together(sensor, rest_s / interval_s, vehicle)
     start_programme(vehicle, letter, programme)
     sensor.phase = vehicle.phase
-    while vehicle.ended is None:
+    while not vehicle.over:
         vehicle.pump()
         sensor.pump()
         vehicle.drop_rows()

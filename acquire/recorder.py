@@ -109,6 +109,8 @@ class Recorder:
         self.resume: Callable[[], None] | None = None
         self.on_row: Callable[[Row], None] | None = None
         self.stop_asked = stop_asked or threading.Event()
+        self.ends_by_itself = False  # a programme that the device finishes without being told
+        self.over = False  # the stream has ended
         self.ended: wire.EndRecord | None = None
         self.identity: wire.StartRecord | None = None
         self._transport = transport
@@ -254,7 +256,7 @@ class Recorder:
             if self._rows:
                 self._consumed += 1
                 yield self._rows.popleft()
-            elif self.ended is not None:
+            elif self.over:
                 return
             else:
                 self.pump()
@@ -356,6 +358,7 @@ class Recorder:
             self.ended = wire.EndRecord.unpack(frame.payload)
             self._skipped += self.ended.skipped
             self._streaming = False
+            self.over = True
 
     def _time(self, row: Row, now_ns: int) -> None:
         """Keep the first and the latest sample of the present segment, for rate and clock ratio."""
@@ -363,7 +366,9 @@ class Recorder:
             if self._first is not None:
                 self._restart_device_s += self._latest.time_s - self._first.time_s
             self._first, self._first_host_ns = row, now_ns
-        self._latest, self._latest_host_ns = row, now_ns
+            self._latest, self._latest_host_ns = row, now_ns
+        elif row.time_s > self._latest.time_s:
+            self._latest, self._latest_host_ns = row, now_ns
 
     def _send(self, letter: str, arguments: bytes) -> None:
         payload = letter.encode() + arguments
@@ -426,6 +431,11 @@ class Recorder:
 
     def _after_silence(self) -> None:
         self._event("silence", f"nothing for {self._timings.silence_s:g} s")
+        if self.ends_by_itself and self._ask_identity() and not self._restarted:
+            self._event("end_lost", "the device is there and idle: its end record was lost on the way")
+            self._streaming = False
+            self.over = True
+            return
         self._after_restart()
 
     def _reconnect(self, error: PortLost) -> None:

@@ -8,11 +8,13 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
+import numpy as np
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from acquire.geometry import body_forces, cell_forces
 from acquire.recorder import Recorder
 
 REFRESH_HZ = 5
@@ -71,6 +73,17 @@ def panel(recorder: Recorder) -> Table:
     return table
 
 
+def bench_forces(recorder: Recorder) -> Text | None:
+    """Forces on the vehicle in N by table 2.8's calibration, once the bench is tared (thesis fig. 2.38)."""
+    tare, values = recorder.session.tare, recorder.status().values
+    if recorder.instrument.name != "bench" or not tare or not values:
+        return None
+    volts = np.array(values) - np.array([tare[column] for column in recorder.instrument.columns])
+    forces = body_forces(cell_forces(volts))
+    text = "   ".join(f"{name} {value:8.3f}" for name, value in zip("xyz", forces, strict=True))
+    return Text(f"force on the vehicle [N]   {text}", style="green")
+
+
 def watch(
     recorders: list[Recorder],
     run: Callable[[], None],
@@ -106,7 +119,8 @@ def watch(
         thread.start()
 
         def picture() -> Group:
-            return Group(*(panel(recorder) for recorder in recorders), *(plot.render() for plot in plots))
+            forces = [text for recorder in recorders if (text := bench_forces(recorder)) is not None]
+            return Group(*map(panel, recorders), *forces, *(plot.render() for plot in plots))
 
         with Live(picture(), console=console, auto_refresh=False) as live:
             while thread.is_alive():

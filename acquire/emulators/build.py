@@ -15,13 +15,13 @@ from acquire.emulators.devices import (
 )
 from acquire.emulators.faults import Faults
 from acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from acquire.emulators.stand import LoadedSensor, StandPhysics
+from acquire.emulators.stand import LoadedSensor, StandPhysics, TorqueRig
 from acquire.emulators.tensile import TensilePhysics
 from acquire.emulators.truth import Truth
 from acquire.emulators.wire import WireHalf, World
 from rotorid.io.experiments import EXPERIMENTS
 
-NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "jr3", "tensile")
+NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "torque", "jr3", "tensile")
 
 
 def build(
@@ -34,7 +34,8 @@ def build(
     fault_share: float = 0.0,
     faults: Faults | None = None,
 ) -> World:
-    """A world with one instrument, or (`stand`) with quadrotor and wrench. Raises ValueError for a name,
+    """A world with one instrument, or (`stand`) with quadrotor and wrench, or (`torque`) with thrust tester
+    and wrench. Raises ValueError for a name,
     material, experiment or infill that does not exist."""
     rng = np.random.default_rng(seed)
 
@@ -60,6 +61,9 @@ def build(
         rotors = Rotors(truth.rotor, Battery(truth.battery), 1)
         physics = TesterPhysics(rotors, truth.rotor, truth.tester, rng)
         return World(physics, line(RotorDevice(physics)))
+    if what == "torque":
+        rig = TorqueRig(truth, Battery(truth.battery), rng)
+        return World(rig, line(RotorDevice(rig.tester)), line(WrenchDevice(rig.stand)))
     if what not in NAMES:
         raise ValueError(f"there is no emulator {what!r}; there are {', '.join(NAMES)}")
     if experiment not in EXPERIMENTS:

@@ -19,8 +19,8 @@ class Faults:
     garbage: frozenset[int] = frozenset()  # sixteen random bytes before it
     share: float = 0.0  # each of the six kinds above befalls a frame at random with this probability
     reset_at: frozenset[int] = frozenset()  # the device restarts instead of sending it
-    unplug_at: frozenset[int] = frozenset()  # the port goes away (pseudo-terminals only)
     silent_from: int | None = None  # nothing from here on, no answers either
+    lose_end: bool = False  # the end record never arrives
     refuse: frozenset[str] = frozenset()  # commands refused
     pace: float = 1.0  # samples per promised sample
     clock_start_us: int = 0  # the device clock at power-up

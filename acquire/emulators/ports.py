@@ -81,6 +81,7 @@ class EmulatedPorts:
         self._away_until: dict[int, float] = {}
         self._wake_read, self._wake_write = os.pipe()
         self._stopping = threading.Event()
+        self._last = 0.0
         self._thread = threading.Thread(target=self._run, name="emulator", daemon=True)
         self.error: BaseException | None = None
 
@@ -104,6 +105,10 @@ class EmulatedPorts:
         if self.error is not None:
             raise self.error
 
+    def pull(self, number: int = 0) -> None:
+        """Pull the plug of a line, now; what is still in its buffers is lost with it."""
+        self._world.lines[number].unplugged = True
+
     def wait(self) -> None:
         """Run until interrupted (for a terminal of its own)."""
         while self._thread.is_alive():
@@ -113,10 +118,10 @@ class EmulatedPorts:
 
     def _run(self) -> None:
         try:
-            begin = time.monotonic()
+            self._last = time.monotonic()
             while not self._stopping.is_set():
                 self._listen()
-                self._pass_time(begin)
+                self._pass_time()
                 for i, line in enumerate(self._world.lines):
                     if line.unplugged:
                         self._stay_away(i, line)
@@ -152,9 +157,14 @@ class EmulatedPorts:
             return False
         return all(t.master < 0 or t.unread() == 0 for t in self.terminals)
 
-    def _pass_time(self, begin: float) -> None:
+    def _pass_time(self) -> None:
         if self._speed is not None:
-            self._world.run_until((time.monotonic() - begin) * self._speed)
+            now = time.monotonic()
+            step_s, self._last = (now - self._last) * self._speed, now
+            if self._speed > 1:
+                # faster than life: rather late than jumping ahead of a host that cannot follow
+                step_s = 0.0 if any(self._pending) else min(step_s, 5 * self._slice_s * self._speed)
+            self._world.run_until(self._world.now_s + step_s)
         elif self._may_go_on():
             self._world.run_until(self._world.now_s + self._slice_s)
 
@@ -173,9 +183,6 @@ class EmulatedPorts:
     def _stay_away(self, i: int, line: WireHalf) -> None:
         terminal = self.terminals[i]
         if terminal.master >= 0:
-            # what the host's side holds already is not lost with the cable: let it be read first
-            while terminal.unread() and not self._stopping.is_set():
-                time.sleep(2e-4)
             terminal.unplug()
             self._pending[i].clear()
             line.cut()

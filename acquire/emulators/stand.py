@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from acquire.emulators.loads import AXES, put_down
-from acquire.emulators.rotor import Rotors
+from acquire.emulators.rotor import Battery, Rotors, TesterPhysics
 from acquire.emulators.sensor import SixAxis
-from acquire.emulators.truth import RotorTruth, SensorTruth, VehicleTruth
+from acquire.emulators.truth import RotorTruth, SensorTruth, Truth, VehicleTruth
 
 GRAVITY = 9.81
 SENSOR_POSITION_M = (0.0, 0.0, 0.045)  # believed, body axes, from the believed centre of mass
@@ -66,6 +66,20 @@ class StandPhysics:
         """Advance by `dt_s`."""
         self.rotors.process(dt_s)
         self.sensor.process(dt_s, self.wrench())
+
+
+class TorqueRig:
+    """Vehicle on the wrench sensor, motor 1 driven and counted by the thrust tester (fig. 3.20b)."""
+
+    def __init__(self, truth: Truth, battery: Battery, rng: np.random.Generator) -> None:
+        rotors = Rotors(truth.rotor, battery, 4)
+        level = truth.wrench.model_copy(update={"tilt_rad": [0.0, 0.0]})  # a fixture of its own, levelled
+        self.stand = StandPhysics(truth.vehicle, truth.rotor, level, rotors, 0.0, 0.0, rng)
+        self.tester = TesterPhysics(rotors, truth.rotor, truth.tester, rng, loaded=False)
+
+    def process(self, dt_s: float) -> None:
+        """Advance by `dt_s`; the stand advances the rotors that both look at."""
+        self.stand.process(dt_s)
 
 
 class LoadedSensor:

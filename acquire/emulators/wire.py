@@ -42,7 +42,7 @@ class WireHalf:
         self._decoder = StreamDecoder()
         self._now_s = 0.0
         self._boots = 0
-        self._fired: set[int] = set()  # resets and unpluggings happen once
+        self._fired: set[int] = set()  # resets happen once
         self.power_up()
 
     # ---- the line ------------------------------------------------------------------------------------
@@ -84,10 +84,6 @@ class WireHalf:
         if number in self._faults.reset_at and number not in self._fired:
             self._fired.add(number)
             self.power_up()
-            return
-        if number in self._faults.unplug_at and number not in self._fired:
-            self._fired.add(number)
-            self.unplugged = True
             return
         frame = self._frame(DATA, self.device.instrument.encode(self.device.counts()))
         self._sent += 1
@@ -145,6 +141,8 @@ class WireHalf:
 
     def _end(self, reason: int) -> None:
         self.due_s = None
+        if self._faults.lose_end:
+            return
         self._emit(self._frame(END, wire.EndRecord(self._sent, 0, reason).pack()))
 
     def _frame(self, kind: int, payload: bytes) -> bytes:

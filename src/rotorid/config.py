@@ -72,12 +72,76 @@ class Residuals(Section):
     seed: int = Field(ge=0, description="Seed of the bootstrap [1].")
 
 
+class Simulation(Section):
+    """The simulated vehicle's readings and disturbances."""
+
+    seed: int = Field(ge=0, description="Seed of disturbance and noise [1].")
+    duration_s: float = Field(gt=0, description="Length of the attitude-control simulation [s].")
+    step_s: float = Field(gt=0, le=0.01, description="Step of the integrator and the controller [s].")
+    moment_n_m: float = Field(ge=0, description="One-sigma moment on the airframe about each axis [N m].")
+    force_n: float = Field(ge=0, description="One-sigma force on the airframe along each axis [N].")
+    correlation_s: float = Field(ge=0, description="Correlation time of moment and force [s].")
+    rate_noise_rad_s: float = Field(ge=0, description="One-sigma noise of a body rate's reading [rad/s].")
+    acceleration_noise_rad_s2: float = Field(
+        ge=0, description="One-sigma noise of an angular acceleration's reading [rad/s2]."
+    )
+    speed_noise_relative: float = Field(
+        ge=0, lt=0.2, description="One-sigma noise of a rotor-speed reading, as a share of it [1]."
+    )
+
+
+class GreyBox(Section):
+    """Parameters of the equations of motion from data."""
+
+    seed: int = Field(ge=0, description="Seed of weights, search and draws [1].")
+    rotor_rate: float = Field(gt=0, description="Learning rate of the rotor networks [1].")
+    rotor_epochs: int = Field(ge=1, description="Epochs of the rotor networks [1].")
+    rotor_hidden: int = Field(ge=1, description="Hidden nodes of the rotor networks [1].")
+    inertia_rate: float = Field(gt=0, description="Learning rate of the inertia network [1].")
+    inertia_epochs: int = Field(ge=1, description="Epochs of the inertia network [1].")
+    inertia_every: int = Field(ge=1, description="Every how many samples the inertia network is shown [1].")
+    speed_limits_rad_s: tuple[float, float] = Field(
+        strict=False, description="Lowest and highest rotor speed that the motors can hold [rad/s]."
+    )
+    design_limits_rad_s: tuple[float, float] = Field(
+        strict=False, description="Rotor speeds that the excitation may use, room left for control [rad/s]."
+    )
+    design_tilt_deg: float = Field(gt=0, lt=60, description="Largest tilt that the excitation may cause [deg].")
+    design_harmonics: tuple[int, int] = Field(
+        strict=False, description="Lowest and highest harmonic of the excitation's period [1]."
+    )
+    design_period_s: float = Field(gt=0, description="Period of the excitation [s].")
+    design_candidates: int = Field(ge=4, description="Excitations tried by the search [1].")
+    flight_s: float = Field(gt=0, description="Length of the identification flight [s].")
+    motor_time_s: float = Field(ge=0, description="Time constant of the motors on that flight [s].")
+    draws: int = Field(ge=1, description="Identification flights, each with its own disturbance and noise [1].")
+    band_hz: tuple[float, float] = Field(
+        strict=False, description="Band in which real flights tell their inertia [Hz]."
+    )
+    block_s: float = Field(gt=0, description="Blocks of flight that the bootstrap draws [s].")
+
+
+class BlackBox(Section):
+    """The stand's wrench without knowledge of the vehicle."""
+
+    seed: int = Field(ge=0, description="Seed of weights, folds and held-out samples [1].")
+    epochs: int = Field(ge=1, description="Epochs of the network [1].")
+    rate: float = Field(gt=0, description="Learning rate of the network [1].")
+    hidden: tuple[int, ...] = Field(strict=False, description="Nodes of each hidden layer [1].")
+    held_out_samples: int = Field(ge=1, description="Samples held out at random, as the thesis does [1].")
+    folds: int = Field(ge=2, description="Parts into which whole experiments are held out [1].")
+    share: float = Field(gt=0, lt=1, description="Share of new samples that an interval is to cover [1].")
+
+
 class Config(Section):
     """The whole of `config.yaml`."""
 
     recordings: Text = Field(description="Folder that holds the recording sets, one folder each [path].")
     rotor: RotorSettings = Field(description="Thrust coefficients from stand runs.")
     residuals: Residuals = Field(description="Rigid-body residuals of the NeuroBEM flights.")
+    simulation: Simulation = Field(description="The simulated vehicle's readings and disturbances.")
+    grey_box: GreyBox = Field(description="Parameters of the equations of motion from data.")
+    black_box: BlackBox = Field(description="The stand's wrench without knowledge of the vehicle.")
     report: Report = Field(description="The report.")
 
 

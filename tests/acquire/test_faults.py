@@ -30,6 +30,7 @@ from acquire.transport import SerialTransport
 from rotorid.io.logs import read_log
 from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
+from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
 
 SAMPLES = 300
@@ -88,14 +89,26 @@ def test_port_busy(plugged, recorder_on, tmp_path):
     assert record(recorder_on("bench", port)).complete
 
 
+def pull_at(ports, recorder, samples):
+    """Pull the plug, once, as soon as the recorder has seen so many samples."""
+
+    def watch(row):
+        if recorder.progress == samples:
+            ports.pull()
+
+    recorder.on_row = watch
+
+
 def test_port_vanishes_and_comes_back(plugged, recorder_on):
-    port = plugged("bench", Faults(unplug_at=frozenset({100})), replug_after_s=0.02).names[0]
-    log = record(recorder_on("bench", port))
+    ports = plugged("bench", replug_after_s=0.02)
+    recorder = recorder_on("bench", ports.names[0])
+    pull_at(ports, recorder, 100)
+    wanted = 5000  # more than all buffers on the way hold, so that the plug is out before the recording is over
+    log = record(recorder, wanted)
     assert log.resets == 1 and log.session.counts.port_losses == 1
     before, after = (log.table[log.table.segment == segment] for segment in (0, 1))
-    # what was in the cable's buffers when it was pulled is lost; what was received is a gapless beginning
-    assert 0 < len(before) <= 100 and len(before) + len(after) >= SAMPLES
-    assert log.missing == 0
+    # what was in the cable's buffers when it was pulled is lost; what was received is there without a gap
+    assert len(before) >= 100 and len(before) + len(after) >= wanted and log.missing == 0
     assert Quality(int(after.quality.iloc[0])) & Quality.AFTER_RESET
     assert (np.diff(log.table.time_s) > 0).all()
     assert [e.what for e in log.session.events] == ["port_lost", "port_back", "reset"]
@@ -104,11 +117,13 @@ def test_port_vanishes_and_comes_back(plugged, recorder_on):
 
 
 def test_port_vanishes_for_good(plugged, recorder_on):
-    port = plugged("bench", Faults(unplug_at=frozenset({100})), replug_after_s=None).names[0]
+    ports = plugged("bench", replug_after_s=None)
+    recorder = recorder_on("bench", ports.names[0], replace(QUICK, reconnect_s=0.02))
+    pull_at(ports, recorder, 100)
     with pytest.raises(PortLost, match="did not come back.*what came before is in the log"):
-        record(recorder_on("bench", port, replace(QUICK, reconnect_s=0.02)))
-    log = read_log(Path(port).with_name("run.rlog"))
-    assert 0 < len(log.table) <= 100 and log.missing == 0
+        record(recorder, None)
+    log = read_log(recorder.log_path)
+    assert len(log.table) >= 100 and log.missing == 0
     assert log.session.ended == Ended.DEVICE_LOST
     assert_metadata_agree(log)
 
@@ -246,6 +261,17 @@ def test_sensor_that_resets_is_powered_and_initialised_again(plugged, recorder_o
     assert log.resets == 1 and log.session.ended == Ended.FINISHED
     after = log.table[log.table.segment == 1]
     np.testing.assert_allclose(np.diff(after.time_s), 0.005, atol=2e-6)
+
+
+def test_a_programme_whose_end_record_is_lost_still_ends(plugged, recorder_on):
+    port = plugged("quadrotor", Faults(lose_end=True)).names[0]
+    programme = Programme(TRAPEZOID, (0.1, 0.1, 0.1, 0.1), 0.5, 1.0, 0.0)
+    with recorder_on("quadrotor", port, replace(QUICK, silence_s=0.05)) as recorder:
+        procedures.fly_programme(recorder, "h", programme)
+    log = read_log(recorder.log_path)
+    assert log.end is None and log.table.throttle_1.max() == pytest.approx(0.1)
+    assert log.table.throttle_1.iloc[-1] == 0 and log.session.ended == Ended.FINISHED
+    assert [event.what for event in log.session.events] == ["silence", "end_lost"]
 
 
 def test_disk_full(plugged, recorder_on):

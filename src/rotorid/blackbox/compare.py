@@ -11,6 +11,11 @@ import pandas as pd
 from rotorid.blackbox.experiments import INPUTS, OUTPUTS
 from rotorid.blackbox.models import Predict, Scale
 
+INPUT_NAMES = {f"force_{i}_n": f"the force of motor {i} (N)" for i in (1, 2, 3, 4)} | {
+    "roll_rad": "roll (rad)",
+    "pitch_rad": "pitch (rad)",
+}
+
 Fit = Callable[[pd.DataFrame], Predict]
 
 
@@ -63,7 +68,7 @@ def conformal_half_width(absolute_error: np.ndarray, experiments: np.ndarray, sh
     for k, column in enumerate(absolute_error.T):
         order = np.argsort(column)
         total = np.cumsum(weight[order])
-        place = np.searchsorted(total, share)
+        place = np.searchsorted(total, share - 1e-9)
         out[k] = column[order[place]] if place < len(order) else np.inf
     return out
 
@@ -103,7 +108,7 @@ class TrainingRange:
         """A sentence for one input (6,): inside, or what lies outside and by how much."""
         scaled = self.scale.apply(np.asarray(inputs, float))
         outside = [
-            f"{name} is {value:.3g}, trained from {low:.3g} to {high:.3g}"
+            f"{INPUT_NAMES[name]} is {value:.3g}, trained from {low:.3g} to {high:.3g}"
             for name, value, low, high, s in zip(INPUTS, inputs, self.scale.low, self.scale.high, scaled, strict=True)
             if s < -1e-9 or s > 1 + 1e-9
         ]

@@ -62,7 +62,7 @@ def fit_thesis_network(
     rate: float = 0.1,
     hidden: tuple[int, ...] = (20, 20),
     seed: int = 0,
-    every: int = 50,
+    every: int = 10,
     checkpoint: Path | None = None,
 ) -> tuple[Predict, Trained]:
     """Train the network of thesis 4.4 on a table with `INPUTS` and `OUTPUTS`."""

@@ -120,16 +120,19 @@ def promised_errors(
 
 
 def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, wanted: Wanted) -> Multisine:
-    """Scaled to the largest that keeps tilt (per axis) and rotor speeds (together) within their limits."""
-    tilt = np.abs(multisine.integral(time_s, 2) / inertias)[:, :2].max(axis=0)
-    factor = np.append(np.minimum(1.0, wanted.tilt_rad / np.maximum(tilt, 1e-12)), 1.0)
-    multisine = multisine.scaled(factor)
-    moment = multisine.moment(time_s)
+    """Scaled to the largest that keeps rotor speeds (together) and tilt (per axis) within their limits."""
     mean = allocation @ np.array([thrust_n, 0.0, 0.0, 0.0])
-    swing = moment @ allocation[:, 1:].T
     low, high = wanted.speed_limits_rad_s[0] ** 2, wanted.speed_limits_rad_s[1] ** 2
-    room = np.where(swing > 0, high - mean, mean - low) / np.maximum(np.abs(swing), 1e-9)
-    return multisine.scaled(min(float(room.min()), 1e9))
+
+    def room(candidate: Multisine) -> float:
+        swing = candidate.moment(time_s) @ allocation[:, 1:].T
+        return float(np.min(np.where(swing > 0, high - mean, mean - low) / np.maximum(np.abs(swing), 1e-9)))
+
+    multisine = multisine.scaled(room(multisine))
+    tilt = np.abs(multisine.integral(time_s, 2) / inertias)[:, :2].max(axis=0)
+    multisine = multisine.scaled(np.append(np.minimum(1.0, wanted.tilt_rad / np.maximum(tilt, 1e-12)), 1.0))
+    # Where two axes cancelled each other in a rotor, less of one may be more for the rotor.
+    return multisine.scaled(min(1.0, room(multisine)))
 
 
 def design(

@@ -69,7 +69,10 @@ class Motion:
     def hub_velocity(self, positions_m: np.ndarray) -> np.ndarray:
         """Velocity of each hub through the air, v + Ω × r_i, shape (n, k, 3), m/s, body axes."""
         rate = self.angular_velocity if self.angular_velocity is not None else np.zeros((self.size, 3))
-        return self.air_velocity[:, None, :] + np.cross(rate[:, None, :], positions_m[None, :, :])
+        x, y, z = positions_m.T
+        p, q, r = rate[:, :1], rate[:, 1:2], rate[:, 2:]
+        turning = np.stack([q * z - r * y, r * x - p * z, p * y - q * x], axis=2)
+        return self.air_velocity[:, None, :] + turning
 
     def has(self, names: tuple[str, ...]) -> bool:
         """Whether every named field is there."""
@@ -136,6 +139,10 @@ class Form:
     vehicle_requires: tuple[str, ...] = ()
     """Keys of vehicle.yaml that must be stated."""
     minimum_rotors: int = 1
+    must_show: tuple[int, ...] = ()
+    """Parameters without which the form is another effect: each must differ from zero by two standard errors."""
+    memory: bool = False
+    """Whether it needs the past (a pendulum of its own): one instant does not give its wrench."""
 
     @property
     def linear(self) -> tuple[int, ...]:
@@ -200,7 +207,7 @@ class Effect:
     confusers: tuple[str, ...] = ()
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
-    kind: Literal["physics", "sensor"] = "physics"
+    kind: Literal["physics", "sensor", "mistake"] = "physics"
     speed_forms: tuple[SpeedForm, ...] = ()
     """Forms that act between command and rotor speed."""
 
@@ -233,6 +240,24 @@ def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | N
     return None
 
 
+def rotor_radius_m(vehicle: Vehicle) -> float:
+    """Rotor radius, m; where none is stated, 0.45 of the smallest distance between two hubs."""
+    if vehicle.rotor_radius_m is not None:
+        return vehicle.rotor_radius_m
+    hubs = vehicle.rotor_positions_m()
+    if len(hubs) < 2:
+        return 0.1
+    apart = np.linalg.norm(hubs[:, None] - hubs[None], axis=2)
+    return 0.45 * float(apart[apart > 0].min())
+
+
 def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
     """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
-    return Contribution(force=forces.sum(axis=1), moment=np.cross(positions_m[None, :, :], forces).sum(axis=1))
+    # Products of (n, k) by (k,) are many times faster here than sums and cross products over short axes.
+    fx, fy, fz = forces[:, :, 0], forces[:, :, 1], forces[:, :, 2]
+    x, y, z = positions_m.T
+    every = np.ones(len(positions_m))
+    return Contribution(
+        force=np.stack([fx @ every, fy @ every, fz @ every], axis=1),
+        moment=np.stack([fz @ y - fy @ z, fx @ z - fz @ x, fy @ x - fx @ y], axis=1),
+    )

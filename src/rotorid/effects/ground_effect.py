@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
+from rotorid.effects.contract import Effect, Form, Parameter, at_hubs, rotor_radius_m
 
 CLOSEST_RADII = 0.3
 """Heights below this many rotor radii are held there: the closed forms diverge and no rotor gets closer."""
@@ -15,7 +15,7 @@ def hub_heights_m(motion, vehicle):
         drop = np.broadcast_to(positions[:, 2], (motion.size, len(positions)))
     else:
         drop = np.einsum("nj,kj->nk", motion.rotation[:, 2, :], positions)
-    return np.maximum(motion.height[:, None] - drop, CLOSEST_RADII * vehicle.rotor_radius_m)
+    return np.maximum(motion.height[:, None] - drop, CLOSEST_RADII * rotor_radius_m(vehicle))
 
 
 def _along_thrust(gain, motion, vehicle):
@@ -27,13 +27,13 @@ def _along_thrust(gain, motion, vehicle):
 
 def image(motion, vehicle, values):
     """T/T_∞ = 1 / (1 - c (R/4z)²), z the hub's height (Cheeseman and Bennett: c = 1)."""
-    ratio = values[0] * (vehicle.rotor_radius_m / (4 * hub_heights_m(motion, vehicle))) ** 2
+    ratio = values[0] * (rotor_radius_m(vehicle) / (4 * hub_heights_m(motion, vehicle))) ** 2
     return _along_thrust(1.0 / (1.0 - np.minimum(ratio, 0.8)) - 1.0, motion, vehicle)
 
 
 def inverse_square(motion, vehicle, values):
     """T/T_∞ = 1 + c (R/4z)²."""
-    ratio = (vehicle.rotor_radius_m / (4 * hub_heights_m(motion, vehicle))) ** 2
+    ratio = (rotor_radius_m(vehicle) / (4 * hub_heights_m(motion, vehicle))) ** 2
     return _along_thrust(values[0] * ratio, motion, vehicle)
 
 
@@ -44,7 +44,7 @@ def exponential(motion, vehicle, values):
 
 def forms(vehicle):
     needs = ("height", "rotor_speed")
-    radius = vehicle.rotor_radius_m or 0.1
+    radius = rotor_radius_m(vehicle)
     return (
         Form(
             "image rotor",
@@ -52,7 +52,6 @@ def forms(vehicle):
             (Parameter("c", "1", 0.0, 40.0, nonlinear=True, starts=(1.0, 4.0, 10.0)),),
             image,
             needs,
-            ("rotor_radius_m",),
         ),
         Form(
             "inverse square",
@@ -60,7 +59,6 @@ def forms(vehicle):
             (Parameter("c", "1", 0.0, 60.0),),
             inverse_square,
             needs,
-            ("rotor_radius_m",),
         ),
         Form(
             "exponential",
@@ -78,7 +76,6 @@ def forms(vehicle):
             ),
             exponential,
             needs,
-            ("rotor_radius_m",),
         ),
     )
 

@@ -48,6 +48,7 @@ def forms(vehicle):
             ),
             rigid,
             ("specific_force",),
+            must_show=(0,),
         ),
         Form(
             "slung",
@@ -58,6 +59,7 @@ def forms(vehicle):
             ),
             slung,
             ("specific_force", "rotation"),
+            memory=True,
         ),
     )
 

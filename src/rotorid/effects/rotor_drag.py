@@ -26,6 +26,13 @@ def per_axis(motion, vehicle, values):
     return Contribution(force=-total * motion.air_velocity * np.array([values[0], values[1], 0.0]))
 
 
+def per_axis_at_the_hubs(motion, vehicle, values):
+    """F_i = -ω_i (k_x v_x,i, k_y v_y,i, 0) at each hub."""
+    positions = vehicle.rotor_positions_m()
+    hub = motion.hub_velocity(positions) * np.array([values[0], values[1], 0.0])
+    return at_hubs(-motion.rotor_speed[:, :, None] * hub, positions)
+
+
 def linear_in_speed(motion, vehicle, values):
     """F = -d P v at the centre of mass, not growing with rotor speed."""
     return Contribution(force=-values[0] * motion.air_velocity * IN_PLANE)
@@ -42,6 +49,13 @@ def forms(vehicle):
             "F = −Σω (k_d,x v_x, k_d,y v_y, 0)",
             (Parameter("k_d_x", k_d.unit, 0.0), Parameter("k_d_y", k_d.unit, 0.0)),
             per_axis,
+            needs,
+        ),
+        Form(
+            "per axis, at the hubs",
+            "F_i = −ω_i (k_d,x v_x,i, k_d,y v_y,i, 0)",
+            (Parameter("k_d_x", k_d.unit, 0.0), Parameter("k_d_y", k_d.unit, 0.0)),
+            per_axis_at_the_hubs,
             needs,
         ),
         Form(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
+from rotorid.effects.contract import Effect, Form, Parameter, at_hubs, rotor_radius_m
 
 
 def _rear_weight(motion, vehicle):
@@ -35,11 +35,9 @@ def saturating(motion, vehicle, values):
 
 
 def hover_inflow_m_s(vehicle, density_kg_m3: float = 1.2):
-    """Momentum theory: v_h = sqrt(T / (2 ρ π R²)) of one rotor in hover, m/s; 5 m/s without a radius."""
-    if vehicle.rotor_radius_m is None or vehicle.mass_kg is None:
-        return 5.0
+    """Momentum theory: v_h = sqrt(T / (2 ρ π R²)) of one rotor in hover, m/s."""
     thrust = vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.rotor_count
-    return float(np.sqrt(thrust / (2 * density_kg_m3 * np.pi * vehicle.rotor_radius_m**2)))
+    return float(np.sqrt(thrust / (2 * density_kg_m3 * np.pi * rotor_radius_m(vehicle) ** 2)))
 
 
 def forms(vehicle):

@@ -8,27 +8,32 @@ from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_h
 def _forces(motion, vehicle, tilt_x, tilt_y):
     thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
     forces = np.zeros((*thrust.shape, 3))
-    forces[:, :, 0] = -thrust * tilt_x
-    forces[:, :, 1] = -thrust * tilt_y
+    forces[:, :, 0] = thrust * tilt_x
+    forces[:, :, 1] = thrust * tilt_y
     return forces
 
 
+def _tilted(motion, vehicle, tilt_x, tilt_y, weight):
+    """Tilted thrust at the hubs and the reaction torques, which lean with their axes; `weight` (k,) picks rotors."""
+    thrust = at_hubs(_forces(motion, vehicle, tilt_x, tilt_y) * weight[None, :, None], vehicle.rotor_positions_m())
+    torque = motion.rotor_speed**2 @ (vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs() * weight)
+    leaning = -torque[:, None] * np.array([[tilt_x, tilt_y, 0.0]])
+    return Contribution(force=thrust.force, moment=thrust.moment + leaning)
+
+
 def at_the_hubs(motion, vehicle, values):
-    """F_i += -T_i (ε_x, ε_y, 0) at each hub, small angles, all rotors alike."""
-    return at_hubs(_forces(motion, vehicle, values[0], values[1]), vehicle.rotor_positions_m())
+    """F_i += T_i (ε_x, ε_y, 0) at each hub, M_i −= ±Q_i (ε_x, ε_y, 0); small angles, all rotors alike."""
+    return _tilted(motion, vehicle, values[0], values[1], np.ones(vehicle.rotor_count))
 
 
 def force_only(motion, vehicle, values):
-    """F = -T (ε_x, ε_y, 0) at the centre of mass."""
+    """F = T (ε_x, ε_y, 0) at the centre of mass."""
     return Contribution(force=_forces(motion, vehicle, values[0], values[1]).sum(axis=1))
 
 
 def _single(k):
     def one(motion, vehicle, values):
-        forces = _forces(motion, vehicle, values[0], values[1])
-        keep = np.zeros((1, forces.shape[1], 1))
-        keep[0, k] = 1.0
-        return at_hubs(forces * keep, vehicle.rotor_positions_m())
+        return _tilted(motion, vehicle, values[0], values[1], np.eye(vehicle.rotor_count)[k])
 
     return one
 
@@ -37,12 +42,12 @@ def forms(vehicle):
     tilt = (Parameter("eps_x", "rad", -0.5, 0.5), Parameter("eps_y", "rad", -0.5, 0.5))
     needs = ("rotor_speed",)
     singles = [
-        Form(f"rotor {k + 1}", f"F_{k + 1} = −T_{k + 1} (ε_x, ε_y, 1)", tilt, _single(k), needs, (), 2)
+        Form(f"rotor {k + 1}", f"F_{k + 1} = T_{k + 1} (ε_x, ε_y, −1)", tilt, _single(k), needs, (), 2)
         for k in range(vehicle.rotor_count)
     ]
     return (
-        Form("all rotors, at the hubs", "F_i = −T_i (ε_x, ε_y, 1)", tilt, at_the_hubs, needs),
-        Form("all rotors, at the centre of mass", "F = −T (ε_x, ε_y, 1)", tilt, force_only, needs),
+        Form("all rotors, at the hubs", "F_i = T_i (ε_x, ε_y, −1)", tilt, at_the_hubs, needs),
+        Form("all rotors, at the centre of mass", "F = T (ε_x, ε_y, −1)", tilt, force_only, needs),
         *singles,
     )
 

@@ -21,7 +21,7 @@ def _torque(motion, vehicle, weights):
 
 def both(motion, vehicle, values):
     """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + d_i): one blade shape scales both."""
-    weights = np.asarray(values)
+    weights = np.asarray(values, float)
     wrench = _thrust(motion, vehicle, weights)
     return Contribution(wrench.force, wrench.moment + _torque(motion, vehicle, weights))
 
@@ -34,6 +34,16 @@ def thrust_only(motion, vehicle, values):
 def torque_only(motion, vehicle, values):
     """C_Q,i = C_Q (1 + d_i)."""
     return Contribution(moment=_torque(motion, vehicle, np.asarray(values)))
+
+
+def _contrast(function):
+    """The differences between rotors alone: what all share is a wrong coefficient, not a difference."""
+
+    def contrast(motion, vehicle, values):
+        weights = np.asarray(values, float)
+        return function(motion, vehicle, weights - weights.mean())
+
+    return contrast
 
 
 def _one(k, count, function):
@@ -67,9 +77,9 @@ def forms(vehicle):
     ]
     return (
         *singles,
-        Form("thrust and torque", text.format("i"), symbols, both, needs, (), 2),
-        Form("thrust", "C_F,i = C_F (1 + d_i)", symbols, thrust_only, needs, (), 2),
-        Form("torque", "C_Q,i = C_Q (1 + d_i)", symbols, torque_only, needs, (), 2),
+        Form("thrust and torque", text.format("i"), symbols, _contrast(both), needs, (), 2),
+        Form("thrust", "C_F,i = C_F (1 + d_i)", symbols, _contrast(thrust_only), needs, (), 2),
+        Form("torque", "C_Q,i = C_Q (1 + d_i)", symbols, _contrast(torque_only), needs, (), 2),
     )
 
 

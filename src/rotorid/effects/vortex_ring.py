@@ -25,7 +25,6 @@ def forms(vehicle):
             (Parameter("k", "1", 0.0, 0.8),),
             mean_loss,
             ("velocity", "rotor_speed"),
-            ("rotor_radius_m",),
         ),
     )
 

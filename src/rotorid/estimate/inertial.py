@@ -57,13 +57,41 @@ class WeightFit:
         return np.sqrt(np.diag(self.covariance)[3:]) * self.inertias**2
 
 
+@dataclass(frozen=True)
+class NetworkFit:
+    """Six weights in physical units, the training, and the epochs (6,) in which each weight's error shrinks to 1/e.
+
+    `epochs_to_settle` is 1 / (rate <x²>) of the weight's input: what the plain gradient rule needs, other weights
+    apart.
+    """
+
+    weights: np.ndarray
+    trained: Trained
+    epochs_to_settle: np.ndarray
+
+    @property
+    def inertias(self) -> np.ndarray:
+        return inertias_of_weights(self.weights)
+
+
 def fit_masked_network(
-    rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, training: Training
-) -> Trained:
-    """Train the masked network from zero-mean random weights by the generalised delta rule."""
+    rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, training: Training, scaled: bool = False
+) -> NetworkFit:
+    """Train the masked network from random weights by the generalised delta rule.
+
+    `scaled` divides every input and output by its largest magnitude, as eqs 4.67-4.73 do for the rotor networks;
+    the thesis trains this network without. The history is of scaled or plain accelerations alike.
+    """
+    inputs = regressors(rates, moments)
+    k_x = 1 / np.abs(inputs).max(axis=0) if scaled else np.ones(6)
+    k_d = 1 / np.abs(accelerations).max(axis=0) if scaled else np.ones(3)
     rng = np.random.default_rng(training.seed)
     network = Network((rng.uniform(-1, 1, (3, 6)) * MASK,), (None,), (LINEAR,), (MASK,))
-    return train(network, regressors(rates, moments), accelerations, training)
+    trained = train(network, inputs * k_x, accelerations * k_d, training)
+    matrix = trained.network.weights[0] * k_x / k_d[:, None]
+    with np.errstate(divide="ignore"):  # an input that is always zero never settles
+        settle = 1 / (training.rate * np.mean((inputs * k_x) ** 2, axis=0))
+    return NetworkFit(six_weights(matrix), trained, settle)
 
 
 def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, block: int = 50) -> WeightFit:

@@ -140,6 +140,13 @@ class OutputErrorFit:
         return np.exp(self.parameters[:3, None] + half[:, None] * np.array([-1.0, 1.0]))
 
 
+def _walk_power(samples: int) -> float:
+    """Expected sum of squares of a unit random walk over a window, its mean taken off."""
+    walk = np.tril(np.ones((samples, samples)), -1)
+    walk = walk - walk.mean(axis=0)
+    return float(np.sum(walk**2))
+
+
 def fit_output_error(
     windows: RateWindows,
     model: Model,
@@ -147,8 +154,16 @@ def fit_output_error(
     window_moment: bool = False,
     iterations: int = 30,
     tolerance: float = 1e-7,
+    cluster: int = 4,
+    moment_noise_n_m: np.ndarray | None = None,
 ) -> OutputErrorFit:
-    """Gauss-Newton with the windows' own unknowns projected out. ValueError where it does not converge."""
+    """Gauss-Newton with the windows' own unknowns projected out.
+
+    Noise of the moments (3,), one sigma a sample, blurs the regressors and would make the inertias too large by
+    noise power over signal power; where `moment_noise_n_m` states it, that is taken off again. The covariance is
+    robust over clusters of `cluster` neighbouring windows. ValueError where there are too few
+    windows or the estimate does not converge.
+    """
     parameters = np.asarray(start, float).copy()
     w, m, _ = windows.rates.shape
     if w <= len(parameters):
@@ -195,13 +210,23 @@ def fit_output_error(
         begin = begin + own_change[:, :3]
         if window_moment:
             extra = extra + own_change[:, 3:]
+        scale_used = scale
         scale = np.sqrt(np.mean((y_free.reshape(w, m, 3) * scale) ** 2, axis=(0, 1)))
         if iteration > 1 and np.max(np.abs(change)) < tolerance:
             break
     else:
         raise ValueError("the output-error estimate did not converge: the flight may not excite every axis")
     inverse = np.linalg.inv(information)
-    covariance = w / (w - len(parameters)) * inverse @ (scores.T @ scores) @ inverse
+    if moment_noise_n_m is not None:
+        torque = model(parameters)[3:6]
+        power = w * (np.asarray(moment_noise_n_m) * torque * windows.dt_s / scale_used) ** 2 * _walk_power(m)
+        parameters = parameters.copy()
+        parameters[:3] += np.log1p(-power / np.diag(information)[:3])
+    # Neighbouring windows share slow disturbances: their scores are summed before they are squared.
+    clustered = np.add.reduceat(scores, np.arange(0, w, cluster), axis=0)
+    spread_of_scores = clustered.T @ clustered
+    count = len(clustered)
+    covariance = count / max(count - len(parameters), 1) * inverse @ spread_of_scores @ inverse
     spread = windows.rates - windows.rates.mean(axis=1, keepdims=True)
     return OutputErrorFit(
         parameters,

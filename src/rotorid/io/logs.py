@@ -153,7 +153,7 @@ def _table(path: Path, instrument: wire.Instrument, places, hosts, payloads) -> 
     columns = {}
     for channel in instrument.channels:
         raw = counts[channel.column].astype(np.int64)
-        if not _is_fraction_or_state(channel):
+        if channel.reading:
             quality[(raw <= channel.low) & (channel.low < 0) | (raw >= channel.high)] |= Quality.SATURATED
         columns[channel.column] = raw * channel.scale
     return pd.DataFrame(
@@ -169,11 +169,6 @@ def _table(path: Path, instrument: wire.Instrument, places, hosts, payloads) -> 
 
 
 _NUMPY = {"b": "i1", "B": "u1", "h": "i2", "H": "u2", "i": "i4", "I": "u4"}
-
-
-def _is_fraction_or_state(channel: wire.Channel) -> bool:
-    """Commands and states reach the end of their range without being saturated readings."""
-    return channel.column.startswith("throttle") or channel.column == "led"
 
 
 def _device_time(where: np.ndarray, host_ns: np.ndarray) -> np.ndarray:

@@ -62,6 +62,7 @@ class Tracker:
         self.boot_id: int | None = None
         self.interval_us: int | None = None
         self.resets = 0
+        self.missing = 0  # frames that never came
         self.repeated = 0
         self.late = 0
         self.gaps: list[Gap] = []
@@ -70,11 +71,6 @@ class Tracker:
         self._kind = START
         self._rollovers = 0
         self._flags = Quality.GOOD  # for the next sample
-
-    @property
-    def missing(self) -> int:
-        """Frames that never came."""
-        return sum(gap.count for gap in self.gaps)
 
     @property
     def rollovers(self) -> int:
@@ -104,6 +100,7 @@ class Tracker:
             return self._old(index, clock)
         if step > 1:
             self.gaps.append(Gap(self.segment, self._index + 1, step - 1, self._clock / 1e6, clock / 1e6))
+            self.missing += step - 1
             self._flags |= Quality.AFTER_GAP
         self._index, self._clock, self._kind = index, clock, frame.kind
         return Placed(self.segment, index, clock, self._take_flags(frame))
@@ -145,10 +142,12 @@ class Tracker:
         return abs(ticks - step * self.interval_us) > max(1_000_000, ticks // 100) + 50 * self.interval_us
 
     def _old(self, index: int, clock: int) -> Placed | None:
-        for i, gap in enumerate(self.gaps):
+        for i in range(len(self.gaps) - 1, -1, -1):  # a late frame's gap is one of the last
+            gap = self.gaps[i]
             if gap.segment == self.segment and gap.first_index <= index < gap.first_index + gap.count:
                 self.gaps[i : i + 1] = _split(gap, index, clock / 1e6)
                 self.late += 1
+                self.missing -= 1
                 return Placed(self.segment, index, clock, Quality.LATE)
         self.repeated += 1
         return None

@@ -12,12 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decide import wrench_findings, wrong_values
+from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence, leftover
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, residual
+from rotorid.mismatch.select import Selection
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
 from rotorid.mismatch.wrench import (
     WrenchModel,
@@ -26,7 +29,7 @@ from rotorid.mismatch.wrench import (
     nonlinear_intervals,
     path_segments,
     refine_nonlinear,
-    reverse_values,
+    reverse_regression,
     speed_path,
     with_gusts,
     with_wind,
@@ -41,9 +44,10 @@ NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturati
 
 def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     """The whole analysis of a set of kind `flight`."""
+    recordings, mistakes, remarks = find_mistakes(recordings)
     prepared = prepare(recordings, cutoff_hz)
-    notes: list[str] = []
-    findings: list[Finding] = []
+    notes = list(remarks)
+    findings = list(mistakes)
     reasons = dict(prepared.not_testable)
     measured = all(s.measured_speed for s in prepared.segments)
 
@@ -67,7 +71,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     if found is None:
         reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
     else:
-        findings += speed_findings(found[0], prepared, measured)
+        findings += speed_findings(found[0], prepared, measured, found[1])
         if found[2] is None:
             reasons.setdefault("battery_sag", "no battery voltage")
     rule = training_rule(prepared.split, segments)
@@ -82,16 +86,27 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         nonlinear_intervals(prepared, model, segments),
     )
 
+    def size(key: str, change: float) -> float:
+        return float(model.search.sizes_of(key, np.array([change])).max())
+
+    if found is not None and not measured:
+        findings = [throttle_or_thrust(f) for f in findings]
+
     values = wrong_values(
         model.regression,
         model.search,
         model.selection,
-        reverse_values(prepared, model, segments),
-        lambda key, change: model.search.size_of(key, np.array([change]), []),
+        reverse_regression(prepared, model, segments),
+        size,
     )
     findings += absorbed_findings(model, values, findings)
-    refitted, improved = vehicles(prepared.vehicle, model, values)
-    traces = make_traces(prepared, model, segments, found, measured)
+    plain_values = {}
+    if model.wind is None:
+        nothing = Selection([], model.selection.fit)
+        plain_values = wrong_values(model.regression, model.search, nothing, None, size)
+    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
+    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in values.items()})
+    traces = make_traces(prepared, model, found, measured, plain_values, values)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, description = leftover(prepared, model, segments, before, after, depends)
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}
@@ -101,13 +116,13 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         believed=prepared.vehicle,
         refitted=refitted,
         improved=improved,
-        findings=tuple(findings),
+        findings=tuple(together(findings)),
         values=contract_values(prepared.vehicle, values),
         not_testable={k: v for k, v in reasons.items() if k not in known},
         traces=traces,
-        noise_floor=noise_floors(prepared, model),
+        noise_floor=noise_floors(prepared, model, found, measured),
         p_values={c: (before[c], after[c]) for c in before},
-        regimes={s.run: regime_variables(s, prepared) for s in segments},
+        regimes=regimes_by_run(segments, prepared),
         unexplained_share=share,
         unexplained_channels=channels,
         unexplained_depends_on=tuple(depends),
@@ -161,7 +176,7 @@ def wind_finding(model: WrenchModel) -> Finding:
     )
 
 
-def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool) -> list[Finding]:
+def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full_speed: float) -> list[Finding]:
     """Findings between command and rotor speed."""
     effects = catalogue()
     out = []
@@ -175,6 +190,9 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool) -> l
             for p, v, s in zip(form.parameters, values, sd, strict=True)
         )
         alternatives = result.alternatives[key]
+        beyond = ()
+        if key == "command_saturation":
+            beyond = saturation_windows(prepared.segments, values[0] * full_speed, form.name == "upper limit")
         out.append(
             Finding(
                 id=key,
@@ -186,6 +204,7 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool) -> l
                 p_value=result.p_values[key],
                 channels=channels,
                 alternatives=tuple(sorted({key, *alternatives})) if alternatives else (),
+                windows=beyond,
             )
         )
     for key, reason in result.dropped.items():
@@ -194,6 +213,14 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool) -> l
                 Finding(id=key, status="not_established", sentence=f"{effects[key].name} did not hold: {reason}")
             )
     return out
+
+
+def throttle_or_thrust(finding: Finding) -> Finding:
+    """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
+    if finding.id != "thrust_curve" or finding.status not in ("established", "ambiguous"):
+        return finding
+    both = tuple(sorted({"thrust_curve", "throttle_curve", *finding.alternatives}))
+    return replace(finding, status="ambiguous", alternatives=both)
 
 
 def absorbed_findings(model: WrenchModel, values: dict, findings: list[Finding]) -> list[Finding]:
@@ -265,18 +292,22 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
     return vehicle.model_copy(update=change)
 
 
-def vehicles(vehicle: Vehicle, model: WrenchModel, values: dict) -> tuple[Vehicle, Vehicle]:
-    """Vehicle refitted without new physics, and with it (only values that are clearly wrong change)."""
-    keys = [t.key for t in model.regression.terms if t.kind == "value"]
-    plain = model.regression.fit(model.search.always)
-    refitted = {k: float(plain.beta[list(plain.columns).index(model.regression.start[k])]) for k in keys}
-    return changed_vehicle(vehicle, refitted), changed_vehicle(vehicle, {k: v[0] for k, v in values.items()})
+def offsets_of(model: WrenchModel) -> list[str]:
+    """Nuisance terms that every fit carries."""
+    return [t.key for t in model.regression.terms if t.kind in ("nuisance", "wind")]
 
 
-def make_traces(prepared, model: WrenchModel, segments, found, measured: bool) -> tuple[Trace, ...]:
-    """Residual of every channel before refitting, after refitting and with the effects."""
-    plain = model.regression.fit(model.search.always)
-    full = model.regression.fit(model.search.always + model.selection.active)
+def make_traces(
+    prepared, model: WrenchModel, found, measured: bool, plain_values: dict, values: dict
+) -> tuple[Trace, ...]:
+    """Residual of every channel before refitting, after refitting and with the effects.
+
+    Only values that are clearly wrong are refitted: the others stay as believed, as in the improved vehicle.
+    """
+    regression = model.regression
+    loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
+    plain = regression.fit(offsets_of(model) + list(plain_values), loose=loose)
+    full = regression.fit(offsets_of(model) + list(values) + model.selection.active, loose=loose)
     out = []
     for r, segment in zip(model.rows, prepared.segments, strict=True):
         before = r.y
@@ -303,23 +334,52 @@ def make_traces(prepared, model: WrenchModel, segments, found, measured: bool) -
     return tuple(out)
 
 
-def noise_floors(prepared: Prepared, model: WrenchModel) -> dict[str, float]:
-    """Noise of each channel in the band of the traces: what the sensors' white noise makes of the residual.
-
-    Never above what is left with the effects.
-    """
-    out = {}
-    if not prepared.noisy_segments:
-        return {CHANNELS[c]: float(model.noise[c]) for c in range(6) if np.isfinite(model.noise[c])}
-    energy, count = np.zeros(12), 0
-    for plain, noisy in zip(prepared.segments, prepared.noisy_segments, strict=True):
-        a, b = residual(plain, prepared.vehicle), residual(noisy, prepared.vehicle)
-        for index, group in enumerate(("force", "moment")):
-            if group in a:
-                part = prepared.thinner(b[group] - a[group])
-                energy[3 * index : 3 * index + 3] += (part**2).sum(axis=0)
-        count += len(part)
-    for c in range(6):
-        if np.isfinite(model.noise[c]):
-            out[CHANNELS[c]] = float(min(np.sqrt(energy[c] / count), model.noise[c]))
+def noise_floors(prepared: Prepared, model: WrenchModel, found, measured: bool) -> dict[str, float]:
+    """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain."""
+    out = {CHANNELS[c]: float(model.noise[c]) for c in range(6) if np.isfinite(model.noise[c])}
+    if found is not None and measured and found[0].noise_rad_s is not None:
+        gain = float(np.sqrt((prepared.thinner.kernel**2).sum()))
+        for i in range(prepared.vehicle.rotor_count):
+            out[f"rotor_speed_{i + 1}"] = found[0].noise_rad_s * gain
     return out
+
+
+def regimes_by_run(segments, prepared: Prepared) -> dict[str, dict[str, np.ndarray]]:
+    """Regime variables of every run, its stretches one after the other."""
+    out: dict[str, dict[str, np.ndarray]] = {}
+    for s in segments:
+        own = regime_variables(s, prepared)
+        if s.run not in out:
+            out[s.run] = own
+            continue
+        shared = [k for k in out[s.run] if k in own]
+        out[s.run] = {k: np.concatenate([out[s.run][k], own[k]]) for k in shared}
+    return out
+
+
+def saturation_windows(segments, limit_rad_s: float, upper: bool) -> tuple[tuple[str, float, float], ...]:
+    """Stretches in which a command goes beyond a limit, closer than 0.3 s taken together."""
+    out = []
+    for s in segments:
+        beyond = (s.command > limit_rad_s if upper else s.command < limit_rad_s).any(axis=1)
+        times = s.motion.time_s
+        for start, stop in stretches(beyond):
+            begin, end = float(times[start]), float(times[stop - 1])
+            if out and out[-1][0] == s.run and begin - out[-1][2] < 0.3:
+                out[-1] = (s.run, out[-1][1], end)
+            else:
+                out.append((s.run, begin, end))
+    return tuple(out)
+
+
+def together(findings: list[Finding]) -> list[Finding]:
+    """Findings with the windows of one id (several gusts) as one."""
+    out: dict[str, Finding] = {}
+    for f in findings:
+        first = out.get(f.id)
+        if first is None or not f.windows or not first.windows:
+            out.setdefault(f.id if first is None else f"{f.id}/{len(out)}", f)
+            continue
+        better = first if first.p_value <= f.p_value else f
+        out[f.id] = replace(better, windows=first.windows + f.windows)
+    return list(out.values())

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
 from scipy.stats import t as student
 
 from rotorid.effects.catalogue import catalogue
@@ -14,13 +14,19 @@ from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
 
+COST_PER_VALUE = 12.0
+"""Whitened squares that a further wrong value must explain."""
+MOST_VALUES = 3
+MOST_DISTRUST = 9.0
+WIDEST_TRUST = 0.1
+VALUE_FLOOR = 0.002
+"""Relative one-sigma that no estimate of a value here is better than (filters, timing)."""
+VALUE_P = 5e-4
 VALUE_Z = 3.5
 """A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""
 SMALLEST_CHANGE = 0.015
 """A relative change below this is no wrong value: no laboratory knows its numbers better."""
 BOOTSTRAPS = 400
-EXPECTED_HELD_OUT = 25.0
-"""Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
 
 
 def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray, np.ndarray]:
@@ -30,50 +36,11 @@ def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray
     return fit.beta[where], fit.covariance[np.ix_(where, where)]
 
 
-def between_runs(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray, float]:
-    """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
-
-    Per run the term is refitted with all other coefficients held (DerSimonian and Laird's moment estimate).
-    """
-    cols = regression.columns([key])
-    where = [list(fit.columns).index(c) for c in cols]
-    rest = [i for i in range(len(fit.columns)) if i not in where]
-    estimates, variances = [], []
-    for run in np.unique(regression.run[regression.training]):
-        mask = regression.training & (regression.run == run)
-        if mask.sum() < 5:
-            continue
-        own = regression.gram[mask][:, cols][:, :, cols]
-        total = own.sum(axis=0)
-        cross = (
-            regression.cross[mask][:, cols] - regression.gram[mask][:, cols][:, :, fit.columns[rest]] @ fit.beta[rest]
-        )
-        if total[0, 0] < 1e-3 * regression.gram[regression.training][:, cols[0], cols[0]].sum():
-            continue  # the effect is hardly excited in this run
-        inverse = np.linalg.pinv(total, rcond=1e-10, hermitian=True)
-        beta = inverse @ cross.sum(axis=0)
-        scores = cross - own @ beta
-        robust = inverse @ (scores.T @ scores) @ inverse
-        estimates.append(beta)
-        variances.append(np.maximum(np.diag(robust), np.diag(inverse)))
-    if len(estimates) < 2:
-        return np.zeros(len(cols)), 1.0
-    b, v = np.array(estimates), np.maximum(np.array(variances), 1e-300)
-    w = 1.0 / v
-    mean = (w * b).sum(axis=0) / w.sum(axis=0)
-    q = (w * (b - mean) ** 2).sum(axis=0)
-    degrees = len(b) - 1
-    scale = w.sum(axis=0) - (w**2).sum(axis=0) / w.sum(axis=0)
-    spread = np.maximum(0.0, (q - degrees) / np.maximum(scale, 1e-300))
-    p = float(min(1.0, len(cols) * chi2.sf(q, degrees).min()))
-    return spread / len(b), p
-
-
 def estimates(regression: Regression, fit: Fit, search: Search, key: str) -> tuple[Estimate, ...]:
     """Linear parameters of a term with 95 % intervals: within runs and between them."""
     term = search.terms[key]
     beta, covariance = coefficients(regression, fit, key)
-    spread, p = between_runs(regression, fit, key)
+    spread, p = regression.between_runs(fit, key)
     variance = np.diag(covariance) + (spread if p < 0.05 else 0.0)
     reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
     out = []
@@ -113,22 +80,6 @@ def held_out_gain(
     return float(np.sqrt(e[:, 0].sum() / e[:, 1].sum())), float(low), float(high)
 
 
-def fails_held_out(regression: Regression, with_it: Fit, without: Fit) -> bool:
-    """Whether a term that should help on the held-out blocks does not."""
-    mask = regression.held_out
-    if mask.sum() < 4:
-        return False
-    gain = without.residual_square[mask] - with_it.residual_square[mask]
-    both = np.concatenate([with_it.columns])
-    shift = with_it.beta.copy()
-    for i, column in enumerate(with_it.columns):
-        where = np.flatnonzero(without.columns == column)
-        if len(where):
-            shift[i] -= without.beta[where[0]]
-    expected = float(np.einsum("bij,i,j->", regression.gram[mask][:, both][:, :, both], shift, shift))
-    return expected > EXPECTED_HELD_OUT and gain.sum() < 0.0
-
-
 def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray) -> list[int]:
     """Channels in which a contribution is at least a third of its strongest, the strongest first."""
     energy = np.zeros(12)
@@ -160,10 +111,7 @@ def wrench_findings(
         with_it = regression.fit(search.always + selection.active)
         channels = main_channels(rows, regression.columns([key]), beta, noise)
         alternatives = search.alternatives(key, selection.active)
-        _, same = between_runs(regression, selection.fit, key)
         status = "ambiguous" if alternatives else "established"
-        if fails_held_out(regression, with_it, without):
-            status = "not_established"
         values = np.array(term.values, float)
         if term.form.linear:
             values[list(term.form.linear)] = beta
@@ -202,52 +150,55 @@ def wrong_values(
     regression: Regression,
     search: Search,
     selection: Selection,
-    reverse: dict[str, tuple[float, float]],
+    reverse: Regression | None,
     size_of: Callable[[str, float], float],
 ) -> dict[str, tuple[float, float]]:
     """The fewest believed values that must change: relative change and one-sigma.
 
-    Grown one at a time (the others at their belief) until what all remaining values together still explain is
-    not significant. A value is named only where the check from the other side (`reverse`) agrees, and where it
-    matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`).
+    Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
+    counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
+    sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
+    side (`reverse`: measured moments as regressors) agrees, and where it matters: SMALLEST_CHANGE, and a size in
+    units of the noise (`size_of(key, relative change)`).
     """
-    nuisance = [t.key for t in regression.terms if t.kind == "nuisance"]
-    values = [t.key for t in regression.terms if t.kind == "value"]
+    nuisance = [t.key for t in regression.terms if t.kind in ("nuisance", "wind")]
+    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
-    free = regression.fit(always + values)
-    named: list[str] = []
+    loose = {key: max(sd, WIDEST_TRUST) for key, sd in trust.items()}
     count = int(regression.training.sum())
 
-    def penalised(fit: Fit) -> float:
-        return fit.gain - float((regression.precision[fit.columns] * fit.beta**2).sum())
+    def penalised(keys: list[str]) -> float:
+        fit = regression.fit(always + keys, loose=loose)
+        cost = 0.0
+        for key in keys:
+            beta, _ = coefficients(regression, fit, key)
+            cost += COST_PER_VALUE + min((beta[0] / trust[key]) ** 2, MOST_DISTRUST)
+        return fit.gain - cost
 
-    for _ in values:
-        base = regression.fit(always + named)
-        left = penalised(free) - penalised(base)
-        rest = [v for v in values if v not in named]
-        if left < chi2.isf(1e-3, max(1, len(rest))):
-            break
-        options = []
-        for key in rest:
-            fit = regression.fit(always + named + [key])
+    subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]
+    named = max(subsets, key=penalised)
+    while named:
+        fit = regression.fit(always + named, loose=loose)
+        other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
+        doubtful = {}
+        for key in named:
             beta, covariance = coefficients(regression, fit, key)
-            z = abs(beta[0]) / np.sqrt(covariance[0, 0])
-            noisy = regression.noise_share([*always, *named, key], key, np.ones(1)) > MOST_ATTENUATION
-            other, sd = reverse.get(key, (beta[0], 0.0))
-            agrees = np.sign(other) == np.sign(beta[0]) and abs(other) > 0.3 * abs(beta[0])
-            matters = abs(beta[0]) > SMALLEST_CHANGE and size_of(key, float(beta[0])) > SMALLEST_SIZE
-            if z > VALUE_Z and matters and not noisy and agrees:
-                p = regression.wald(fit, regression.columns([key]), count)
-                options.append((penalised(fit) - penalised(base), key, p))
-        options = [o for o in options if o[2] < 5e-4]
-        if not options:
+            change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
+            check = float(coefficients(reverse or regression, other, key)[0][0])
+            noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
+            agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
+            matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
+            p = regression.wald(fit, regression.columns([key]), count)
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or not agrees or not matters:
+                doubtful[key] = abs(change) / sd
+        if not doubtful:
             break
-        named.append(max(options)[1])
+        named.remove(min(doubtful, key=doubtful.get))
     if not named:
         return {}
-    fit = regression.fit(always + named, jackknife=True)
+    fit = regression.fit(always + named, jackknife=True, loose=loose)
     out = {}
     for key in named:
         beta, covariance = coefficients(regression, fit, key)
-        out[key] = (float(beta[0]), float(np.sqrt(covariance[0, 0])))
+        out[key] = (float(beta[0]), float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR)))
     return out

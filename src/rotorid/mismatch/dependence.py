@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.regression import at_least
+from rotorid.mismatch.regression import at_least, quadratic_form
 from rotorid.mismatch.rows import CHANNELS
 
 ALARM_P = 1e-5
@@ -98,7 +98,7 @@ def _wald(parts, inputs, taps, rate_hz):
     plain = inverse
     robust = inverse @ (scores.T @ scores) @ inverse
     covariance = at_least(robust, plain)
-    statistic = float(beta @ np.linalg.pinv(covariance, rcond=1e-9, hermitian=True) @ beta)
+    statistic = quadratic_form(beta, covariance)
     count = len(blocks)
     if count - size < 3:
         return 1.0, np.zeros(size)

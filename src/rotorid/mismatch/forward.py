@@ -4,7 +4,7 @@ Three models are compared on the same windows: the believed vehicle, the refitte
 its effects. An error is the length of the vector between simulation and recording (for attitude the angle of the
 rotation between them), taken over all samples of all windows but the restarts themselves. The noise floor is what
 the sensors' own noise would make of a perfect model: the simulation is started and driven once more with as much
-white noise again, and the recorded side's noise is added.
+white noise again, and the recorded side's noise is added. It is never put above what the improved model leaves.
 """
 
 from __future__ import annotations
@@ -83,10 +83,12 @@ def forward_channels(analysis: Analysis) -> Forward:
         def share(sign, name=name):
             return Errors(**{stage: _rms(errors[stage], name, part, sign) for stage in STAGES})
 
+        rmse = SplitErrors(training=share(1), held_out=share(-1))
+        left = [e for e in (rmse.training.after, rmse.held_out.after) if e is not None]
         channels[name] = Channel(
             unit=UNITS[name],
-            noise_floor=floor.get(name),
-            rmse=SplitErrors(training=share(1), held_out=share(-1)),
+            noise_floor=min([floor[name], *left]) if name in floor else None,
+            rmse=rmse,
             p_value=PValues(before=None, after=None),
         )
     return Forward(channels, tuple(notes))

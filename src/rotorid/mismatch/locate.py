@@ -2,15 +2,17 @@
 
 Three sources, in this order of trust:
 
-1. Findings that state their own windows (a gust, a saturated command) are taken as they are.
+1. Findings that state their own windows (a gust, a sensor that drops out) are taken as they are; on their channels
+   nothing else is listed that findings explain.
 2. What a finding adds to a channel carries almost no noise. An interval is where its local size matters beside
    the channel's noise; it is kept if the energy of the residual `before` is above what the coloured noise of
    `after` allows. Findings at work for most of the flight are listed only where nothing is confined in time:
    their place is a regime, not a time.
-3. What the findings leave, `after`, is whitened and scanned over windows of 0.5 to 4 s for energy and for a mean
-   other than zero. The threshold is Bonferroni's over every window of every channel of every run; the spread of
-   both statistics is measured on the blocks of the residual themselves, so that colour that whitening left, or
-   noise that comes in bouts, raises the threshold. Edges are those of the most likely segment.
+3. What the findings leave, `after`, is whitened, evened out (noise that grows with how hard it is flown is no
+   mismatch) and scanned over windows of 0.5 to 4 s for energy and for a mean other than zero. The threshold is
+   Bonferroni's over every window of every channel of every run; the spread of both statistics is measured on the
+   blocks of the residual themselves, so that colour that whitening left, or noise that comes in bouts, raises the
+   threshold. Edges are those of the most likely segment.
 """
 
 from __future__ import annotations
@@ -19,37 +21,47 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import nnls
 from scipy.signal import lfilter
 from scipy.stats import chi2, f
 
 from rotorid.mismatch.findings import Analysis, Trace
+from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import autoregression
-from rotorid.mismatch.shares import segments_of, shares
+from rotorid.mismatch.shares import effort, segments_of, shares
 from rotorid.mismatch.verdict import SMALLEST_P, Location, Regime, rms, with_status
 
 FAMILY_ERROR = 0.002
 """Chance of any false interval in a whole set."""
-LOCAL_S = 0.2
+SCAN_ERROR = 1e-4
+"""The same for the scan of what is left; smaller, because the tails of real noise are heavier than assumed."""
+LOCAL_S = 0.1
 """Length over which the local size of an explained mismatch is taken."""
 MATTERS = 0.3
 """Local size beside the channel's noise from which an explained mismatch matters at all."""
 ON_SHARE_OF_PEAK = 0.2
 ON_SHARE_OF_NOISE = 0.15
 LOST_AT_ENDS_S = 1.0
+SMALLEST_SHARE = 0.03
+"""Share of a run's mismatch energy below which an interval is not worth a line."""
 SHORTEST_GAP_S = 0.25
 LONGEST_GAP_S = 2.0
 THROUGHOUT = 0.7
 """Covering more than this share of the flight counts as being there throughout."""
-CONFINED = 0.5
+CONFINED = 0.4
 """Covering less than this share of the flight counts as acting in part of it."""
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
-LOUDER = 1.6
+LOUDER = 4.0
 """Energy of a window beside the usual, below which louder noise is not called a mismatch."""
 SHIFTED = 0.4
 """Mean of a window beside the residual's usual size, below which a shift does not matter."""
+HELD_BACK = 3.0
+"""Energy of a block over the noise expected there, beyond which it does not count as noise in full."""
 REGIME_BLOCK_S = 0.5
 REGIME_BINS = 8
 REGIME_P = 1e-3
+CONTRAST = 2.0
+"""Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
 EXCESS_SHARE = 0.25
 """Bins with at least this share of the largest excess belong to the regime."""
 
@@ -67,14 +79,15 @@ class Interval:
 
 def locate(analysis: Analysis) -> list[Location]:
     """Locations of the mismatch, in the order of channels, runs and time; empty where there is none."""
-    own = _stated(analysis)
-    found = list(own)
+    segments = segments_of(analysis)
+    found = _stated(analysis)
     if with_status(analysis, "established", "ambiguous", "absorbed") or analysis.values:
-        partial, throughout = _explained(analysis)
-        found += partial
+        partial, throughout = _explained(analysis, segments)
+        stated = {i.trace.channel for i in found}
+        found += [i for i in partial if i.trace.channel not in stated]
         if not found:
             found += throughout
-    found += _unexplained(analysis)
+    found += _unexplained(analysis, segments)
     order = {(t.channel, t.run): k for k, t in enumerate(analysis.traces)}
     found.sort(key=lambda i: (order[i.trace.channel, i.trace.run], i.start))
     return _worded(analysis, _disjoint(found))
@@ -157,47 +170,67 @@ def _stated(analysis: Analysis) -> list[Interval]:
     return out
 
 
-def _explained(analysis: Analysis) -> tuple[list[Interval], list[Interval]]:
+def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interval], list[Interval]]:
     """Intervals of what acts in part of the flight, and of what acts for most of it.
 
-    Each finding's own contribution says where it acts; where a channel has none (values refitted, what lies
-    between command and rotor speed), all that was taken away from the channel.
+    Each finding's own contribution says where it acts; for what lies between command and rotor speed all that was
+    taken away from its channels does. A wrong value is wrong throughout.
     """
     channels = _by_channel(analysis)
-    own = shares(analysis, segments_of(analysis))
-    parts = [(channel, series) for found in own.values() for channel, series in found.items() if channel in channels]
-    spoken_for = {channel for channel, _ in parts}
-    parts += [
-        (channel, [mismatch_of(t, True) for t in traces])
-        for channel, traces in channels.items()
-        if channel not in spoken_for
-    ]
+    causes = [{c: x for c, x in found.items() if c in channels} for found in shares(analysis, segments).values()]
+    spoken_for = {channel for found in causes for channel in found}
+    rest = {c: [mismatch_of(t, True) for t in ts] for c, ts in channels.items() if c not in spoken_for}
+    at_work = with_status(analysis, "established", "ambiguous")
+    formless = {c for f in at_work if f.form is None and not f.windows for c in f.channels}
+    causes.append({c: x for c, x in rest.items() if c in formless})
     partial, throughout = [], []
-    for channel, series in parts:
-        here, confined = _where(channels[channel], series, len(analysis.traces))
-        (partial if confined else throughout).extend(here)
+    if analysis.values:
+        for channel in rest.keys() - formless:
+            masks = _acting(channels[channel], rest[channel])
+            if masks is not None:
+                throughout += _tested(channels[channel], [np.ones(len(m), bool) for m in masks], len(analysis.traces))
+    for cause in causes:
+        masks = {c: m for c, series in cause.items() if (m := _acting(channels[c], series)) is not None}
+        by_run: dict[str, list[np.ndarray]] = {}
+        for channel, parts in masks.items():
+            for trace, mask in zip(channels[channel], parts, strict=True):
+                by_run.setdefault(f"{trace.run} {trace.time_s[0]}", []).append(mask)
+        if not by_run:
+            continue
+        anywhere = [np.any(m, axis=0) for m in by_run.values()]
+        share = float(np.concatenate(anywhere).mean())
+        for channel, parts in masks.items():
+            here = _tested(channels[channel], parts, len(analysis.traces))
+            (partial if share < CONFINED else throughout).extend(here)
     return partial, throughout
 
 
-def _where(traces: Sequence[Trace], series: Sequence[np.ndarray], count: int) -> tuple[list[Interval], bool]:
-    """Intervals in which a contribution to a channel matters, and whether they are the smaller part of the flight."""
+def _acting(traces: Sequence[Trace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
+    """Masks of where a contribution to a channel matters beside its noise; None where it never does."""
     noise = channel_noise(traces)
     levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
     peak = float(np.quantile(np.concatenate(levels), 0.99))
     if not peak > MATTERS * noise:
-        return [], True
+        return None
     threshold = max(ON_SHARE_OF_PEAK * peak, ON_SHARE_OF_NOISE * noise)
     masks = [_closed(level > threshold, _period(t)) for level, t in zip(levels, traces, strict=True)]
-    share = float(np.concatenate(masks).mean())
-    freedom = _freedom_per_sample(traces)
+    if np.concatenate(masks).mean() > THROUGHOUT:
+        return [np.ones(len(m), bool) for m in masks]
+    return masks
+
+
+def _tested(traces: Sequence[Trace], masks: Sequence[np.ndarray], count: int) -> list[Interval]:
+    """Intervals of the masks in which the residual before is larger than coloured noise allows."""
+    noise, freedom = channel_noise(traces), _freedom_per_sample(traces)
     found = []
     for trace, mask in zip(traces, masks, strict=True):
-        spans = [(0, len(mask))] if share > THROUGHOUT else _spans(mask)
+        energy = np.concatenate([[0.0], np.cumsum(np.nan_to_num(mismatch_of(trace, True)) ** 2)])
+        spans = [(a, b) for a, b in _spans(mask) if energy[b] - energy[a] >= SMALLEST_SHARE * energy[-1]]
         for start, stop in spans:
             p = _energy_p(trace.before[start:stop], noise, freedom)
             if p < FAMILY_ERROR / max(len(spans) * count, 1):
                 found.append(Interval(trace, start, stop, p, True))
-    return found, share < CONFINED
+    return found
 
 
 def _local_size(values: np.ndarray, period_s: float) -> np.ndarray:
@@ -249,29 +282,49 @@ def _energy_p(values: np.ndarray, noise: float, freedom: float) -> float:
     return float(chi2.sf(degrees * np.mean(values**2) / max(noise, 1e-300) ** 2, degrees)) if len(values) else 1.0
 
 
-def _unexplained(analysis: Analysis) -> list[Interval]:
+def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
     """Stretches in which the residual after the effects is louder or shifted."""
     channels = _by_channel(analysis)
     windows = sum(
         2 * len(_window_starts(len(t.after), length)) for ts in channels.values() for t in ts for length in _lengths(t)
     )
-    limit = FAMILY_ERROR / max(windows, 1)
-    found = []
+    limit = SCAN_ERROR / max(windows, 1)
+    found, hard = [], effort(segments)
     for traces in channels.values():
         parts = [np.nan_to_num(t.after) for t in traces]
         taps = autoregression(parts)
         white = [lfilter(taps, [1.0], p) for p in parts]
-        scale = _typical(np.concatenate(white))
-        white = [w / scale for w in white]
+        white = _evened(traces, white, hard)
         for w in white:
             w[: len(taps)] = 0.0
         found += _louder(traces, white, limit) + _shifted(traces, white, parts, limit)
     return found
 
 
-def _typical(values: np.ndarray) -> float:
-    """One sigma from the median of the absolute values."""
-    return max(float(np.median(np.abs(values))) / 0.6745, 1e-300)
+def _evened(traces: Sequence[Trace], white: list[np.ndarray], hard) -> list[np.ndarray]:
+    """Residuals divided by the size that noise has at that moment: a constant and a part that grows with effort.
+
+    The energy of half-second blocks is fitted by non-negative least squares on the effort, twice, blocks far above
+    the fit held back to it, so that a mismatch that comes and goes does not count as noise.
+    """
+    energies, efforts, lengths = [], [], []
+    for trace, w in zip(traces, white, strict=True):
+        width = REGIME_BLOCK_S / _period(trace)
+        time_s, squares = hard[trace.run]
+        on_trace = [np.interp(trace.time_s, time_s, column) for column in squares.T]
+        efforts.append(np.stack([np.ones(len(w)), *(_moving_mean(x, width) for x in on_trace)], axis=1))
+        energies.append(_moving_mean(w**2, width))
+        lengths.append(max(int(width), 1))
+    x = np.concatenate([e[::n] for e, n in zip(efforts, lengths, strict=True)])
+    y = np.concatenate([e[::n] for e, n in zip(energies, lengths, strict=True)])
+    scale = np.maximum(x.mean(axis=0), 1e-300)
+    usual = np.full(len(y), max(float(np.median(y)), 1e-300))
+    for _ in range(3):
+        weight = 1.0 / usual
+        coefficients, _ = nnls(x / scale * weight[:, None], np.minimum(y, HELD_BACK * usual) * weight)
+        usual = np.maximum(x / scale @ coefficients, 1e-3 * float(np.median(y)) + 1e-300)
+    floor = 1e-3 * float(np.median(y)) + 1e-300
+    return [w / np.sqrt(np.maximum(e / scale @ coefficients, floor)) for w, e in zip(white, efforts, strict=True)]
 
 
 def _lengths(trace: Trace) -> list[int]:
@@ -425,6 +478,8 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     )
     means = np.array([energy[which == b].mean() for b in bins])
     floor = means.min()
+    if means.max() < CONTRAST * floor:
+        return None
     inside = means - floor >= EXCESS_SHARE * (means.max() - floor)
     first = last = int(np.argmax(means))
     while first > 0 and inside[first - 1]:

@@ -36,7 +36,8 @@ GAP_S = 2.0
 """Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
-ACTIVE = "active"
+MOST_NOISE_SAMPLES = 8192
+"""Samples of a column that its noise level is read from."""
 
 
 def split_runs(recordings: RecordingSet) -> Split:
@@ -76,10 +77,10 @@ def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float
 
 def white_level(values: np.ndarray) -> float:
     """One-sigma of the white part of an evenly sampled signal: the lowest level of its spectrum, as if flat."""
-    values = values[np.isfinite(values)]
+    values = values[np.isfinite(values)][:MOST_NOISE_SAMPLES]
     if len(values) < 64:
         return 0.0
-    _, density = welch(values, fs=1.0, nperseg=min(256, len(values) // 2), detrend="linear")
+    _, density = welch(values, fs=1.0, nperseg=min(256, len(values) // 2))
     smooth = np.convolve(density[2:], np.ones(9) / 9, mode="valid")
     return float(np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 

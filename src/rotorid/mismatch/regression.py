@@ -111,26 +111,45 @@ class Regression:
         parts = [np.arange(self.start[k], self.start[k] + sizes[k]) for k in keys]
         return np.concatenate(parts).astype(int) if parts else np.zeros(0, int)
 
+    def __post_init__(self):
+        self._total_gram = self.gram[self.training].sum(axis=0)
+        self._total_cross = self.cross[self.training].sum(axis=0)
+
     def _normal(self, cols: np.ndarray, mask: np.ndarray):
         share = mask.sum() / len(mask)
         grid = np.ix_(cols, cols)
-        gram = self.gram[mask].sum(axis=0)[grid]
-        cross = self.cross[mask].sum(axis=0)[cols]
+        if mask is self.training:
+            gram, cross = self._total_gram[grid], self._total_cross[cols]
+        else:
+            index = np.flatnonzero(mask)
+            gram = self.gram[np.ix_(index, cols, cols)].sum(axis=0)
+            cross = self.cross[np.ix_(index, cols)].sum(axis=0)
         bias = limited_bias(gram, self.bias_gram[grid] * share)
         return gram, cross, bias, self.bias_cross[cols] * share
 
-    def fit(self, keys: Iterable[str], mask: np.ndarray | None = None, jackknife: bool = False) -> Fit:
-        """Fit terms on the masked blocks (training by default)."""
+    def fit(
+        self,
+        keys: Iterable[str],
+        mask: np.ndarray | None = None,
+        jackknife: bool = False,
+        loose: dict[str, float] | None = None,
+    ) -> Fit:
+        """Fit terms on the masked blocks (training by default); `loose` widens priors (term to one-sigma)."""
         mask = self.training if mask is None else mask
         cols = self.columns(keys)
         gram, cross, bias, bias_cross = self._normal(cols, mask)
-        prior = np.diag(self.precision[cols])
+        precision = self.precision
+        if loose:
+            precision = precision.copy()
+            for key, sd in loose.items():
+                precision[self.columns([key])] = 1.0 / sd**2
+        prior = np.diag(precision[cols])
         inverse = ridge_inverse(gram - bias + prior)
         beta = inverse @ (cross - bias_cross)
         count = int(mask.sum())
-        grid = np.ix_(cols, cols)
-        blocks = self.gram[mask][:, grid[0], grid[1]]
-        scores = self.cross[mask][:, cols] - bias_cross / count - (blocks - bias / count) @ beta
+        every = self.gram[np.ix_(np.arange(len(mask)), cols, cols)]
+        blocks = every[mask]
+        scores = self.cross[np.ix_(np.flatnonzero(mask), cols)] - bias_cross / count - (blocks - bias / count) @ beta
         if jackknife:
             eye = np.eye(len(cols))
             scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
@@ -140,17 +159,62 @@ class Regression:
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
         shift = DOUBT_OF_CORRECTION * (beta - ridge_inverse(gram + prior) @ cross)
         covariance = at_least(robust, plain) + np.outer(shift, shift)
-        all_blocks = self.gram[:, grid[0], grid[1]]
-        rss = self.square - 2 * self.cross[:, cols] @ beta + np.einsum("bij,i,j->b", all_blocks, beta, beta)
+        rss = self.square - 2 * self.cross[:, cols] @ beta + (every @ beta) @ beta
         gain = float(self.square[mask].sum() - rss[mask].sum())
         return Fit(cols, beta, covariance, rss, gain)
+
+    def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
+        """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
+
+        Per run the term is refitted with all other coefficients held (DerSimonian and Laird's moment estimate).
+        """
+        cols = self.columns([key])
+        where = [list(fit.columns).index(c) for c in cols]
+        rest = [i for i in range(len(fit.columns)) if i not in where]
+        estimates, variances = [], []
+        for run in np.unique(self.run[self.training]):
+            mask = self.training & (self.run == run)
+            if mask.sum() < 5:
+                continue
+            own = self.gram[mask][:, cols][:, :, cols]
+            total = own.sum(axis=0)
+            cross = self.cross[mask][:, cols] - self.gram[mask][:, cols][:, :, fit.columns[rest]] @ fit.beta[rest]
+            if total[0, 0] < 1e-3 * self.gram[self.training][:, cols[0], cols[0]].sum():
+                continue  # the effect is hardly excited in this run
+            inverse = np.linalg.pinv(total, rcond=1e-10, hermitian=True)
+            beta = inverse @ cross.sum(axis=0)
+            scores = cross - own @ beta
+            robust = inverse @ (scores.T @ scores) @ inverse
+            estimates.append(beta)
+            variances.append(np.maximum(np.diag(robust), np.diag(inverse)))
+        if len(estimates) < 2:
+            return np.zeros(len(cols)), 1.0
+        b, v = np.array(estimates), np.maximum(np.array(variances), 1e-300)
+        w = 1.0 / v
+        mean = (w * b).sum(axis=0) / w.sum(axis=0)
+        q = (w * (b - mean) ** 2).sum(axis=0)
+        degrees = len(b) - 1
+        scale = w.sum(axis=0) - (w**2).sum(axis=0) / w.sum(axis=0)
+        spread = np.maximum(0.0, (q - degrees) / np.maximum(scale, 1e-300))
+        p = float(min(1.0, len(cols) * chi2.sf(q, degrees).min()))
+        return spread / len(b), p
+
+    def expected_gain(self, with_it: Fit, without: Fit, mask: np.ndarray) -> float:
+        """Whitened squares that the larger model should explain on masked blocks if its coefficients are right."""
+        shift = with_it.beta.copy()
+        for i, column in enumerate(with_it.columns):
+            where = np.flatnonzero(without.columns == column)
+            if len(where):
+                shift[i] -= without.beta[where[0]]
+        grams = self.gram[np.ix_(np.flatnonzero(mask), with_it.columns, with_it.columns)]
+        return float(((grams @ shift) @ shift).sum())
 
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
         """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
         others = self.columns([k for k in keys if k != key])
         own = self.columns([key])
         cols = np.concatenate([others, own])
-        gram = self.gram[self.training].sum(axis=0)
+        gram = self._total_gram
         bias = self.bias_gram * self.training.mean()
         inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
         direction = np.concatenate([-inner @ gram[np.ix_(others, own)] @ beta, beta])
@@ -164,7 +228,7 @@ class Regression:
         where = np.argsort(fit.columns)[where]
         b = fit.beta[where]
         cov = fit.covariance[np.ix_(where, where)]
-        statistic = float(b @ np.linalg.pinv(cov, hermitian=True) @ b)
+        statistic = quadratic_form(b, cov)
         q = len(b)
         if count - q < 2:
             return 1.0
@@ -203,13 +267,23 @@ def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
 
 def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
     """A covariance that is in no direction smaller than the plain one."""
-    values, vectors = np.linalg.eigh((plain + plain.T) / 2)
-    values = np.maximum(values, values[-1] * 1e-14 if len(values) else 0)
+    # Coefficients differ by many powers of ten (kg m2 beside relative changes): compare in units of their own.
+    unit = np.sqrt(np.maximum(np.diag(plain), 0.0))
+    scale = np.where(unit > 0, 1.0 / np.where(unit > 0, unit, 1.0), 0.0)
+    values, vectors = np.linalg.eigh((plain + plain.T) / 2 * np.outer(scale, scale))
+    values = np.maximum(values, 1e-12)
     root = vectors * np.sqrt(values)
     back = vectors / np.sqrt(values)
-    inner = back.T @ robust @ back
+    inner = back.T @ (robust * np.outer(scale, scale)) @ back
     v, u = np.linalg.eigh((inner + inner.T) / 2)
-    return root @ (u * np.maximum(v, 1.0)) @ u.T @ root.T
+    return root @ (u * np.maximum(v, 1.0)) @ u.T @ root.T * np.outer(unit, unit)
+
+
+def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
+    """valuesᵀ covariance⁻¹ values, in units of the coefficients' own standard errors."""
+    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    scaled = values / unit
+    return float(scaled @ np.linalg.pinv(covariance / np.outer(unit, unit), rcond=1e-10, hermitian=True) @ scaled)
 
 
 def whiten(rows: Rows, filters: np.ndarray | dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -58,13 +58,13 @@ def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.nd
     thrust = vehicle.thrust_coefficients_n_s2() * squared
     positions = vehicle.rotor_positions_m()
     force = np.zeros((motion.size, 3))
-    force[:, 2] = -thrust.sum(axis=1)
+    force[:, 2] = -thrust @ np.ones(len(positions))
     arm = np.zeros_like(force)
     # r × (0, 0, -T) = (-y T, x T, 0)
-    arm[:, 0] = -(thrust * positions[:, 1]).sum(axis=1)
-    arm[:, 1] = (thrust * positions[:, 0]).sum(axis=1)
+    arm[:, 0] = -thrust @ positions[:, 1]
+    arm[:, 1] = thrust @ positions[:, 0]
     torque = np.zeros_like(force)
-    torque[:, 2] = (squared * vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs()).sum(axis=1)
+    torque[:, 2] = squared @ (vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs())
     return force, arm, torque
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
+from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
 
 ENTER_P = 1e-4
@@ -15,9 +15,21 @@ KEEP_P = 1e-4
 COST_PER_PARAMETER = 8.0
 """Whitened squares that each further parameter must explain before a richer form is preferred."""
 SMALLEST_SIZE = 0.15
-"""An effect below this share of the channel's noise (its strongest second) does not matter."""
+"""An effect below this share of the channel's noise (its strongest tenth of the seconds) does not matter."""
+SHARE_OF_LARGEST = 0.04
+"""Nor does one below this share of the largest effect in its channel: no form is known better than that."""
+COST_PER_EFFECT = 20.0
+"""Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
 ALTERNATIVE_P = 0.01
+"""A term that beside an alternative is less significant than this could be that alternative instead."""
+MOST_EXTRA_PARAMETERS = 3
+"""An alternative with more further parameters than this explains by its freedom, not by its cause."""
 MOST_EFFECTS = 10
+EXPECTED_HELD_OUT = 25.0
+"""Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
+UNSTEADY_P = 1e-6
+UNSTEADY_SHARE = 0.4
+"""A coefficient that spreads by more than this share of itself between runs is no constant of the vehicle."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +46,8 @@ class Candidate:
 
     @property
     def score(self) -> float:
-        return self.gain / self.inflation - COST_PER_PARAMETER * len(self.beta)
+        """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
+        return self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
 
 
 @dataclass
@@ -51,12 +64,16 @@ class Selection:
 class Search:
     """Forward search with replacement of forms, backward checks and pair moves."""
 
-    def __init__(self, regression: Regression, size_of, always: list[str] | None = None):
-        """`size_of(key, beta, others)` gives the size of a term in units of the channel's noise."""
+    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None):
+        """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
+
+        `known_sizes`, same shape, are of effects that are in the model already (between command and rotor speed).
+        """
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
-        self.always = always if always is not None else [t.key for t in regression.terms if t.kind != "effect"]
-        self.size_of = size_of
+        self.always = [t.key for t in regression.terms if t.kind != "effect"]
+        self.sizes_of = sizes_of
+        self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
     def physical(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
@@ -66,6 +83,8 @@ class Search:
         for index, value, sd in zip(term.form.linear, beta, error, strict=True):
             parameter = term.form.parameters[index]
             if value < parameter.low - 1.5 * sd or value > parameter.high + 1.5 * sd:
+                return False
+            if index in term.form.must_show and abs(value) < 2.0 * sd:
                 return False
         return True
 
@@ -78,11 +97,25 @@ class Search:
         beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
         p_value = self.regression.wald(fit, cols, self.blocks)
         gain = fit.gain - base.gain
-        statistic = float(beta @ np.linalg.pinv(covariance, hermitian=True) @ beta)
+        statistic = quadratic_form(beta, covariance)
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         physical = physical and self.regression.noise_share(keys, key, beta) < MOST_ATTENUATION
         return Candidate(key, beta, p_value, gain, inflation, physical)
+
+    def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
+        """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
+        own = self.sizes_of(key, beta)
+        largest = self.known_sizes.copy()
+        others = [k for k in active if k != key]
+        if others:
+            fit = self.regression.fit(self.always + others)
+            for k in others:
+                cols = self.regression.columns([k])
+                where = [list(fit.columns).index(c) for c in cols]
+                largest = np.maximum(largest, self.sizes_of(k, fit.beta[where]))
+        counted = np.where(own >= SHARE_OF_LARGEST * largest, own, 0.0)
+        return float(counted.max())
 
     def without(self, key: str, active: list[str]) -> Fit:
         return self.regression.fit(self.always + [k for k in active if k != key])
@@ -109,12 +142,49 @@ class Search:
         judged = [c for c in judged if c.physical] or judged
         return max(judged, key=lambda c: c.score).key
 
+    def simpler(self, active: list[str]) -> list[str] | None:
+        """A model with one id less and another form of one that stays, if it explains nearly as much.
+
+        Drag at the hubs, for example, is the same as drag at the centre of mass with a yaw damping beside it.
+        """
+        if len(active) < 2:
+            return None
+
+        def worth(keys: list[str]) -> float:
+            parameters = sum(self.terms[k].size for k in keys)
+            gain = self.regression.fit(self.always + keys).gain
+            return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys)
+
+        best, found = worth(active), None
+        for gone in active:
+            for stays in active:
+                if stays == gone or self.terms[stays].run or self.terms[gone].run:
+                    continue
+                for other in self.terms.values():
+                    if other.kind != "effect" or other.effect != self.terms[stays].effect:
+                        continue
+                    trial = [other.key if k == stays else k for k in active if k != gone]
+                    value = worth(trial)
+                    if value > best and self._all_physical(trial):
+                        best, found = value, trial
+        return found
+
+    def _all_physical(self, active: list[str]) -> bool:
+        fit = self.regression.fit(self.always + active)
+        for key in active:
+            cols = self.regression.columns([key])
+            where = [list(fit.columns).index(c) for c in cols]
+            sd = np.sqrt(np.diag(fit.covariance)[where])
+            if not self.physical(self.terms[key], fit.beta[where], sd):
+                return False
+        return True
+
     def weak(self, active: list[str]) -> tuple[str, str] | None:
         """The worst term of the model that fails a test, with the reason; None if all hold."""
         worst = None
         for key in active:
             judged = self.judge(key, active, self.without(key, active))
-            size = self.size_of(key, judged.beta, active)
+            size = self.weight(key, judged.beta, active)
             reason = None
             if judged.p_value > KEEP_P:
                 reason = f"p = {judged.p_value:.2g} beside the others"
@@ -139,7 +209,7 @@ class Search:
                         break
                     if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
                         continue
-                    size = self.size_of(candidate.key, candidate.beta, active)
+                    size = self.weight(candidate.key, candidate.beta, active)
                     if size < SMALLEST_SIZE:
                         dropped.setdefault(effect, f"its size is {size:.2g} of the noise")
                         continue
@@ -160,6 +230,9 @@ class Search:
                     active[active.index(key)] = better
                     trail.append(f"  {key} → {better}")
                     changed = True
+            if (simpler := self.simpler(active)) is not None:
+                trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
+                active, changed = simpler, True
             while (weak := self.weak(active)) is not None:
                 key, reason = weak
                 active.remove(key)
@@ -168,10 +241,54 @@ class Search:
                 changed = True
             if not changed or not grown:
                 break
+        while (failed := self.failed_held_out(active)) is not None:
+            active.remove(failed)
+            dropped[self.terms[failed].effect] = "it did not help on the held-out runs"
+            trail.append(f"- {failed}: fails on the held-out runs")
+            while (weak := self.weak(active)) is not None:
+                active.remove(weak[0])
+                dropped[self.terms[weak[0]].effect] = weak[1]
+        while (unsteady := self.unsteady(active)) is not None:
+            active.remove(unsteady)
+            dropped[self.terms[unsteady].effect] = "it differs from run to run"
+            trail.append(f"- {unsteady}: differs from run to run")
         fit = self.regression.fit(self.always + active, jackknife=True)
         final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
         kept = {self.terms[k].effect for k in active}
         return Selection(active, fit, final, trail, {e: r for e, r in dropped.items() if e not in kept})
+
+    def failed_held_out(self, active: list[str]) -> str | None:
+        """The term that should help on the held-out blocks and does the most harm there instead."""
+        mask = self.regression.held_out
+        if mask.sum() < 4 or not active:
+            return None
+        with_it = self.regression.fit(self.always + active)
+        worst, found = 0.0, None
+        for key in active:
+            if self.terms[key].run:
+                continue
+            without = self.without(key, active)
+            expected = self.regression.expected_gain(with_it, without, mask)
+            gain = float((without.residual_square - with_it.residual_square)[mask].sum())
+            if expected > EXPECTED_HELD_OUT and gain < worst:
+                worst, found = gain, key
+        return found
+
+    def unsteady(self, active: list[str]) -> str | None:
+        """A term whose coefficients are not the same from run to run, beyond doubt and by much."""
+        fit = self.regression.fit(self.always + active)
+        for key in active:
+            if self.terms[key].run:
+                continue
+            spread, p = self.regression.between_runs(fit, key)
+            cols = self.regression.columns([key])
+            where = [list(fit.columns).index(c) for c in cols]
+            runs = len(np.unique(self.regression.run[self.regression.training]))
+            if p < UNSTEADY_P and (spread * runs).sum() > (UNSTEADY_SHARE * fit.beta[where]) @ (
+                UNSTEADY_SHARE * fit.beta[where]
+            ):
+                return key
+        return None
 
     def pair(self, active: list[str], dropped: dict[str, str], most: int = 14) -> list[str] | None:
         """Two terms that mask each other: neither enters alone, both hold together."""
@@ -202,7 +319,7 @@ class Search:
             judged.p_value < ENTER_P / 10
             and judged.physical
             and judged.score > 0
-            and self.size_of(key, judged.beta, active) > SMALLEST_SIZE
+            and self.weight(key, judged.beta, active) > SMALLEST_SIZE
         )
 
     def alternatives(self, key: str, active: list[str]) -> list[str]:
@@ -217,16 +334,11 @@ class Search:
             if term.effect in found:
                 continue
             other = self.judge(term.key, rest, self.without(key, active))
-            if not other.physical or other.p_value > ENTER_P or other.score < 0.5 * own.score:
+            if not other.physical or other.p_value > 1e-3 or other.gain < 0.5 * own.gain:
                 continue
-            if other.score < own.score - COST_PER_PARAMETER and len(other.beta) > len(own.beta):
+            if len(other.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
                 continue
             both = self.judge(key, [*rest, term.key], self.regression.fit(self.always + rest + [term.key]))
             if both.p_value > ALTERNATIVE_P:
                 found.append(term.effect)
         return found
-
-
-def with_values(term: Term, values: np.ndarray) -> Term:
-    """The term at new parameter values."""
-    return replace(term, values=tuple(float(v) for v in values))

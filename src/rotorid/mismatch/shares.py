@@ -61,6 +61,21 @@ def shares(analysis: Analysis, segments: list[Segment]) -> dict[int, dict[str, l
     return out
 
 
+def effort(segments: list[Segment]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """How hard each run is flown: instants (n,) and squares (n, 4) of rotor speed changes, rates and accelerations.
+
+    Readings that are late by part of a sample, or coarse, leave errors that grow with these.
+    """
+    parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for segment in segments:
+        motion = segment.motion
+        given = [motion.rotor_acceleration, motion.angular_velocity, motion.angular_acceleration, motion.specific_force]
+        squares = [np.zeros(motion.size) if g is None else (np.nan_to_num(g) ** 2).sum(axis=1) for g in given]
+        squares[3] = (squares[3] - np.median(squares[3])) ** 2
+        parts.setdefault(segment.run, []).append((motion.time_s, np.stack(squares, axis=1)))
+    return {run: (np.concatenate([t for t, _ in p]), np.concatenate([e for _, e in p])) for run, p in parts.items()}
+
+
 def _series(finding: Finding, segments: list[Segment], vehicle) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Channel group to instants (n,) and contribution (n, 3) over all stretches of a run."""
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}

@@ -316,8 +316,8 @@ def plain_sentence(
     if word == "no_mismatch":
         return _agreement(analysis, channels)
     main = main_channel(analysis, locations, channels)
-    parts = [_where(main, locations, channels)]
-    parts += [_left_out(f, number_of == 0) for number_of, f in enumerate(with_status(analysis, "established"))]
+    parts = [_where(main, locations, channels, analysis)]
+    parts += [_left_out(f, k == 0) for k, f in enumerate(with_status(analysis, "established"))]
     parts += [_either(f, analysis) for f in one_per_class(with_status(analysis, "ambiguous"))]
     parts += [_wrong(name, values) for name, values in analysis.values.items()]
     if with_status(analysis, "established", "ambiguous") or analysis.values:
@@ -360,7 +360,7 @@ def _either_split(channel: Channel) -> tuple[Errors, str]:
     return channel.rmse.training, "on the flight it was fitted to"
 
 
-def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Channel]) -> str:
+def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Channel], analysis: Analysis) -> str:
     if not main:
         return ""
     here = [loc for loc in locations if loc.channel == main]
@@ -370,22 +370,27 @@ def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Chan
         return capital(off) + "."
     best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
     doubt = f" ({sure(best.p_value if best.p_value is not None else 1.0)})"
-    return f"{capital(_when(best, here))}{off}{doubt}."
+    return capital(f"{_when(best, here, analysis)}{off}{doubt}.")
 
 
-def _when(best: Location, here: Sequence[Location]) -> str:
+def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
     """Lead-in that says in which regime, else at what time, the mismatch shows."""
     regime = best.regime
-    if regime is not None and regime.variable != "time_s" and (regime.low is not None or regime.high is not None):
+    if regime is not None and regime.variable != "time_s" and regime.low is not None and regime.high is not None:
         name, unit = regime_words(regime.variable)
         space = f" {unit}" if unit else ""
-        if regime.low is None:
+        flown = np.concatenate([r[regime.variable] for r in analysis.regimes.values() if regime.variable in r])
+        to_the_end = regime.high >= np.nanquantile(flown, 0.98)
+        from_the_start = regime.low <= np.nanquantile(flown, 0.02)
+        if from_the_start and not to_the_end:
             return f"up to {number(regime.high)}{space} of {name}, "
-        if regime.high is None:
+        if to_the_end and not from_the_start:
             return f"from {number(regime.low)}{space} of {name} on, "
-        return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "
-    if regime is not None and best.start_s is not None and best.stop_s is not None:
-        more = f" and {len(here) - 1} other stretches" if len(here) > 2 else ""
+        if not to_the_end:
+            return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "
+        return ""
+    if best.energy_share < 0.99 and best.start_s is not None and best.stop_s is not None:
+        more = f" (and in {len(here) - 1} more stretches)" if len(here) > 1 else ""
         return f"from {best.start_s:.1f} to {best.stop_s:.1f} s of {best.run}{more}, "
     return ""
 
@@ -447,16 +452,21 @@ def _rest(analysis: Analysis, locations: Sequence[Location]) -> str:
 
 def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
     shown = [c for c in ("force_z", "force_x", "moment_x", "moment_z") if c in channels] or list(channels)
-    quoted = []
-    for name in shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]:
-        errors, where = _either_split(channels[name])
-        unit = channels[name].unit
-        quoted.append(
-            f"{where if not quoted else 'there'} the {channel_words(name)} is {number(errors.before)} {unit} off and "
-            f"the sensors' own noise is {number(channels[name].noise_floor)} {unit}"
-        )
-    tail = f": {listed(quoted)}" if quoted else ""
-    return f"The simulation agrees with the recordings to within the noise{tail}."
+    chosen = shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]
+    left = listed(
+        [
+            f"{number(_either_split(channels[c])[0].before)} {channels[c].unit} in the {channel_words(c)} "
+            f"(the sensors' own noise: {number(channels[c].noise_floor)})"
+            for c in chosen
+        ]
+    )
+    if not left:
+        return "Nothing was found that the believed vehicle leaves out."
+    where = _either_split(channels[chosen[0]])[1]
+    return (
+        f"The believed vehicle describes these recordings: the error that is left {where}, {left}, does not depend on "
+        "how it was flown."
+    )
 
 
 if __name__ == "__main__":

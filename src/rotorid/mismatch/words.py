@@ -94,23 +94,28 @@ def effect_words(effect_id: str) -> str:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """A number to so many significant digits: plain from 0.001 to 99 999, else with an exponent."""
+    """A number to so many significant digits: plain from 0.0001 to 99 999, else with an exponent."""
     if value is None or not math.isfinite(value):
         return "unknown"
     if value == 0:
         return "0"
     value = float(f"{value:.{digits - 1}e}")
     exponent = math.floor(math.log10(abs(value)))
-    if -3 <= exponent < 5:
+    if -4 <= exponent < 5:
         return f"{value:.{max(digits - 1 - exponent, 0)}f}"
     return f"{value / 10.0**exponent:.{digits - 1}f}e{exponent}"
 
 
 def plus_minus(value: float, low: float | None, high: float | None) -> str:
-    """`5.1e-5 ± 0.2e-5`: half the interval to one digit (two below a 3), the value to the same place."""
+    """`5.1e-5 ± 0.2e-5`: half the interval to one digit (two below a 3), the value to the same place.
+
+    An interval many times the value says that the recordings do not determine it.
+    """
     if low is None or high is None or not all(map(math.isfinite, (value, low, high))) or high <= low:
         return number(value, 3)
     half = (high - low) / 2
+    if half > 5 * max(abs(value), abs(low + high) / 2):
+        return "not determined"
     place = math.floor(math.log10(half))
     if half / 10.0**place < 3:
         place -= 1

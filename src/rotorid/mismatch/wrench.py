@@ -65,6 +65,7 @@ def wrench_model(
     start: list[str] | None = None,
     segments: list[Segment] | None = None,
     noisy_segments: list[Segment] | None = None,
+    known_sizes: np.ndarray | None = None,
 ) -> WrenchModel:
     """Assemble, whiten, reduce and search."""
     segments = prepared.segments if segments is None else segments
@@ -85,28 +86,30 @@ def wrench_model(
     )
     per = max(2, int(rate))
 
-    def size_of(key: str, beta: np.ndarray, active: list[str]) -> float:
+    def sizes_of(key: str, beta: np.ndarray) -> np.ndarray:
         short = any(t.key == key and t.run for t in terms)
-        return local_size(rows, regression.columns([key]), beta, noise, per, 1.0 if short else 0.9)
+        return local_sizes(rows, regression.columns([key]), beta, noise, per, 1.0 if short else 0.9)
 
-    search = Search(regression, size_of)
+    search = Search(regression, sizes_of, known_sizes)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
 
 
-def local_size(
+def local_sizes(
     rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray, per: int, quantile: float = 0.9
-) -> float:
-    """Strongest tenth of the seconds of a contribution in any channel, in units of the channel's noise."""
-    best = 0.0
-    for r in rows:
-        count = len(r.y) // per
-        if count < 1:
-            continue
-        part = (r.x[: count * per][:, :, cols] @ beta).reshape(count, per, 12)
-        local = np.sqrt((part**2).mean(axis=1))
-        for c in np.flatnonzero(np.isfinite(noise)):
-            best = max(best, float(np.quantile(local[:, c], quantile)) / noise[c])
-    return best
+) -> np.ndarray:
+    """Strongest tenth of the seconds of a contribution per channel, in units of the channel's noise, (12,)."""
+    return sizes_of_parts([r.x[:, :, cols] @ beta for r in rows], noise, per, quantile)
+
+
+def sizes_of_parts(parts: list[np.ndarray], noise: np.ndarray, per: int, quantile: float = 0.9) -> np.ndarray:
+    """Quantile over seconds of the rms of contributions (n, 12), in units of the noise; the largest of all parts."""
+    best = np.zeros(12)
+    for part in parts:
+        count = len(part) // per
+        if count:
+            local = np.sqrt((part[: count * per].reshape(count, per, 12) ** 2).mean(axis=1))
+            best = np.fmax(best, np.quantile(local, quantile, axis=0) / noise)
+    return np.nan_to_num(best)
 
 
 def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full_voltage, cutoff_hz) -> list[Segment]:
@@ -379,8 +382,8 @@ def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
     return model.regression.filters
 
 
-def reverse_values(prepared: Prepared, model: WrenchModel, segments) -> dict[str, tuple[float, float]]:
-    """Values and their one-sigma with the measured moments as regressors instead of the predicted ones.
+def reverse_regression(prepared: Prepared, model: WrenchModel, segments) -> Regression:
+    """The values and selected effects with the measured moments as regressors instead of the predicted ones.
 
     Noise in the rotor speeds pulls the usual estimate one way, noise in the body rates pulls this one the other
     way: the truth lies between (Frisch bounds).
@@ -388,18 +391,7 @@ def reverse_values(prepared: Prepared, model: WrenchModel, segments) -> dict[str
     active = [model.search.terms[k] for k in model.selection.active]
     terms = [t for t in model.terms if t.kind != "effect"] + active
     rows = assemble_rows(prepared, terms, segments, chosen(model), measured_moment=True)
-    regression = build(
-        rows,
-        terms,
-        model_filters(model),
-        training_rule(prepared.split, segments),
-        block_seconds(rows, prepared.thinner.rate_hz),
-        prepared.thinner.rate_hz,
+    rate = prepared.thinner.rate_hz
+    return build(
+        rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
     )
-    fit = regression.fit([t.key for t in terms])
-    out = {}
-    for t in terms:
-        if t.kind == "value":
-            where = list(fit.columns).index(regression.start[t.key])
-            out[t.key] = (float(fit.beta[where]), float(np.sqrt(fit.covariance[where, where])))
-    return out

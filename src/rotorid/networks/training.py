@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -71,7 +70,6 @@ def train(
         first = _restore(Path(checkpoint), weights, biases, history)
         LOGGER.info("continued after epoch %d", first)
     current = replace(network, weights=tuple(weights), biases=tuple(biases))
-    began = time.monotonic()
     for epoch in range(first, training.epochs):
         errors = np.empty_like(targets)
         for rows in _groups(training, epoch, len(inputs)):
@@ -87,14 +85,7 @@ def train(
         if (epoch + 1) % training.checkpoint_every == 0 or epoch + 1 == training.epochs:
             if not all(np.isfinite(w).all() for w in weights):
                 raise ValueError(f"training ran away by epoch {epoch + 1}: lower the rate {training.rate}")
-            spent = time.monotonic() - began
-            LOGGER.info(
-                "epoch %d of %d, %.1f s, mse %s",
-                epoch + 1,
-                training.epochs,
-                spent,
-                np.array2string(np.mean(errors**2, axis=0), precision=3),
-            )
+            LOGGER.info("epoch %d of %d, mse %s", epoch + 1, training.epochs, np.mean(errors**2, axis=0).round(9))
             if checkpoint is not None:
                 _store(Path(checkpoint), epoch + 1, weights, biases, history)
     epochs = np.arange(kept) * training.every

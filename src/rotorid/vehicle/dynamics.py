@@ -84,7 +84,7 @@ class Dynamics:
 
 def has_memory(form: Form) -> bool:
     """Whether a form needs the past (a pendulum of its own), so that one instant does not give its wrench."""
-    return bool(getattr(form, "memory", False))
+    return form.memory
 
 
 def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[str]) -> None:

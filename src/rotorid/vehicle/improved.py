@@ -8,6 +8,10 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Effect, Form, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.simulator import Commands, Controller, Motors, Trace, simulate
+
+LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
+"""Forms of `motor_lag` that the simulator's own motors fly."""
 
 ActiveForm = tuple[Form, np.ndarray]
 """A form of an effect and the values of its parameters, in order."""
@@ -83,3 +87,45 @@ def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | ActiveSp
     if not np.all(np.isfinite(values)):
         raise InputError(f"{where} ({name}, {wanted}) has a parameter that is not a finite number")
     return form, values
+
+
+def simulate_as_stated(
+    vehicle: Vehicle,
+    controller: Controller,
+    duration_s: float,
+    step_s: float = 0.001,
+    voltage_v: float | None = None,
+    **settings,
+) -> Trace:
+    """Fly a vehicle with every effect that its file states switched on; `settings` as for `simulate`.
+
+    What lies between command and rotor speed is applied to the whole series where the commands are known
+    (`Commands`). Under any other controller only a lag of the speed can be flown, since the other forms need the
+    series; InputError says so.
+    """
+    speed_forms = active_speed_forms(vehicle)
+    motors = Motors(limits_rad_s=vehicle.rotor_speed_limits_rad_s)
+    if speed_forms and isinstance(controller, Commands):
+        time_s = step_s * np.arange(int(round(duration_s / step_s)) + 1)
+        held = np.searchsorted(controller.time_s, time_s + 1e-9, side="right") - 1
+        command = controller.rotor_speed[np.maximum(held, 0)]
+        voltage = None if voltage_v is None else np.full(len(time_s), float(voltage_v))
+        controller = Commands(time_s, speeds_of_commands(vehicle, command, time_s, voltage))
+    else:
+        for form, values in speed_forms:
+            if form.name not in LAGS_OF_SPEED:
+                raise InputError(
+                    f"vehicle {vehicle.name}: effect form {form.name!r} needs the whole series of commands; "
+                    "give them as Commands instead of a controller"
+                )
+            motors = Motors(values[0], values[-1], vehicle.rotor_speed_limits_rad_s)
+    return simulate(
+        vehicle,
+        controller,
+        duration_s,
+        step_s,
+        motors=motors,
+        effects=active_forms(vehicle),
+        voltage_v=voltage_v,
+        **settings,
+    )

@@ -10,7 +10,6 @@ from rotorid.estimate.inertial import (
     fit_least_squares,
     fit_masked_network,
     inertias_of_weights,
-    six_weights,
     weights_of_inertias,
 )
 from rotorid.networks.network import LINEAR, Network
@@ -90,10 +89,21 @@ def test_least_squares_finds_the_inertias_and_covers():
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
 
-def test_masked_network_ends_where_least_squares_does():
+@pytest.mark.parametrize("scaled", [False, True])
+def test_masked_network_ends_where_least_squares_does(scaled):
     rates, accelerations, moments = motion(500)
-    trained = fit_masked_network(rates / 10, accelerations / 10, moments, Training(0.8, 20000, every=1000))
-    weights = six_weights(trained.network.weights[0])
+    how = Training(0.8, 20000, every=1000)
+    fit = fit_masked_network(rates / 10, accelerations / 10, moments, how, scaled)
     expected = fit_least_squares(rates / 10, accelerations / 10, moments).weights
-    np.testing.assert_allclose(weights, expected, rtol=1e-6)
-    assert np.all(trained.network.weights[0][MASK == 0] == 0)
+    np.testing.assert_allclose(fit.weights, expected, rtol=1e-6)
+    assert np.all(fit.trained.network.weights[0][MASK == 0] == 0)
+
+
+def test_epochs_to_settle_are_the_time_constant_of_the_error():
+    """One axis alone, constant input 0.1, rate 0.5: the error shrinks by 1 - 0.5 · 0.01 an epoch, 200 epochs to 1/e."""
+    rates = np.zeros((10, 3))
+    moments = np.full((10, 3), 0.1)
+    fit = fit_masked_network(rates, moments * 400, moments, Training(0.5, 200, seed=1))
+    np.testing.assert_allclose(fit.epochs_to_settle[3:], 200)
+    mse = fit.trained.mse[:, 0]
+    assert mse[199] / mse[0] == pytest.approx(np.exp(-2 * 199 / 200), rel=0.01)

@@ -427,3 +427,37 @@ def test_angular_acceleration_is_equation_4_19():
         -0.0182 * p * q + 0.03 / 4.6838e-3,
     ]
     np.testing.assert_allclose(found, by_hand, atol=3e-4)
+
+
+def test_effects_of_the_vehicle_file_are_flown():
+    """Lag and drag stated in the file: the same flight as with both given by hand, under commands and under PID."""
+    from rotorid.vehicle.improved import simulate_as_stated
+
+    drag = catalogue()["rotor_drag"].forms(thesis_vehicle())[0]
+    parameters = {p.symbol: 1e-5 for p in drag.parameters}
+    entries = [
+        dict(id="motor_lag", form="up and down", parameters={"tau_up": 0.05, "tau_down": 0.03}),
+        dict(id="rotor_drag", form=drag.name, parameters=parameters),
+    ]
+    stated = thesis_vehicle(effects=entries)
+    start = Start(velocity_m_s=np.array([[3.0, 0, 0]]))
+    pid = AttitudePid(thesis_vehicle(), training_reference())
+    effects = [(drag, list(parameters.values()))]
+    by_hand = simulate(thesis_vehicle(), pid, 0.5, 0.002, start, Motors(0.05, 0.03), effects)
+    found = simulate_as_stated(stated, pid, 0.5, 0.002, start=start)
+    np.testing.assert_array_equal(found.velocity, by_hand.velocity)
+    assert abs(found.velocity[0, -1, 0] - 3.0) > 0.05
+    commands = Commands(0.002 * np.arange(250), wiggle(250, 0.002))
+    known = simulate_as_stated(stated, commands, 0.5, 0.002, start=start)
+    lagged = simulate(thesis_vehicle(), commands, 0.5, 0.002, start, Motors(0.05, 0.03), effects)
+    # The series is lagged a sample at a time and held, the simulator's motors move within the step.
+    np.testing.assert_allclose(known.rotor_speed[0, 50:], lagged.rotor_speed[0, 50:], rtol=3e-3)
+
+
+def test_a_slung_load_swings_in_the_simulator():
+    """The pendulum hangs still in hover and pulls the vehicle down by its weight."""
+    vehicle = thesis_vehicle()
+    slung = next(f for f in catalogue()["payload"].forms(vehicle) if f.name == "slung")
+    hold = Commands(np.array([0.0]), np.full((1, 4), np.sqrt(0.652 * 9.81 / (4 * CF))))
+    trace = simulate(vehicle, hold, 0.5, 0.005, effects=[(slung, [0.1, 0.5])])
+    assert trace.velocity[0, -1, 2] == pytest.approx(0.1 * 9.81 / 0.652 * 0.5, rel=1e-3)

@@ -72,13 +72,14 @@ class Answer(NamedTuple):
 @dataclass(frozen=True)
 class Channel:
     """One number of a sample. `column` carries the unit; value = scale × count. `low` and `high` are the
-    counts at which the channel saturates."""
+    counts at which the channel saturates; a command or a state (`reading=False`) does not saturate."""
 
     column: str
     code: str  # struct format of the count
     scale: float
     low: int
     high: int
+    reading: bool = True
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,9 @@ INSTRUMENT = Instrument(
     baud_rate=115200,
     interval_us=20_000,
     channels=(
-        *(Channel(f"throttle_{i}", "H", THROTTLE_SCALE, 0, 10_000) for i in range(1, 5)),
+        *(Channel(f"throttle_{i}", "H", THROTTLE_SCALE, 0, 10_000, reading=False) for i in range(1, 5)),
         Channel("battery_voltage_v", "H", 1e-3, 0, 30_000),
-        Channel("led", "B", 1, 0, 3),
+        Channel("led", "B", 1, 0, 3, reading=False),
     ),
     commands={letter: text for letter, text in COMMON_COMMANDS.items() if letter != "G"}
     | {letter: f"run a programme: {text}" for letter, text in DYNAMICS.items()},

@@ -14,7 +14,7 @@ INSTRUMENT = Instrument(
     baud_rate=115200,
     interval_us=20_000,
     channels=(
-        Channel("throttle", "H", THROTTLE_SCALE, 0, 10_000),
+        Channel("throttle", "H", THROTTLE_SCALE, 0, 10_000, reading=False),
         Channel("speed_rpm", "H", 1.0, 0, 0xFFFF),
         Channel("thrust_n", "i", 1e-3, -50_000, 50_000),
         Channel("battery_voltage_v", "H", 1e-3, 0, 30_000),

@@ -1,0 +1,205 @@
+"""Stretches in which a sensor gave nothing: missing, held or zero readings while the vehicle flew on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.mistakes.signals import replace_columns, sensor_columns
+from rotorid.mismatch.motion import fresh_samples, stretches
+from rotorid.recordings import RecordingSet, Run, Vehicle
+
+SHORTEST_GAP_S = 0.3
+SHORTEST_GAP_PERIODS = 12
+"""A missing or held stretch counts from this many of the sensor's own periods on."""
+MERGE_S = 0.3
+SHORTEST_STAND_S = 0.15
+STANDING = 0.2
+"""A rotor below this share of what the others turn at, relative to its own habit, stands still."""
+IMPLAUSIBLE_THRUST = 0.45
+"""A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read."""
+LARGEST_UNTOUCHED_SHARE = 0.5
+CHANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One dropout of one column."""
+
+    run: str
+    column: str
+    sensor: str
+    kind: str
+    """`missing`, `held` or `zero`."""
+    start_s: float
+    stop_s: float
+    mask: np.ndarray
+    p_value: float
+
+
+def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
+    """The set with dropouts blanked, and the finding."""
+    stretches_found = [s for run in recordings.runs for s in in_run(run, recordings.vehicle)]
+    if not stretches_found:
+        return recordings, None
+
+    def change(run: Run):
+        columns = {}
+        for s in stretches_found:
+            if s.run == run.name and s.kind != "missing":
+                columns[s.column] = columns.get(s.column, run.table[s.column]).mask(s.mask)
+        return columns
+
+    windows = {(s.run, round(s.start_s, 4), round(s.stop_s, 4)) for s in stretches_found}
+    where = sorted(windows)
+    columns = tuple(dict.fromkeys(s.column for s in stretches_found))
+    kinds = " and ".join(dict.fromkeys(s.kind for s in stretches_found))
+    first = where[0]
+    more = "" if len(where) == 1 else f" and {len(where) - 1} more stretch{'es' if len(where) > 2 else ''}"
+    sentence = (
+        f"{', '.join(columns)} dropped out ({kinds} readings) in {first[0]} from {first[1]:.2f} s to {first[2]:.2f} s"
+        f"{more}; these samples were left out."
+    )
+    finding = Finding(
+        id="sensor_dropout",
+        status="established",
+        sentence=sentence,
+        p_value=max(s.p_value for s in stretches_found),
+        channels=columns,
+        windows=tuple(where),
+    )
+    return replace_columns(recordings, change), finding
+
+
+def in_run(run: Run, vehicle: Vehicle) -> list[Stretch]:
+    """Every dropout of a run, column by column."""
+    found = []
+    for sensor, names in sensor_columns(vehicle).items():
+        present = [n for n in names if run.has(n)]
+        if sensor in ("commands", "throttle") or not present:
+            continue
+        zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
+        for name in present:
+            values = run.column(name)
+            blank = missing(run.time_s, values)
+            if name in zero:
+                found += _as_stretches(run, name, sensor, "zero", zero[name], 0.0)
+                blank = blank & ~zero[name]
+            found += _as_stretches(run, name, sensor, "missing", blank, 0.0)
+            rest = np.where(zero.get(name, np.zeros(len(values), bool)), np.nan, values)
+            for mask, p in held(run.time_s, rest):
+                found += _as_stretches(run, name, sensor, "held", mask, p)
+    return found
+
+
+def _as_stretches(run: Run, name, sensor, kind, mask, p_value) -> list[Stretch]:
+    """Masks as stretches, close ones merged."""
+    t = run.time_s
+    pieces = []
+    for start, stop in stretches(mask):
+        if pieces and t[start] - t[pieces[-1][1] - 1] < MERGE_S:
+            pieces[-1] = (pieces[-1][0], stop)
+        else:
+            pieces.append((start, stop))
+    out = []
+    for start, stop in pieces:
+        own = np.zeros(len(t), bool)
+        own[start:stop] = True
+        out.append(Stretch(run.name, name, sensor, kind, float(t[start]), float(t[stop - 1]), own, p_value))
+    return out
+
+
+def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Mask of holes inside a column that are far longer than its own period."""
+    index = np.flatnonzero(np.isfinite(values))
+    mask = np.zeros(len(values), bool)
+    if len(index) < 10:
+        return mask
+    gap = np.diff(time_s[index])
+    # The second shortest tenth of the recording's habit: a sensor with many holes keeps its own period.
+    longest = max(SHORTEST_GAP_S, SHORTEST_GAP_PERIODS * float(np.median(gap)), 3 * float(np.quantile(gap, 0.98)))
+    for k in np.flatnonzero(gap > longest):
+        mask[index[k] + 1 : index[k + 1]] = True
+    return mask
+
+
+def held(time_s: np.ndarray, values: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Stretches in which a changing column repeats one reading far longer than chance and habit allow."""
+    index = np.flatnonzero(np.isfinite(values))
+    if len(index) < 100:
+        return []
+    v, t = values[index], time_s[index]
+    same = np.concatenate([[False], np.diff(v) == 0.0])
+    runs = [(a - 1, b) for a, b in stretches(same)]
+    if not runs:
+        return []
+    lengths = np.array([b - a for a, b in runs])
+    period = float(np.median(np.diff(t[fresh_samples(v)]))) if same.mean() > 0.4 else float(np.median(np.diff(t)))
+    out = []
+    for (a, b), length in zip(runs, lengths, strict=True):
+        duration = t[b - 1] - t[a]
+        if duration < max(SHORTEST_GAP_S, SHORTEST_GAP_PERIODS * period):
+            continue
+        others = lengths[lengths < length]
+        habit = np.quantile(others, 0.99) if len(others) > 20 else 1
+        repeat = (same.sum() - (length - 1)) / max(len(v) - length, 1)
+        p = float(min(1.0, len(v) * max(repeat, 1.0 / len(v)) ** (length / max(habit, 1))))
+        if p > CHANCE or length < 8 * habit:
+            continue
+        mask = np.zeros(len(values), bool)
+        # The first of the repeated readings is a true one.
+        mask[index[a] + 1 : index[b - 1] + 1] = True
+        out.append((mask, p))
+    return out
+
+
+def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Column to mask of samples in which a rotor reads (near) zero while the others carry the vehicle."""
+    speed = run.array(names)
+    out = {}
+    with np.errstate(invalid="ignore"):
+        usual = np.nanquantile(np.where(speed > 0, speed, np.nan), 0.75, axis=0)
+    if not np.all(np.isfinite(usual)) or np.any(usual <= 0):
+        usual = np.where(np.isfinite(usual) & (usual > 0), usual, np.nanmedian(usual))
+    top = float(np.median(usual))
+    for i, name in enumerate(names):
+        others = np.delete(speed / usual, i, axis=1)
+        # Half of the others at work, and none of them standing: then the vehicle flies.
+        with np.errstate(invalid="ignore"):
+            flying = (np.nanmedian(others, axis=1) > 0.6) & (np.nanmin(others, axis=1) > 0.3)
+        if not flying.any():
+            continue
+        thrust = np.nanquantile(speed[flying, i], 0.98) ** 2 / max(np.nanmedian(speed[flying], axis=0).max() ** 2, 1e-9)
+        if thrust < IMPLAUSIBLE_THRUST and _balanced(vehicle, i):
+            out[name] = np.isfinite(speed[:, i])
+            continue
+        zero = flying & (speed[:, i] < STANDING * top)
+        sudden = np.zeros(len(zero), bool)
+        for start, stop in stretches(zero):
+            # A saturated motor may truly stand for a moment.
+            if run.time_s[stop - 1] - run.time_s[start] < SHORTEST_STAND_S:
+                continue
+            # A rotor cannot stop and start within a sample or two: look at its readings just outside.
+            before = speed[max(start - 2, 0) : start, i]
+            after = speed[stop : stop + 2, i]
+            near = np.concatenate([before, after])
+            low = np.nanmax(speed[start:stop, i])
+            if low == 0.0 or (len(near) and np.nanmin(near) > 3 * max(low, 1e-9)):
+                sudden[start:stop] = True
+        if sudden.any():
+            # Readings strewn between zeros are no better than the zeros.
+            share = sudden[flying].mean()
+            out[name] = np.isfinite(speed[:, i]) if share > LARGEST_UNTOUCHED_SHARE else sudden
+    return out
+
+
+def _balanced(vehicle: Vehicle, rotor: int) -> bool:
+    """Whether hovering asks of this rotor a thrust that is not far below the largest."""
+    positions = vehicle.rotor_positions_m()
+    if not len(positions):
+        return False
+    rows = np.stack([np.ones(len(positions)), positions[:, 0], positions[:, 1]])
+    share = np.linalg.pinv(rows) @ np.array([1.0, 0.0, 0.0])
+    return bool(share[rotor] > 0.8 * share.max())

@@ -1,0 +1,257 @@
+"""Fits of one group of signals to another with a free delay, in blocks of the frequency domain.
+
+Y(f) = M X(f) e^(-i 2π f τ) + N Z(f): the matrices real, one delay τ for all; Z are nuisances on Y's own clock.
+Every output is weighted by the spectrum of what the fit leaves, so that coloured residuals count for what they
+are; covariances are sandwiches over blocks of time, so that they hold whatever the spectrum's model misses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal.windows import hann
+from scipy.stats import t as student
+
+from rotorid.mismatch.motion import stretches
+from rotorid.signal import kernels
+
+BLOCK_S = 2.56
+OVERSAMPLING = 5.0
+"""Rate of the thinned signals over the cutoff."""
+PERFECTION = 1e-3
+"""Share of an output's own power that is always taken as noise: files hold columns computed from each other."""
+FEWEST_BLOCKS = 4
+LONGEST_LAG_S = 0.15
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Spectra of blocks of time."""
+
+    frequency_hz: np.ndarray
+    """(m,)."""
+    y: np.ndarray
+    """(b, m, q)."""
+    x: np.ndarray
+    """(b, m, p)."""
+    z: np.ndarray
+    """(b, m, r)."""
+    run: np.ndarray
+    """Run number of each block, (b,)."""
+    time_s: np.ndarray
+    """Centre of each block since the start of its run, (b,)."""
+
+    @property
+    def count(self) -> int:
+        return len(self.y)
+
+    def outputs(self, chosen) -> Blocks:
+        """The same with some outputs only."""
+        return Blocks(self.frequency_hz, self.y[:, :, chosen], self.x, self.z, self.run, self.time_s)
+
+    def part(self, chosen) -> Blocks:
+        """Some of the blocks only."""
+        kept = [getattr(self, n)[chosen] for n in ("y", "x", "z", "run", "time_s")]
+        return Blocks(self.frequency_hz, *kept)
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Evenly sampled signals (n, m) and whether their derivative is meant."""
+
+    values: np.ndarray
+    derivative: bool = False
+
+
+def join(parts: list[Blocks]) -> Blocks | None:
+    """Blocks of several runs as one, None for none."""
+    parts = [p for p in parts if p is not None]
+    if not parts:
+        return None
+    stacked = [np.concatenate([getattr(p, n) for p in parts]) for n in ("y", "x", "z")]
+    runs = np.concatenate([p.run for p in parts])
+    return Blocks(parts[0].frequency_hz, *stacked, runs, np.concatenate([p.time_s for p in parts]))
+
+
+def cut(
+    y: Signal,
+    x: Signal,
+    z: Signal | None,
+    rate_hz: float,
+    band_hz: tuple[float, float],
+    run: int,
+) -> Blocks | None:
+    """Blocks of one run: both sides pass the same low-pass, missing samples are left out."""
+    cutoff = band_hz[1]
+    parts = [y, x] + ([z] if z is not None else [])
+    good = np.all([np.isfinite(p.values).all(axis=1) for p in parts], axis=0)
+    # Analysis above the band is thinned away; all runs must share one grid of frequencies.
+    step = max(1, int(rate_hz / (OVERSAMPLING * cutoff)))
+    length = int(round(BLOCK_S * rate_hz / step))
+    frequency = np.arange(1, int(np.ceil(band_hz[1] * BLOCK_S)) + 1) / BLOCK_S
+    used = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= band_hz[1]))
+    taper = hann(length, sym=False)[:, None] / np.sqrt(length)
+    out = [[] for _ in parts]
+    times = []
+    flat, slope = kernels.low_pass(rate_hz, 1.2 * cutoff), kernels.derivative(rate_hz, 1.2 * cutoff)
+    half = kernels.half_length(rate_hz, 1.2 * cutoff)
+    for start, stop in stretches(good):
+        if stop - start < 2 * half + length * step:
+            continue
+        filtered = [kernels.apply(slope if p.derivative else flat, p.values[start:stop])[::step] for p in parts]
+        for k in range(len(filtered[0]) // length):
+            inside = slice(k * length, (k + 1) * length)
+            for store, f in zip(out, filtered, strict=True):
+                piece = f[inside] - f[inside].mean(axis=0)
+                store.append(np.fft.rfft(piece * taper, axis=0)[used + 1])
+            times.append((start + half + (k + 0.5) * length * step) / rate_hz)
+    if not times:
+        return None
+    spectra = [np.array(s) for s in out]
+    if z is None:
+        spectra.append(np.zeros((len(times), len(used), 0), complex))
+    return Blocks(frequency[used], *spectra, np.full(len(times), run), np.array(times))
+
+
+@dataclass(frozen=True)
+class LaggedFit:
+    """A fit with a free delay."""
+
+    lag_s: float
+    """How late Y shows what X shows (positive: Y is late, or X is early)."""
+    lag_sd: float
+    gain: np.ndarray
+    """M, (q, p)."""
+    gain_sd: np.ndarray
+    explained: np.ndarray
+    """Share of every output's weighted power that X explains beyond Z, (q,)."""
+    weight: np.ndarray
+    """1 / power of what is left, (q, m)."""
+    nuisance: np.ndarray
+    """N, (q, r)."""
+    block_count: int
+
+    def lag_p(self, threshold_s: float) -> float:
+        """p-value that the delay is no larger than a threshold."""
+        if self.lag_sd <= 0:
+            return 1.0
+        statistic = (abs(self.lag_s) - threshold_s) / self.lag_sd
+        return float(student.sf(statistic, max(self.block_count - 2, 1)))
+
+
+def _smooth(power: np.ndarray) -> np.ndarray:
+    """Running mean over five frequencies along axis 1."""
+    width = min(5, power.shape[1])
+    padded = np.pad(power, ((0, 0), (width // 2, width - 1 - width // 2)), mode="edge")
+    return np.stack([np.convolve(row, np.ones(width) / width, mode="valid") for row in padded])
+
+
+def noise_weight(blocks: Blocks, left: np.ndarray) -> np.ndarray:
+    """1 / power of a residual (b, m, q), with a floor, (q, m)."""
+    power = _smooth(np.mean(np.abs(left) ** 2, axis=0).T)
+    own = _smooth(np.mean(np.abs(blocks.y) ** 2, axis=0).T)
+    return 1.0 / (power + PERFECTION * own + 1e-30)
+
+
+def _moments(blocks: Blocks, weight, transfer):
+    """Normal equations of every block: (b, q, K, K), (b, q, K)."""
+    x = np.concatenate([blocks.x * transfer[:, :, None], blocks.z], axis=2)
+    weighted = x.conj()[:, None] * weight[None, :, :, None]
+    gram = np.real(np.swapaxes(weighted, 2, 3) @ x[:, None])
+    cross = np.real(np.swapaxes(weighted, 2, 3) @ np.swapaxes(blocks.y, 1, 2)[..., None])[..., 0]
+    return gram, cross
+
+
+def _solve(gram: np.ndarray, cross: np.ndarray) -> np.ndarray:
+    scale = 1.0 / np.sqrt(np.einsum("qkk->qk", gram) + 1e-300)
+    scaled_gram = gram * scale[:, :, None] * scale[:, None, :] + 1e-9 * np.eye(gram.shape[1])
+    return scale * np.linalg.solve(scaled_gram, (cross * scale)[..., None])[..., 0]
+
+
+def delay(frequency_hz: np.ndarray, lag_s) -> np.ndarray:
+    """e^(-i 2π f τ), (1 or b, m)."""
+    return np.exp(-2j * np.pi * np.atleast_1d(lag_s)[:, None] * frequency_hz[None, :])
+
+
+def fit(
+    blocks: Blocks,
+    lags_s: np.ndarray | None = None,
+    transfer: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> LaggedFit | None:
+    """The best delay with free real gains; None where there are too few blocks.
+
+    `transfer(frequency)` multiplies X (a motor's lag). `lags_s` is the grid to search, `[0]` to hold it there.
+    """
+    if blocks is None or blocks.count < FEWEST_BLOCKS:
+        return None
+    frequency = blocks.frequency_hz
+    base = np.ones((1, len(frequency)), complex) if transfer is None else transfer(frequency)[None, :]
+    if lags_s is None:
+        step = 1.0 / (8 * frequency[-1])
+        lags_s = np.arange(-LONGEST_LAG_S, LONGEST_LAG_S + step / 2, step)
+    weight = noise_weight(blocks, blocks.y)
+    for _ in range(2):
+        scores = []
+        for lag in lags_s:
+            gram, cross = (m.sum(axis=0) for m in _moments(blocks, weight, base * delay(frequency, lag)))
+            beta = _solve(gram, cross)
+            scores.append(float(np.sum(beta * cross)))
+        lag = _peak(lags_s, np.array(scores))
+        if len(lags_s) > 1:
+            fine = lag + np.linspace(-1, 1, 5) * (lags_s[1] - lags_s[0]) / 4
+            values = []
+            for candidate in fine:
+                gram, cross = (m.sum(axis=0) for m in _moments(blocks, weight, base * delay(frequency, candidate)))
+                values.append(float(np.sum(_solve(gram, cross) * cross)))
+            lag = _peak(fine, np.array(values))
+        phase = base * delay(frequency, lag)
+        gram_b, cross_b = _moments(blocks, weight, phase)
+        gram, cross = gram_b.sum(axis=0), cross_b.sum(axis=0)
+        beta = _solve(gram, cross)
+        x = np.concatenate([blocks.x * phase[:, :, None], blocks.z], axis=2)
+        left = blocks.y - x @ beta.T
+        new = noise_weight(blocks, left)
+        lags_s = lags_s if len(lags_s) == 1 else lag + np.linspace(-3, 3, 13) * (lags_s[1] - lags_s[0])
+        weight = new
+    gram_b, cross_b = _moments(blocks, weight, phase)
+    gram, cross = gram_b.sum(axis=0), cross_b.sum(axis=0)
+    beta = _solve(gram, cross)
+    left = blocks.y - x @ beta.T
+    q, p = len(beta), blocks.x.shape[2]
+    count = blocks.count
+    sd = np.zeros_like(beta)
+    for j in range(q):
+        inverse = np.linalg.pinv(gram[j], hermitian=True)
+        score = cross_b[:, j] - gram_b[:, j] @ beta[j]
+        spread = inverse @ (score.T @ score) @ inverse * count / (count - 1)
+        sd[j] = np.sqrt(np.maximum(np.diag(spread), np.diag(inverse)))
+    # The delay's derivative -i 2π f M X is orthogonal to every real multiple of X itself.
+    model = (blocks.x * phase[:, :, None]) @ beta[:, :p].T
+    turn = -2j * np.pi * frequency[None, :, None] * model
+    w = weight.T[None]
+    score = np.real(np.sum(w * turn.conj() * left, axis=(1, 2)))
+    curvature = float(np.sum(w * np.abs(turn) ** 2))
+    lag_sd = float(np.sqrt(max(np.sum(score**2) * count / (count - 1), curvature))) / max(curvature, 1e-300)
+    without = _solve(gram[:, p:, p:], cross[:, p:]) if blocks.z.shape[2] else np.zeros((q, 0))
+    rest = blocks.y - blocks.z @ without.T
+    explained = 1 - np.sum(w * np.abs(left) ** 2, axis=(0, 1)) / np.sum(w * np.abs(rest) ** 2, axis=(0, 1))
+    return LaggedFit(float(lag), lag_sd, beta[:, :p], sd[:, :p], explained, weight, beta[:, p:], count)
+
+
+def _peak(at: np.ndarray, score: np.ndarray) -> float:
+    """Where a sampled curve peaks, by a parabola through its highest three samples."""
+    k = int(np.argmax(score))
+    if k == 0 or k == len(at) - 1:
+        return float(at[k])
+    a, b, c = score[k - 1 : k + 2]
+    bend = a - 2 * b + c
+    shift = 0.0 if bend >= 0 else 0.5 * (a - c) / bend
+    return float(at[k] + shift * (at[1] - at[0]))
+
+
+def loss_by_block(blocks: Blocks, found: LaggedFit, gain: np.ndarray, lag_s) -> np.ndarray:
+    """Weighted squares that a given M and delay leave in every block, (b, q); N as found."""
+    model = (blocks.x * delay(blocks.frequency_hz, lag_s)[:, :, None]) @ gain.T + blocks.z @ found.nuisance.T
+    return np.sum(found.weight.T[None] * np.abs(blocks.y - model) ** 2, axis=1)

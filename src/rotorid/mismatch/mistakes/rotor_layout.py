@@ -1,0 +1,341 @@
+"""Rotor columns in the wrong order and rotors that spin the other way, from the moments on all rotors at once.
+
+In a closed loop every rotor answers every disturbance, so one rotor at a time misleads. Here whole layouts
+compete: each predicts roll, pitch and yaw acceleration from all squared speeds in a band (2-25 Hz; yaw from
+0.7 Hz), with a free positive gain an axis so that a wrong C_F, C_Q or inertia does not matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.stats import t as student
+
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.mistakes import comparisons as compare
+from rotorid.mismatch.mistakes import lagged
+from rotorid.mismatch.mistakes.axes import Result, Turn, apply_turn, axis_finding, signals_of
+from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit, Signal
+from rotorid.mismatch.mistakes.signals import Signals, replace_columns, sensor_columns
+from rotorid.recordings import RecordingSet, Run, Vehicle
+
+YAW_BAND_HZ = (0.7, 15.0)
+MOST_ROTORS_FOR_EVERY_ORDER = 6
+LEAST_LIKELIHOOD = 25.0
+"""Log-likelihood that the right layout must bring over none, and over the believed one."""
+LEAST_ADVANTAGE = 1.5
+"""What the right layout explains over what the believed one explains, at least."""
+LEAST_STEP = 0.6
+OVERLAP = 1.94
+"""Neighbouring frequencies of a Hann window are correlated: sums of squares vary by this more."""
+P_LIMIT = 1e-6
+TIED_LIKELIHOOD, TIED_SHARE = 12.0, 0.02
+"""Layouts within this log-likelihood, or this share of what is explained, are not told apart."""
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Normal equations of an axis, block by block, nuisances already taken out."""
+
+    square: np.ndarray
+    """(b,)."""
+    cross: np.ndarray
+    """(b, k)."""
+    gram: np.ndarray
+    """(b, k, k)."""
+
+
+def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> Moments:
+    """Moments of one output with the rotors delayed and Z projected out."""
+    x = blocks.x * lagged.delay(blocks.frequency_hz, lag_s)[:, :, None]
+    y, z = blocks.y[:, :, output], blocks.z
+    w = weight[None, :, None]
+    if z.shape[2]:
+        gram = np.real(np.einsum("bmk,bml->kl", z.conj() * w, z))
+        inverse = np.linalg.pinv(gram, hermitian=True)
+        x = x - z @ (inverse @ np.real(np.einsum("bmk,bml->kl", z.conj() * w, x)))
+        y = y - z @ (inverse @ np.real(np.einsum("bmk,bm->k", z.conj() * w, y)))
+    square = np.sum(weight[None] * np.abs(y) ** 2, axis=1)
+    cross = np.real(np.einsum("bmk,bm->bk", x.conj() * w, y))
+    return Moments(square, cross, np.real(np.einsum("bmk,bml->bkl", x.conj() * w, x)))
+
+
+def rows_of(vehicle: Vehicle) -> np.ndarray:
+    """Roll and pitch acceleration of one newton at every rotor, (2, k), rad/s²/N."""
+    at, inertia = vehicle.rotor_positions_m(), vehicle.inertia_kg_m2
+    return np.stack([-at[:, 1] / inertia.xx, at[:, 0] / inertia.yy])
+
+
+def best_gain(m: Moments, row: np.ndarray) -> np.ndarray:
+    """A row (k,) times its best positive gain."""
+    gram = row @ m.gram.sum(axis=0) @ row
+    return row * (max(m.cross.sum(axis=0) @ row / gram, 0.0) if gram > 0 else 0.0)
+
+
+def loss(m: Moments, row: np.ndarray) -> float:
+    """What a row (k,) leaves of an axis."""
+    return float(m.square.sum() - 2 * m.cross.sum(axis=0) @ row + row @ m.gram.sum(axis=0) @ row)
+
+
+def clearly_better(whole: float, believed: float, best: float, c: Contest) -> bool:
+    """Whether a layout that leaves `best` of `whole` is overwhelmingly better than one that leaves `believed`."""
+    return (
+        (believed - best) / OVERLAP > LEAST_LIKELIHOOD
+        and whole - best > LEAST_ADVANTAGE * (whole - believed)
+        and c.step > LEAST_STEP
+        and c.p_value < P_LIMIT
+    )
+
+
+def tie(whole: float, best: float) -> float:
+    """Largest loss that still counts as the best."""
+    return best + max(OVERLAP * TIED_LIKELIHOOD, TIED_SHARE * (whole - best))
+
+
+def losses_of_orders(m: list[Moments], rows: np.ndarray, orders: np.ndarray) -> np.ndarray:
+    """What every order (h, k) leaves of roll and pitch, each with its best positive gain, (h,)."""
+    total = np.zeros(len(orders))
+    for axis, part in enumerate(m):
+        b = rows[axis][orders]
+        cross = b @ part.cross.sum(axis=0)
+        gram = np.einsum("hk,kl,hl->h", b, part.gram.sum(axis=0), b)
+        gain = np.where(gram > 0, np.maximum(cross, 0.0), 0.0)
+        total += part.square.sum() - gain**2 / np.maximum(gram, 1e-300)
+    return total
+
+
+def orders_to_try(count: int) -> np.ndarray:
+    """Orders of the columns: every one for few rotors, else every exchange of two; the believed one first."""
+    if count <= MOST_ROTORS_FOR_EVERY_ORDER:
+        return np.array(list(permutations(range(count))))
+    found = [tuple(range(count))]
+    for i, j in combinations(range(count), 2):
+        order = list(range(count))
+        order[i], order[j] = j, i
+        found.append(tuple(order))
+    return np.array(found)
+
+
+def moves(order: np.ndarray) -> int:
+    """How many exchanges of two columns an order takes."""
+    seen, cycles = set(), 0
+    for start in range(len(order)):
+        if start not in seen:
+            cycles += 1
+            at = start
+            while at not in seen:
+                seen.add(at)
+                at = int(order[at])
+    return len(order) - cycles
+
+
+@dataclass(frozen=True)
+class Contest:
+    """How far the data go from a believed prediction towards another, and how surely."""
+
+    step: float
+    """0: the believed one fits; 1: the other does."""
+    p_value: float
+    """That the step is zero, for blocks that are independent of each other."""
+
+
+def contest(axis_moments: list[Moments], believed: list[np.ndarray], other: list[np.ndarray]) -> Contest:
+    """Step along the difference of two predictions (rows (k,) an axis, gains included)."""
+    score, curvature = 0.0, 0.0
+    for m, old, new in zip(axis_moments, believed, other, strict=True):
+        change = new - old
+        score = score + m.cross @ change - m.gram @ old @ change
+        curvature = curvature + m.gram @ change @ change
+    count = len(score)
+    step = float(score.sum() / max(curvature.sum(), 1e-300))
+    rest = score - curvature * step
+    sd = np.sqrt(max(np.sum(rest**2) * count / max(count - 1, 1), OVERLAP * curvature.sum())) / max(
+        curvature.sum(), 1e-300
+    )
+    return Contest(step, float(student.sf(step / sd, max(count - 1, 1))))
+
+
+def find(recordings: RecordingSet) -> Result:
+    """The layout (order of the columns, turning senses) that needs the fewest changes among those that fit."""
+    vehicle = recordings.vehicle
+    if vehicle.kind != "flight" or not 3 <= vehicle.rotor_count <= 8:
+        return Result(recordings)
+    signals = signals_of(recordings)
+    sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
+    blocks = _thrust_blocks(signals, vehicle, sensor) if sensor else None
+    free = lagged.fit(blocks)
+    if free is None:
+        return Result(recordings)
+    parts = [moments(blocks, axis, free.lag_s, free.weight[axis]) for axis in (0, 1)]
+    rows = rows_of(vehicle)
+    orders = orders_to_try(vehicle.rotor_count)
+    yaw = _yaw_moments(signals, vehicle, sensor, free)
+    believed = vehicle.yaw_signs()
+    senses = np.array(list(product((1.0, -1.0), repeat=vehicle.rotor_count))) if yaw else believed[None]
+    yaw_rows = [_yaw_row(yaw, s) for s in senses] if yaw else []
+    yaw_losses = np.array([loss(yaw, row) for row in yaw_rows]) if yaw else np.zeros(1)
+    losses = losses_of_orders(parts, rows, orders)[:, None] + yaw_losses[None, :]
+    if not np.isfinite(losses).all():
+        # Rotors that all turn alike make no moment to tell them apart by.
+        return Result(recordings)
+    whole = float(sum(m.square.sum() for m in parts) + (yaw.square.sum() if yaw else 0.0))
+    costs = np.array([moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
+    least = float(losses.min())
+    tied = np.argwhere(losses <= tie(whole, least))
+    ranked = sorted(tied.tolist(), key=lambda at: (costs[at[0], at[1]], losses[at[0], at[1]]))
+    order, turned = ranked[0]
+    if costs[order, turned] == 0:
+        return Result(recordings)
+    # Only axes on which the two layouts differ can tell them apart.
+    contested, now, then = [], [], []
+    if order:
+        contested += parts
+        now += [best_gain(m, rows[a]) for a, m in enumerate(parts)]
+        then += [best_gain(m, rows[a][orders[order]]) for a, m in enumerate(parts)]
+    same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
+    if yaw and turned != same:
+        contested.append(yaw)
+        now.append(yaw_rows[same])
+        then.append(yaw_rows[turned])
+    outcome = contest(contested, now, then)
+    outcome = replace(outcome, p_value=min(1.0, outcome.p_value * losses.size))
+    disputed = float(sum(m.square.sum() for m in contested))
+    left = [sum(loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then)]
+    if not clearly_better(disputed, left[0], left[1], outcome):
+        return Result(recordings)
+    checked = any({"attitude", "gyroscope"} <= set(s.values) for s in signals)
+    if not checked:
+        flipped = _flipped_gyroscope(recordings, parts, rows, yaw, believed, least, whole, costs[order, turned])
+        if flipped:
+            return flipped(outcome.p_value)
+    rival = any(costs[a, b] == costs[order, turned] for a, b in ranked[1:])
+    result = Result(recordings)
+    if order:
+        result = _reordered(recordings, orders[order], outcome.p_value, rival)
+    turning = np.flatnonzero(senses[turned] != believed[orders[order]]) if yaw else np.zeros(0, int)
+    if len(turning):
+        # Columns are in order by now: column i belongs to rotor orders[order][i].
+        rotors = sorted(int(orders[order][i]) for i in turning)
+        found = _turned(result.recordings, rotors, outcome.p_value, rival)
+        result = Result(found.recordings, result.findings + found.findings)
+    return result
+
+
+def _turned_cost(senses: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """Changes of sense from what each order expects, (orders, senses); all at once is one change."""
+    changed = (senses[None, :, :] != expected[:, None, :]).sum(axis=2)
+    return np.where(changed == senses.shape[1], 1, changed)
+
+
+def _flipped_gyroscope(recordings, parts, rows, yaw, believed, least, whole, cost):
+    """A gyroscope with fewer flipped axes than the layout needs changes, where no attitude tells; None if none."""
+    best = None
+    for signs in product((1, -1), repeat=3):
+        total = sum(loss(m, best_gain(m, signs[a] * rows[a])) for a, m in enumerate(parts))
+        total += loss(yaw, _yaw_row(yaw, signs[2] * believed)) if yaw else 0.0
+        flips = sum(s < 0 for s in signs)
+        if total <= tie(whole, least) and 0 < flips < cost and (best is None or flips < best[0]):
+            best = (flips, signs)
+    if best is None:
+        return None
+    turn = Turn((0, 1, 2), best[1])
+
+    def result(p_value: float) -> Result:
+        note = "No attitude is recorded: the gyroscope's sign was told from the believed rotors' moments."
+        finding = axis_finding(recordings, "gyroscope", turn, p_value)
+        return Result(apply_turn(recordings, "gyroscope", turn), (finding,), (note,))
+
+    return result
+
+
+def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
+    def make(s: Signals):
+        rate = s.values["gyroscope"]
+        thrust = compare.squared_speeds(s, vehicle, sensor)
+        return Signal(rate[:, :2], True), Signal(thrust), Signal(rate)
+
+    return compare.gather(signals, ("gyroscope", sensor), compare.MOMENT_BAND_HZ, make)
+
+
+def _reordered(recordings: RecordingSet, order: np.ndarray, p: float, ambiguous: bool) -> Result:
+    """Column i belongs to rotor order[i] of vehicle.yaml."""
+    names = sensor_columns(recordings.vehicle)
+
+    def change(run: Run):
+        columns = {}
+        for kind in ("rotors", "commands", "throttle"):
+            for i, name in enumerate(names[kind]):
+                if name in run.table.columns:
+                    columns[names[kind][order[i]]] = run.table[name].to_numpy()
+        return columns
+
+    wrong = [i for i in range(len(order)) if order[i] != i]
+    told = ", ".join(f"column {i + 1} belongs to rotor {order[i] + 1}" for i in wrong)
+    finding = Finding(
+        id="rotor_order",
+        status="ambiguous" if ambiguous else "established",
+        sentence=f"The rotor columns are in another order than vehicle.yaml: {told}; put in order.",
+        p_value=p,
+        channels=tuple(names["rotors"][i] for i in wrong),
+        alternatives=("rotor_order", "spin_direction") if ambiguous else (),
+    )
+    return Result(recordings if ambiguous else replace_columns(recordings, change), (finding,))
+
+
+def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> Moments | None:
+    """Yaw acceleration against every rotor's torque (k) and acceleration (k); None without a torque coefficient."""
+    if not np.any(vehicle.torque_coefficients_n_m_s2()):
+        return None
+
+    def make(s: Signals):
+        rate = s.values["gyroscope"]
+        torque = compare.squared_speeds(s, vehicle, sensor) / vehicle.thrust_coefficients_n_s2()
+        torque = torque * vehicle.torque_coefficients_n_m_s2() / vehicle.inertia_kg_m2.zz
+        change = np.gradient(s.values[sensor], 1.0 / s.rate_hz, axis=0)
+        return Signal(rate[:, 2:], True), Signal(np.concatenate([torque, change], axis=1)), Signal(rate)
+
+    blocks = compare.gather(signals, ("gyroscope", sensor), YAW_BAND_HZ, make)
+    telling = roll.lag_sd < 0.005
+    late = roll.lag_s if telling else 0.0
+    free = lagged.fit(blocks, np.array([late]))
+    return moments(blocks, 0, late, free.weight[0]) if free else None
+
+
+def _turned(recordings: RecordingSet, rotors: list[int], p_value: float, ambiguous: bool) -> Result:
+    """The believed turning senses of some rotors reversed."""
+    vehicle = recordings.vehicle
+    every = len(rotors) == vehicle.rotor_count
+    numbers = ", ".join(str(i + 1) for i in rotors)
+    who = "all rotors spin" if every else f"rotor {numbers} spins" if len(rotors) == 1 else f"rotors {numbers} spin"
+    other = {"ccw": "cw", "cw": "ccw"}
+    new = tuple(
+        r.model_copy(update={"spin": other[r.spin]}) if i in rotors else r for i, r in enumerate(vehicle.rotors)
+    )
+    finding = Finding(
+        id="spin_direction",
+        status="ambiguous" if ambiguous else "established",
+        sentence=f"The yaw moments say that {who} the other way than vehicle.yaml has it: turned round.",
+        p_value=p_value,
+        channels=("moment_z",),
+        alternatives=("rotor_order", "spin_direction") if ambiguous else (),
+    )
+    fixed = recordings
+    if not ambiguous:
+        fixed = replace(recordings, vehicle=vehicle.model_copy(update={"rotors": new}))
+    return Result(fixed, (finding,))
+
+
+def _yaw_row(m: Moments, signs: np.ndarray) -> np.ndarray:
+    """Best row (2k,) of torques and acceleration torques with these senses; neither gain negative."""
+    k = len(signs)
+    basis = np.zeros((2 * k, 2))
+    basis[:k, 0], basis[k:, 1] = signs, signs
+    gram, cross = basis.T @ m.gram.sum(axis=0) @ basis, basis.T @ m.cross.sum(axis=0)
+    scale = 1 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+    root = np.sqrt(np.maximum(values, 1e-9))
+    gain, _ = nnls(root[:, None] * vectors.T, vectors.T @ (cross * scale) / root)
+    return basis @ (scale * gain)

@@ -1,0 +1,109 @@
+"""The columns of a run on one even grid, sensor by sensor, nothing derived and nothing dropped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicSpline
+
+from rotorid.mismatch.motion import continuous, fresh_samples, own_rate_hz, rotation_matrices
+from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import columns as c
+
+LONGEST_BRIDGED_SAMPLES = 6
+"""A hole of up to this many of a sensor's own periods is interpolated; a longer one stays missing."""
+
+
+def sensor_columns(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
+    """Sensor to its columns. One sensor is one clock."""
+    count = vehicle.rotor_count
+    return {
+        "rotors": c.rotor_columns("rotor_speed", count),
+        "commands": c.rotor_columns("rotor_command", count),
+        "throttle": c.rotor_columns("throttle", count),
+        "gyroscope": c.ANGULAR_VELOCITY,
+        "accelerometer": c.SPECIFIC_FORCE,
+        "attitude": c.QUATERNION,
+        "velocity": c.VELOCITY,
+        "position": c.POSITION,
+    }
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Sensors of one run on an even grid; a sensor that the run lacks is not in `values`."""
+
+    run: str
+    rate_hz: float
+    time_s: np.ndarray
+    values: dict[str, np.ndarray]
+    """Sensor to (n, m), SI units, NaN where missing."""
+    own_rate_hz: dict[str, float]
+
+    def rotation(self) -> np.ndarray:
+        """Body-to-world rotations of the recorded attitude, (n, 3, 3)."""
+        q = self.values["attitude"]
+        return rotation_matrices(q / np.linalg.norm(q, axis=1, keepdims=True))
+
+
+def on_grid(time_s: np.ndarray, values: np.ndarray, grid_s: np.ndarray) -> np.ndarray:
+    """Fresh samples of (n, m) values interpolated onto a grid (cubic), NaN in long holes and outside."""
+    keep = fresh_samples(values)
+    t, v = time_s[keep], values[keep]
+    if len(t) < 8:
+        return np.full((len(grid_s), values.shape[1]), np.nan)
+    if len(t) == len(grid_s) and np.allclose(t, grid_s, atol=1e-6, rtol=0):
+        return v.astype(float)
+    out = CubicSpline(t, v, axis=0, extrapolate=False)(grid_s)
+    gap = np.diff(t)
+    for k in np.flatnonzero(gap > LONGEST_BRIDGED_SAMPLES * float(np.median(gap))):
+        out[(grid_s > t[k]) & (grid_s < t[k + 1])] = np.nan
+    return out
+
+
+def read_signals(run: Run, vehicle: Vehicle) -> Signals:
+    """Every sensor of a run on the run's own median period."""
+    t = run.time_s
+    rate = 1.0 / float(np.median(np.diff(t)))
+    grid = t[0] + np.arange(int(np.floor((t[-1] - t[0]) * rate + 1e-6)) + 1) / rate
+    values, own = {}, {}
+    for key, names in sensor_columns(vehicle).items():
+        if names and run.has(*names):
+            raw = run.array(names)
+            if key == "attitude":
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    raw = continuous(raw / np.linalg.norm(raw, axis=1, keepdims=True))
+            values[key] = on_grid(t, raw, grid)
+            own[key] = own_rate_hz(t, raw)
+    return Signals(run.name, rate, grid, values, own)
+
+
+@dataclass(frozen=True)
+class ReadSet(RecordingSet):
+    """A recording set that reads its signals once; a changed copy (`replace`) reads its own."""
+
+    @cached_property
+    def signals(self) -> list[Signals]:
+        """Signals of every run."""
+        return [read_signals(run, self.vehicle) for run in self.runs]
+
+
+def replace_columns(recordings: RecordingSet, change) -> RecordingSet:
+    """The set with every run's table passed through `change(run) -> dict of columns or None`."""
+    runs = []
+    for run in recordings.runs:
+        columns = change(run)
+        runs.append(Run(run.name, run.table.assign(**columns)) if columns else run)
+    return replace(recordings, runs=tuple(runs))
+
+
+def scaled(recordings: RecordingSet, names: tuple[str, ...], factor: float) -> RecordingSet:
+    """The set with some columns multiplied by a factor in every run that has them."""
+
+    def change(run: Run) -> dict[str, pd.Series]:
+        return {n: run.table[n] * factor for n in names if n in run.table.columns}
+
+    return replace_columns(recordings, change)

@@ -1,0 +1,150 @@
+"""Lines in the accelerometer or gyroscope that follow the rotors' speed, seen through whatever aliasing there is.
+
+The phase of each rotor is the integral of its recorded speed. Multiplying a reading by e^(-iψ) at the instants of
+its samples turns a line locked to the rotor, or its alias, into a constant, whatever the sampling rate; a
+structural resonance stays at its own frequency and passes by. In short windows the power at the rotor's order is
+compared with the power at orders beside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import gamma
+
+from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.mistakes.axes import signals_of
+from rotorid.mismatch.mistakes.signals import Signals
+from rotorid.recordings import RecordingSet
+from rotorid.recordings import columns as c
+
+WINDOW_S = 0.35
+SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
+"""Offsets from the order, in widths of the window, that tell the level beside the line."""
+ORDERS = (1, 2)
+P_LIMIT = 1e-9
+LEAST_AMPLITUDE = 0.5
+"""Line over the reading's own scatter beside it (one sigma a sample), at least, to matter."""
+LOWEST_HZ = 12.0
+"""Aliases below this fall among the flight's own motion and are left out."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One axis of a sensor against the rotors' order."""
+
+    column: str
+    unit: str
+    order: int
+    amplitude: float
+    low: float
+    high: float
+    over_noise: float
+    p_value: float
+
+
+def find(recordings: RecordingSet) -> Finding | None:
+    """A vibration that follows the rotors, None where there is no clear one."""
+    if recordings.vehicle.kind != "flight":
+        return None
+    signals = [s for s in signals_of(recordings) if "rotors" in s.values]
+    lines = []
+    for sensor, columns, unit in (
+        ("accelerometer", c.SPECIFIC_FORCE, "m/s2"),
+        ("gyroscope", c.ANGULAR_VELOCITY, "rad/s"),
+    ):
+        have = [s for s in signals if sensor in s.values and s.own_rate_hz[sensor] > 0.9 * s.rate_hz]
+        for axis, column in enumerate(columns):
+            for order in ORDERS:
+                line = measure(have, sensor, axis, column, unit, order)
+                if line and line.p_value < P_LIMIT and line.over_noise > LEAST_AMPLITUDE:
+                    lines.append(line)
+    if not lines:
+        return None
+    lines.sort(key=lambda x: x.p_value)
+    strongest = max(lines, key=lambda x: (x.column.startswith("specific"), x.amplitude))
+    where = ", ".join(dict.fromkeys(x.column for x in lines))
+    return Finding(
+        id="vibration",
+        status="established",
+        sentence=(
+            f"A vibration of {strongest.amplitude:.2g} {strongest.unit} a rotor turns with the rotors (order "
+            f"{strongest.order}) in {where}; it may add a constant that grows with the thrust, which looks like a "
+            "wrong thrust coefficient."
+        ),
+        parameters=tuple(Estimate(f"amplitude ({x.column})", x.amplitude, x.unit, x.low, x.high) for x in lines),
+        p_value=lines[0].p_value,
+        channels=tuple(dict.fromkeys(x.column for x in lines)),
+    )
+
+
+def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, unit: str, order: int) -> Line | None:
+    """Power at the rotors' order over that beside it, summed over windows and rotors."""
+    ratios, powers, levels, lengths = [], [], [], []
+    for s in all_signals:
+        length = int(WINDOW_S * s.rate_hz)
+        if length < 24:
+            continue
+        line, beside, crowd, floor = demodulated(s, sensor, axis, order, length)
+        good = np.isfinite(line).all(axis=1) & np.isfinite(beside).all(axis=1) & (beside.min(axis=1) > 0)
+        if not good.any():
+            continue
+        # Rotors at nearly one speed see the same line: count each window once, by their mean.
+        ratios.append((line[good] / beside[good]).mean(axis=1))
+        powers.append(((line - beside)[good] / crowd[good]).mean(axis=1))
+        levels.append(floor[good].mean(axis=1))
+        lengths.append(np.full(good.sum(), length))
+    if not ratios or sum(map(len, ratios)) < 20:
+        return None
+    ratio, power, level, length = (np.concatenate(x) for x in (ratios, powers, levels, lengths))
+    n = len(ratio)
+    # Each ratio is about exponential, a little heavier because the level beside is estimated from eight bins.
+    p = float(gamma.sf(float(ratio.sum()) * (1 - 1 / len(SIDE_BINS)), n))
+    mean = float(power.mean())
+    sd = float(power.std(ddof=1) / np.sqrt(n))
+    amplitude, low, high = (np.sqrt(max(v, 0.0)) for v in (mean, mean - 1.96 * sd, mean + 1.96 * sd))
+    # White noise of one sigma s a sample shows as 4 s² · 1.5 / length behind a Hann taper.
+    noise = float(np.sqrt(level.mean() * np.median(length) / 6))
+    return Line(column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p)
+
+
+def demodulated(s: Signals, sensor: str, axis: int, order: int, length: int) -> tuple[np.ndarray, ...]:
+    """Squared amplitude at the order, beside it, number of rotors that share the line, and noise: (windows, rotors).
+
+    NaN where it cannot be told.
+    """
+    speed = s.values["rotors"]
+    reading = s.values[sensor][:, axis]
+    count = len(reading) // length
+    dt = 1.0 / s.rate_hz
+    middle = np.zeros_like(speed)
+    middle[1:] = (speed[1:] + speed[:-1]) * dt / 2
+    shape = (count, length)
+    x = reading[: count * length].reshape(shape)
+    k = np.arange(length)
+    # The flight's own slow motion is taken out with a straight line and a taper.
+    ramp = (k - k.mean()) / max(np.abs(k - k.mean()).max(), 1)
+    x = x - x.mean(axis=1, keepdims=True)
+    x = x - ramp * (x @ ramp / (ramp @ ramp))[:, None]
+    taper = np.hanning(length + 2)[1:-1]
+    taper = taper / taper.mean()
+    line = np.full((count, speed.shape[1]), np.nan)
+    beside, crowd, floor = (np.full_like(line, np.nan) for _ in range(3))
+    steps = order * middle[: count * length].reshape(count, length, -1)
+    steps[:, 0] = 0.0
+    follow = np.exp(-1j * np.cumsum(steps, axis=1))
+    for i in range(speed.shape[1]):
+        base = x * taper * follow[:, :, i]
+        spectrum = np.abs(np.fft.fft(base, axis=1) / length) ** 2 * 4
+        # Where the alias comes near zero frequency, flight motion would be taken for a line.
+        turn = order * speed[: count * length, i].reshape(shape).mean(axis=1) * dt
+        turned = np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
+        clear = turned / (2 * np.pi * dt) > LOWEST_HZ + 6 / WINDOW_S
+        line[clear, i] = spectrum[clear, 0]
+        # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
+        together = np.mean(taper[:, None] * follow[:, :, i, None].conj() * follow, axis=1)
+        crowd[clear, i] = np.sum(np.abs(together[clear]) ** 2, axis=1)
+        floor[clear, i] = np.median(spectrum[clear], axis=1) / np.log(2)
+        beside[clear, i] = np.mean(spectrum[clear][:, list(SIDE_BINS)], axis=1)
+    return line, beside, crowd, floor

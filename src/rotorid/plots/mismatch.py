@@ -1,0 +1,215 @@
+"""Figures of a mismatch verdict: before and after, where, in which regime, how much better."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.plots import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN_SAMPLES = 1600
+SMOOTH_S = 0.5
+STRIP_CELL_S = 0.5
+LOUDEST = 10.0
+"""Size beside the noise at which the heat strip's colour ends."""
+SHADE = "#f3e6d8"
+
+
+def svg(fig: Figure) -> str:
+    """The figure as SVG text, the same for the same data; closes it."""
+    import matplotlib.pyplot as plt
+
+    text = io.StringIO()
+    fig.savefig(text, format="svg", metadata={"Date": None})
+    plt.close(fig)
+    return text.getvalue()
+
+
+def smoothed(values: np.ndarray, width: int) -> np.ndarray:
+    """Centred moving mean over `width` samples, the ends over what there is."""
+    half = max(width // 2, 0)
+    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(values))])
+    index = np.arange(len(values))
+    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    return (total[last] - total[first]) / (last - first)
+
+
+def before_and_after(
+    time_s: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    noise: float | None,
+    label: str,
+    unit: str,
+    where: Sequence[tuple[float, float]] = (),
+) -> Figure:
+    """Error of one channel of one run with the believed vehicle above, with the improved one below.
+
+    Faint: every sample; strong: half-second mean; grey band: two sigma of the sensors' noise; tinted: where the
+    mismatch was located.
+    """
+    fig, axes = style.figure(3.5, rows=2, sharex=True, sharey=True)
+    period = float(np.median(np.diff(time_s)))
+    reach = 1.05 * float(np.nanquantile(np.abs(before), 0.998))
+    for ax, values, name, colour in (
+        (axes[0], before, "as believed", style.COLOUR["before"]),
+        (axes[1], after, "improved", style.COLOUR["after"]),
+    ):
+        for start, stop in where:
+            ax.axvspan(start, stop, color=SHADE, lw=0, zorder=0)
+        if noise:
+            ax.axhspan(-2 * noise, 2 * noise, color="#d9d9d9", lw=0, zorder=0.5)
+        kept = style.thin(values, SHOWN_SAMPLES)
+        ax.plot(time_s[kept], values[kept], color=colour, lw=0.5, alpha=0.35)
+        ax.plot(time_s, smoothed(values, int(SMOOTH_S / period)), color=colour, lw=1.4)
+        ax.axhline(0, color="black", lw=0.5)
+        ax.set_title(name, loc="left", color=colour, fontweight="bold", pad=3)
+        ax.set_ylabel(f"error ({unit})")
+    axes[0].set_title(label, loc="right", color=style.GREY, pad=3)
+    axes[0].set_ylim(-reach, reach)
+    axes[1].set_xlim(time_s[0], time_s[-1])
+    axes[1].set_xlabel("time (s)")
+    return fig
+
+
+def heat_strip(
+    channels: Sequence[str],
+    labels: Sequence[str],
+    runs: Sequence[str],
+    held_out: Sequence[str],
+    sizes: Mapping[tuple[str, str, str], tuple[np.ndarray, np.ndarray]],
+    located: Mapping[tuple[str, str], Sequence[tuple[float, float]]],
+) -> Figure:
+    """Size of the error beside the noise, channels down, the runs' time across, before above after.
+
+    `sizes` maps (stage, run, channel) to instants and sizes in units of the noise; `located` maps (run, channel)
+    to intervals, which are underlined.
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib.colors import LogNorm
+
+    height = 0.9 + 2 * 0.19 * len(channels)
+    span = {r: _span(sizes, r) for r in runs}
+    widths = [max(span[r][1] - span[r][0], 1e-3) for r in runs]
+    style.use()
+    fig, axes = plt.subplots(
+        2,
+        len(runs),
+        figsize=(style.TEXT_WIDTH_IN, height),
+        squeeze=False,
+        sharey=True,
+        gridspec_kw={"width_ratios": widths},
+    )
+    norm = LogNorm(0.7, LOUDEST)
+    for row, stage in enumerate(("before", "after")):
+        for column, run in enumerate(runs):
+            ax = axes[row, column]
+            for line, channel in enumerate(channels):
+                if (stage, run, channel) not in sizes:
+                    continue
+                time_s, size = sizes[stage, run, channel]
+                step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else STRIP_CELL_S
+                edges = np.append(time_s - step / 2, time_s[-1] + step / 2)
+                image = np.clip(size, 0.7, LOUDEST)[None, :]
+                ax.pcolormesh(edges, [line - 0.44, line + 0.36], image, norm=norm, cmap="YlOrRd", rasterized=True, lw=0)
+                if row == 0:
+                    for start, stop in located.get((run, channel), ()):
+                        ax.plot([start, stop], [line + 0.43] * 2, color="black", lw=1.2, solid_capstyle="butt")
+            ax.set_xlim(*span[run])
+            ax.grid(False)
+            ax.tick_params(length=2)
+            for side in ("left", "bottom"):
+                ax.spines[side].set_visible(False)
+            if row == 0:
+                ax.set_xticklabels([])
+                name = run if len(run) <= 14 else f"{run[:12]}…"
+                ax.set_title(f"{name}\nheld out" if run in held_out else f"{name}\n", fontsize=7.5, pad=3)
+            else:
+                ax.locator_params(axis="x", nbins=3)
+        axes[row, 0].set_yticks(range(len(channels)), labels)
+        axes[row, 0].set_ylabel("as believed" if row == 0 else "improved")
+    axes[0, 0].set_ylim(len(channels) - 0.4, -0.6)
+    fig.supxlabel("time (s)", fontsize=9.5)
+    fig.get_layout_engine().set(w_pad=0.01, wspace=0.01)
+    scale = fig.colorbar(
+        plt.cm.ScalarMappable(norm=norm, cmap="YlOrRd"), ax=axes, fraction=0.02, pad=0.01, ticks=[1, 2, 5, 10]
+    )
+    scale.ax.set_yticklabels(["1", "2", "5", "10"])
+    scale.ax.minorticks_off()
+    scale.set_label("error / noise")
+    return fig
+
+
+def _span(sizes, run: str) -> tuple[float, float]:
+    times = [t for (_, r, _), (t, _) in sizes.items() if r == run and len(t)]
+    return (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 1.0)
+
+
+def against_regime(
+    values: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    noise: float | None,
+    variable: str,
+    label: str,
+    shown: tuple[float, float] | None,
+    bins: int = 10,
+) -> Figure:
+    """Size of half-second stretches against the variable that separates them best; lines: root mean square by bin."""
+    fig, ax = style.figure(2.5)
+    if shown:
+        ax.axvspan(*shown, color=SHADE, lw=0, zorder=0)
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, bins + 1)))
+    for size, name, colour in (
+        (before, "as believed", style.COLOUR["before"]),
+        (after, "improved", style.COLOUR["after"]),
+    ):
+        ax.plot(values, size, ".", color=colour, ms=2.5, alpha=0.3, mew=0, rasterized=True)
+        if len(edges) > 2:
+            which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+            kept = [b for b in range(len(edges) - 1) if np.any(which == b)]
+            centre = [float(values[which == b].mean()) for b in kept]
+            level = [float(np.sqrt(np.mean(size[which == b] ** 2))) for b in kept]
+            ax.plot(centre, level, "o-", color=colour, label=name)
+    if noise:
+        ax.axhline(noise, color=style.GREY, lw=1, ls="--", label="sensors' noise")
+    ax.set_ylim(0, 1.05 * float(np.quantile(np.concatenate([before, after]), 0.995)))
+    ax.set_xlabel(variable)
+    ax.set_ylabel(label)
+    ax.legend(loc="upper left", ncols=3)
+    return fig
+
+
+def gains(labels: Sequence[str], before, refitted, after) -> Figure:
+    """Error over noise of every channel: as believed, refitted, improved (each (n,), NaN where unknown)."""
+    fig, ax = style.figure(0.75 + 0.2 * len(labels))
+    rows = np.arange(len(labels))
+    before, refitted, after = (np.asarray(v, float) for v in (before, refitted, after))
+    ax.hlines(rows, np.minimum(before, after), np.maximum(before, after), color="#cccccc", lw=1.5, zorder=1)
+    ax.plot(before, rows, "o", color=style.COLOUR["before"], label="as believed")
+    ax.plot(refitted, rows, "o", color=style.COLOUR["refitted"], ms=3.5, label="values refitted")
+    ax.plot(after, rows, "o", color=style.COLOUR["after"], label="improved")
+    ax.axvline(1, color=style.GREY, ls="--", lw=1)
+    ax.set_xscale("log")
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    shown = np.concatenate([before, refitted, after, [1.0]])
+    shown = shown[np.isfinite(shown) & (shown > 0)]
+    low, high = 0.8 * shown.min(), 1.25 * shown.max()
+    ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if low <= t <= high]
+    ax.xaxis.set_major_locator(FixedLocator(ticks))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xlim(low, high)
+    ax.set_yticks(rows, labels)
+    ax.set_ylim(len(labels) - 0.5, -0.5)
+    ax.grid(axis="y", visible=False)
+    ax.set_xlabel("error / sensors' noise (1: nothing left to gain)")
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.1)
+    return fig

@@ -1,0 +1,232 @@
+"""The newcomer's way: an emulator in one process, a recorder in another, a log that the pipeline reads."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from acquire import procedures
+from acquire.cli import app
+from acquire.geometry import GF_N, body_forces, cell_forces
+from acquire.view import Plot, bench_forces, braille, panel, watch
+from rotorid.io.index import read_index
+from rotorid.io.logs import read_log
+
+ACQUIRE = [sys.executable, "-m", "acquire"]
+
+
+@pytest.fixture
+def emulator(tmp_path):
+    """Start `emulate` with some arguments; its ports are there when it returns."""
+    processes = []
+
+    def start(what: str, *names: str, more: tuple[str, ...] = ()) -> list[str]:
+        links = [str(tmp_path / name) for name in names]
+        options = [word for link in links for word in ("--link", link)]
+        process = subprocess.Popen([*ACQUIRE, "emulate", what, *options, *more], stdout=subprocess.PIPE, text=True)
+        processes.append(process)
+        for _ in links:
+            assert "Ctrl-C ends it" in process.stdout.readline()
+        return links
+
+    yield start
+    for process in processes:
+        process.terminate()
+        process.wait()
+        process.stdout.close()
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess:
+    return subprocess.run([*ACQUIRE, *arguments], capture_output=True, text=True, timeout=60)
+
+
+def test_static_test_in_two_terminals(emulator, tmp_path):
+    (port,) = emulator("bench", "ttyBENCH", more=("--load", "z:500.48@3", "--speed", "20"))
+    out = tmp_path / "raw" / "local"
+    done = run(
+        *(
+            "bench",
+            "--port",
+            port,
+            "--test",
+            "static",
+            "--axis",
+            "z",
+            "--load-gf",
+            "500.48",
+            "--place-s",
+            "4",
+        ),
+        *("--out", str(out), "--id", "mine", "--air", "23,95400,0.5", "--operator", "me"),
+    )
+    assert done.returncode == 0, done.stderr
+    assert "mine.rlog: " in done.stdout and "0 missing" in done.stdout
+    log = read_log(out / "mine.rlog")
+    table, marks = log.table.set_index("index"), log.session.marks
+    cells = list(log.instrument.columns)
+    tare, reading = (
+        table.loc[marks[f"{step}_start"] : marks[f"{step}_stop"], cells].mean() for step in ("tare", "read")
+    )
+    force = body_forces(cell_forces((reading - tare).to_numpy()))
+    assert -force[2] / GF_N == pytest.approx(500.48, rel=0.01)
+    assert log.session.setup.operator == "me" and log.session.setup.air.temperature_c == 23
+    checked = run("check", str(out / "mine.rlog"), "--csv", str(tmp_path / "mine.csv"))
+    assert "missing 0 in 0 gaps" in checked.stdout and (tmp_path / "mine.csv").exists()
+    assert "1 recordings" in run("index", str(tmp_path / "raw")).stdout
+    assert read_index(tmp_path / "raw")[0]["id"] == "mine"
+
+
+def test_experiment_with_two_instruments_and_two_clocks(emulator, tmp_path):
+    ports = emulator("stand", "ttyQUAD", "ttyWRENCH", more=("--experiment", "27", "--speed", "20"))
+    done = run(
+        *("experiment", "27", "--quadrotor-port", ports[0], "--wrench-port", ports[1]),
+        *("--out", str(tmp_path), "--id", "e27"),
+    )
+    assert done.returncode == 0, done.stderr
+    vehicle, sensor = read_log(tmp_path / "e27-quadrotor.rlog"), read_log(tmp_path / "e27-wrench.rlog")
+    assert vehicle.session.group == sensor.session.group == "e27"
+    assert vehicle.session.setup.mount_roll_deg == 15
+    assert vehicle.end is not None and vehicle.table.throttle_1.max() == pytest.approx(0.2)
+    assert sensor.table.force_y_n.max() > 1.0  # thrust of about 5.7 N at 15°
+    assert sensor.table.force_z_n.iloc[:50].mean() == pytest.approx(6.4, abs=0.1)
+    # the two hosts' times are one clock, so that the sensor saw the programme begin and end
+    begin = sensor.session.host_start_ns - vehicle.session.host_start_ns
+    assert abs(begin) < 5e9
+
+
+def test_rotor_and_tensile(emulator, tmp_path):
+    (port,) = emulator("rotor", "ttyROTOR", more=("--speed", "20"))
+    done = run("rotor", "--port", port, "--throttle", "0.3", "--out", str(tmp_path), "--id", "r")
+    assert done.returncode == 0, done.stderr
+    table = read_log(tmp_path / "r.rlog").table
+    assert table.throttle.max() == pytest.approx(0.3) and table.throttle.iloc[-1] == 0
+    assert table.thrust_n.max() > 1.5
+    (port,) = emulator("tensile", "ttyTENSILE", more=("--speed", "40", "--infill-percent", "25"))
+    done = run("tensile", "--port", port, "--infill-percent", "25", "--out", str(tmp_path), "--id", "t")
+    assert done.returncode == 0, done.stderr
+    assert read_log(tmp_path / "t.rlog").table.force_n.max() == pytest.approx(36.811 * 19.2, rel=0.02)
+
+
+def test_wrench_operations(emulator, tmp_path):
+    (port,) = emulator("wrench", "ttyWRENCH", more=("--speed", "20"))
+    for step in ("power-on", "offset"):
+        assert run("wrench", "--port", port, "--only", step, "--out", str(tmp_path), "--id", step).returncode == 0
+    done = run(
+        *("wrench", "--port", port, "--interval", "0.02", "--measuring-times", "40", "--restart-times", "1"),
+        *("--offset", "--out", str(tmp_path), "--id", "w"),
+    )
+    assert done.returncode == 0, done.stderr
+    log = read_log(tmp_path / "w.rlog")
+    assert len(log.table) == 80 and log.end.sent == 80  # one run and one restart of forty
+    assert abs(log.table.force_z_n.mean()) < 0.1  # the weight is offset away
+    assert run("wrench", "--port", port, "--only", "power-off", "--out", str(tmp_path), "--id", "off").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["bench", "--port", "/dev/nothing"], "no such port"),
+        (["rotor", "--port", "x", "--throttle", "2"], "less than or equal to 1"),
+        (["bench", "--port", "x", "--air", "warm"], "--air is temperature"),
+        (["bench", "--port", "x", "--plot", "cell_9_v"], "--plot is one of cell_1_v"),
+        (["quadrotor", "--port", "x", "--maxima", "1,2,3"], "four fractions"),
+        (["emulate", "toaster", "--link", "x"], "there is no emulator 'toaster'"),
+        (["emulate", "bench", "--link", "x", "--load", "heavy"], "AXIS:GF@SECONDS"),
+        (["check", "nothing.rlog"], "nothing.rlog"),
+        (["experiment", "49", "--quadrotor-port", "x", "--wrench-port", "y"], "less than or equal to 48"),
+    ],
+)
+def test_mistakes_get_one_clear_sentence(arguments, sentence, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code in (1, 2)
+    text = " ".join(result.output.replace("│", " ").split())
+    assert sentence in text and "Traceback" not in text
+
+
+def test_ports_lists_or_says_what_to_do():
+    result = CliRunner().invoke(app, ["ports"])
+    assert result.exit_code == 0 and result.output.strip()
+
+
+def test_torque_test_with_tester_and_sensor(emulator, tmp_path):
+    ports = emulator("torque", "ttyROTOR", "ttyWRENCH", more=("--speed", "20"))
+    done = run(
+        *("torque", "--throttle", "0.4", "--rotor-port", ports[0], "--wrench-port", ports[1]),
+        *("--out", str(tmp_path), "--id", "q"),
+    )
+    assert done.returncode == 0, done.stderr
+    tester, sensor = read_log(tmp_path / "q-rotor.rlog").table, read_log(tmp_path / "q-wrench.rlog").table
+    speed = tester.speed_rpm.max() * np.pi / 30
+    moment = sensor.moment_z_n_m
+    # the throttle comes when the host gets to it, at twenty times the speed of life: look for it
+    torque = moment[moment > 0.02].median() - moment.iloc[:50].mean()
+    assert torque == pytest.approx(1.8558e-8 * speed**2, rel=0.05)
+
+
+def test_reference_sensor_on_the_bench_command(emulator, tmp_path):
+    (port,) = emulator("jr3", "ttyJR3", more=("--load", "z:957.5475@3", "--speed", "20"))
+    done = run(
+        *("bench", "--platform", "jr3", "--port", port, "--test", "static", "--place-s", "4"),
+        *("--out", str(tmp_path), "--id", "j"),
+    )
+    assert done.returncode == 0, done.stderr
+    log = read_log(tmp_path / "j.rlog")
+    table, marks = log.table.set_index("index"), log.session.marks
+    read = table.force_z_n.loc[marks["read_start"] : marks["read_stop"]].mean() - log.session.tare["force_z_n"]
+    assert read == pytest.approx(-957.5475 * GF_N, abs=0.3)
+
+
+def test_forces_are_shown_once_the_bench_is_tared(loopback):
+    world, recorder = loopback("bench")
+
+    def prompt(text):
+        world.physics.place_load("z", 500.0)
+        return lambda: True
+
+    assert bench_forces(recorder) is None
+    with recorder:
+        procedures.static_test(recorder, prompt)
+    shown = bench_forces(recorder).plain
+    assert float(shown.split("z")[1]) == pytest.approx(-500 * GF_N, rel=0.005)
+
+
+def test_live_view_in_a_terminal(plugged, recorder_on):
+    recorder = recorder_on("bench", plugged("bench", speed=200.0).names[0])
+    plot = Plot(recorder, "cell_1_v")
+    console = Console(force_terminal=True, width=200, record=True, file=open("/dev/null", "w"))
+
+    def work() -> None:
+        with recorder:
+            procedures.stream(recorder, 2000)
+
+    watch([recorder], work, recorder.stop_asked, [plot], console)
+    console.print(panel(recorder))
+    text = console.export_text()
+    assert "load-cell bench · finished" in text and "cell_6_v" in text and "remaining" in text
+    assert len(read_log(recorder.log_path).table) >= 2000
+    assert "cell_1_v" in plot.render().plain
+
+
+def test_braille_curve_by_hand():
+    # two characters wide, one high: four columns of dots, four rows; a rising line
+    (line,) = [braille([0.0, 1.0, 2.0, 3.0], width=2, height=1)[0].split()[0]]
+    assert [ord(c) - 0x2800 for c in line] == [0x40 | 0x20, 0x02 | 0x08]
+    assert braille([], 2, 1) == []
+
+
+def test_modules_of_the_library_stay_apart():
+    """`rotorid.io` knows nothing of `acquire`."""
+    for path in (Path(__file__).parents[2] / "src" / "rotorid").rglob("*.py"):
+        assert "acquire" not in [
+            word.split(".")[0]
+            for line in path.read_text().splitlines()
+            if line.startswith(("import ", "from "))
+            for word in [line.split()[1]]
+        ], path

@@ -1,0 +1,107 @@
+"""What is said to each instrument, command by command, and that a log can be played back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from acquire import procedures
+from acquire.clock import SystemClock
+from acquire.recorder import Recorder
+from acquire.transport import ReplayTransport
+from rotorid.io.frames import COMMAND, decode
+from rotorid.io.logs import read_log
+from rotorid.io.rawlog import SENT, read_raw
+from rotorid.io.wire import INSTRUMENTS
+from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
+from rotorid.io.wire.rotor import pack_throttle
+from rotorid.io.wire.wrench import pack_initialise
+
+
+def said(path) -> list[str]:
+    """Letter and arguments (hex) of the commands in a log."""
+    frames = [decode(chunk.data[:-1]) for chunk in read_raw(path).chunks if chunk.tag == SENT]
+    assert all(frame.kind == COMMAND for frame in frames)
+    return [f"{chr(frame.payload[0])} {frame.payload[1:].hex()}".strip() for frame in frames]
+
+
+def test_wrench(loopback):
+    _, recorder = loopback("wrench")
+    with recorder:
+        procedures.measure_wrench(recorder, 0.02, restart_times=2, measuring_times=30, offset=True)
+    # 20,000 µs = 0x4e20; 2; 30; all little-endian
+    assert said(recorder.log_path) == [
+        "?",
+        "P 01",
+        "I 204e000002001e000000",
+        "O",
+        "G 204e0000",
+        "X",
+        "P 00",
+    ]
+    assert len(read_log(recorder.log_path).table) == 90  # thirty samples and two restarts
+
+
+def test_bench(loopback):
+    _, recorder = loopback("bench")
+    with recorder:
+        procedures.stream(recorder, 10, 0.001)
+    assert said(recorder.log_path) == ["?", "G e8030000", "X"]
+
+
+def test_rotor(loopback):
+    _, recorder = loopback("rotor")
+    with recorder:
+        procedures.thrust_test(recorder, 0.25, 0.5, 2.0)
+    # throttle 0.25 = 2500 = 0x09c4, held by the tester itself for 2.5 s = 2500 ms at most
+    assert said(recorder.log_path) == ["?", "G 00000000", "T c409c409", "T 00000000", "X"]
+
+
+def test_quadrotor(loopback):
+    _, recorder = loopback("quadrotor")
+    with recorder:
+        procedures.fly_programme(recorder, "r", Programme(TRAPEZOID, (0.2, 0.05, 0.05, 0.2), 1.0, 2.0, 0.0))
+    # trapezoid; 2000, 500, 500, 2000; 1000 ms, 2000 ms, 0 mHz
+    assert said(recorder.log_path) == [
+        "?",
+        "r 00" + "d007" + "f401" + "f401" + "d007" + "e803" + "d007" + "0000",
+    ]
+    log = read_log(recorder.log_path)
+    assert log.end is not None and log.table.throttle_2.max() == pytest.approx(0.05)
+
+
+def test_experiment_says_the_programme_while_the_sensor_measures(loopback):
+    _, vehicle, sensor = loopback("stand")
+    with vehicle, sensor:
+        procedures.experiment(vehicle, sensor, "h", Programme(TRAPEZOID, (0.2,) * 4, 1.0, 2.0, 0.0), rest_s=1.0)
+    assert [word[0] for word in said(sensor.log_path)] == ["?", "P", "I", "G", "X", "P"]
+    flight, wrench = read_log(vehicle.log_path), read_log(sensor.log_path)
+    # rest, 4 s and half a second of programme, rest; the sensor reads 6.396 N less the thrust at the maximum
+    assert wrench.table.time_s.iloc[-1] == pytest.approx(1 + 4.5 + 1, abs=0.5)
+    assert flight.table.time_s.iloc[-1] == pytest.approx(4.5, abs=0.05)
+    speed = 1829.2 * 0.4**0.669
+    assert wrench.table.force_z_n.min() == pytest.approx(6.396 - 4 * 1.3877e-6 * speed**2, abs=0.1)
+
+
+@pytest.mark.parametrize("bad", [(1.5, 1.0), (-0.1, 1.0), (0.5, 70.0)])
+def test_throttles_that_are_none(bad):
+    with pytest.raises(ValueError, match="throttle"):
+        pack_throttle(*bad)
+
+
+def test_intervals_that_are_none():
+    with pytest.raises(ValueError, match="between 0 and 60 s"):
+        pack_initialise(0.0, 0, 0)
+
+
+def test_a_log_played_back_gives_the_same_table(loopback, tmp_path):
+    _, recorder = loopback("bench")
+    with recorder:
+        procedures.stream(recorder, 100)
+    folder = tmp_path / "again"
+    replay = ReplayTransport(recorder.log_path)
+    with Recorder(INSTRUMENTS["bench"], replay, SystemClock(), folder, "again", durable=False) as again:
+        procedures.stream(again, 100)
+    first, second = read_log(recorder.log_path).table, read_log(folder / "again.rlog").table
+    channels = [column for column in first if column != "host_time_s"]
+    np.testing.assert_array_equal(first[channels], second[channels])

@@ -1,0 +1,1 @@
+"""Recordings whose hidden cause is known, made by code that shares nothing with `rotorid`."""

@@ -1,0 +1,77 @@
+"""Build concealed sets.
+
+    python -m tests.concealed.build --cases 'single/*/moderate/0' --out DIR --answers DIR2
+
+Sets go to DIR/<set>/ under names that say nothing; the truth goes to DIR2/<set>.json, which the stage under
+test must never read. What is already built is left alone: an interrupted build goes on where it stopped.
+"""
+
+import argparse
+import json
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from . import cases, rotorpy_cases
+from .richsim import scene
+from .write import write_set
+
+
+def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> Path:
+    """Write one set and its answer; with `signals` also the noise-free tables beside the answer."""
+    make = {"richsim": scene.make, "rotorpy": rotorpy_cases.make}[case.generator]
+    recording, truth, ideals = make(case.settings, case.seed)
+    write_set(recording, out / case.set_name)
+    answers.mkdir(parents=True, exist_ok=True)
+    if signals:
+        for run, table in ideals.items():
+            (answers / case.set_name).mkdir(exist_ok=True)
+            table.to_parquet(answers / case.set_name / f"{run}.parquet", index=False)
+    # what a hidden cause needs to show (a wind needs drag) is to be found as well
+    expected = sorted({*case.truth, *(e["id"] for e in truth["effects"])})
+    answer = {"set": case.set_name, "case": case.name, "generator": case.generator, "expected": expected, **truth}
+    path = answers / f"{case.set_name}.json"
+    path.write_text(json.dumps(answer, indent=1))
+    return path
+
+
+def _one(job):
+    case, out, answers, signals = job
+    start = time.monotonic()
+    try:
+        build(case, out, answers, signals)
+    except RuntimeError as error:
+        return f"FAILED {case.name}: {error}"
+    return f"{case.set_name} {time.monotonic() - start:.1f} s"
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", default="*", help="shell patterns on case names, comma-separated")
+    parser.add_argument("--out", type=Path, required=True, help="folder for recording sets")
+    parser.add_argument("--answers", type=Path, required=True, help="another folder, for the truth")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--signals", action="store_true", help="keep the noise-free tables beside the answers")
+    parser.add_argument("--list", action="store_true", help="only list the cases")
+    args = parser.parse_args(argv)
+    chosen = cases.matching(args.cases)
+    if args.list:
+        print("\n".join(f"{c.set_name}  {c.name}" for c in chosen))
+        return 0
+    if args.answers.resolve().is_relative_to(args.out.resolve()):
+        parser.error("--answers must lie outside --out")
+    todo = [
+        (c, args.out, args.answers, args.signals) for c in chosen if not (args.answers / f"{c.set_name}.json").exists()
+    ]
+    print(f"{len(chosen)} cases, {len(chosen) - len(todo)} already built", file=sys.stderr)
+    failed = 0
+    with ProcessPoolExecutor(args.jobs) as pool:
+        for k, line in enumerate(pool.map(_one, todo)):
+            failed += line.startswith("FAILED")
+            print(f"[{k + 1}/{len(todo)}] {line}", file=sys.stderr, flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""An independent multirotor simulator: own equations, own integrator, own sensors."""

@@ -1,0 +1,142 @@
+"""Flights made by hand for tests: a prescribed turning and thrust, everything else follows by rigid-body mechanics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+from rotorid.recordings import RecordingSet, Run, Vehicle
+
+DENSE_HZ = 1000.0
+GRAVITY = 9.81
+QUAD = {
+    "name": "hand-made",
+    "kind": "flight",
+    "mass_kg": 0.652,
+    "inertia_kg_m2": {"xx": 2.489e-3, "yy": 2.5743e-3, "zz": 4.6838e-3},
+    "rotors": [
+        {"x_m": 0.0884, "y_m": 0.0884, "spin": "ccw"},
+        {"x_m": 0.0884, "y_m": -0.0884, "spin": "cw"},
+        {"x_m": -0.0884, "y_m": -0.0884, "spin": "ccw"},
+        {"x_m": -0.0884, "y_m": 0.0884, "spin": "cw"},
+    ],
+    "thrust_coefficient_n_s2": 1.3877e-6,
+    "torque_coefficient_n_m_s2": 1.8558e-8,
+}
+
+
+def quad(**changes) -> Vehicle:
+    """The thesis's vehicle, with changes."""
+    return Vehicle.model_validate(QUAD | changes)
+
+
+def smooth(rng: np.random.Generator, count: int, size: float, highest_hz: float) -> np.ndarray:
+    """Band-limited noise of a given one-sigma, (count,)."""
+    sos = butter(4, highest_hz, fs=DENSE_HZ, output="sos")
+    values = sosfiltfilt(sos, rng.standard_normal(count + 4000))[2000:-2000]
+    return size * values / values.std()
+
+
+class Flight:
+    """True motion on a dense grid; `record` samples it as columns, each sensor at its own instants."""
+
+    def __init__(self, seed: int, duration_s: float = 25.0, drag: float = 0.0, excitation: float = 1.0):
+        rng = np.random.default_rng(seed)
+        self.vehicle = quad()
+        count = int((duration_s + 2.0) * DENSE_HZ)
+        t = np.arange(count) / DENSE_HZ
+        angles = np.stack([smooth(rng, count, s * excitation, f) for s, f in ((0.4, 1.5), (0.15, 4.0), (0.15, 4.0))], 1)
+        rotation = Rotation.from_euler("ZYX", angles)
+        q = rotation.as_quat()[:, [3, 0, 1, 2]]
+        q *= np.where(np.einsum("ij,ij->i", q, np.roll(q, 1, axis=0)) < 0, -1.0, 1.0)[:, None]
+        slope = CubicSpline(t, q).derivative()(t)
+        w, x, y, z = q.T
+        dw, dx, dy, dz = slope.T
+        rate = 2 * np.stack(
+            [
+                w * dx - x * dw - y * dz + z * dy,
+                w * dy - y * dw - z * dx + x * dz,
+                w * dz - z * dw - x * dy + y * dx,
+            ],
+            axis=1,
+        )
+        thrust = self.vehicle.mass_kg * GRAVITY * (1 + smooth(rng, count, 0.08 * excitation, 3.0))
+        # Drag needs the velocity, which needs the drag: two rounds are enough for a weak one.
+        body = np.stack([np.zeros(count), np.zeros(count), -thrust / self.vehicle.mass_kg], axis=1)
+        force = body
+        for _ in range(3 if drag else 1):
+            acceleration = rotation.apply(force) + np.array([0.0, 0.0, GRAVITY])
+            acceleration -= acceleration.mean(axis=0)
+            velocity = cumulative_trapezoid(acceleration, t, axis=0, initial=0.0)
+            velocity -= velocity.mean(axis=0)
+            along = rotation.inv().apply(velocity)
+            force = body - drag * along * np.array([1.0, 1.0, 0.0])
+        position = cumulative_trapezoid(velocity, t, axis=0, initial=0.0) + np.array([0.0, 0.0, -5.0])
+        # The mean acceleration that was taken out returns as specific force, so that kinematics stay exact.
+        exact = rotation.inv().apply(CubicSpline(t, velocity).derivative()(t) - np.array([0.0, 0.0, GRAVITY]))
+        inertia = self.vehicle.inertia_kg_m2.matrix()
+        moment = CubicSpline(t, rate).derivative()(t) @ inertia + np.cross(rate, rate @ inertia)
+        at = self.vehicle.rotor_positions_m()
+        lever = self.vehicle.torque_coefficient_n_m_s2 / self.vehicle.thrust_coefficient_n_s2
+        mixer = np.stack([np.ones(4), -at[:, 1], at[:, 0], lever * self.vehicle.yaw_signs()])
+        lift = -exact[:, 2] * self.vehicle.mass_kg
+        thrusts = np.linalg.solve(mixer, np.column_stack([lift, moment]).T).T
+        speed = np.sqrt(np.maximum(thrusts, 1e-3) / self.vehicle.thrust_coefficient_n_s2)
+        self.truth = {
+            "rotors": CubicSpline(t, speed),
+            "position": CubicSpline(t, position),
+            "velocity": CubicSpline(t, velocity),
+            "attitude": CubicSpline(t, q),
+            "gyroscope": CubicSpline(t, rate),
+            "accelerometer": CubicSpline(t, exact),
+        }
+        self.phase = cumulative_trapezoid(speed, t, axis=0, initial=0.0)
+        self.time_s, self.duration_s, self.rng = t, duration_s, rng
+
+    def record(self, rate_hz: float = 200.0, late_s=None, growth=None, vibration: float = 0.0, name="run01") -> Run:
+        """A run with noise. `late_s` and `growth` (sensor to s, s/s) put a sensor's stamps behind."""
+        t = np.arange(int(self.duration_s * rate_hz)) / rate_hz
+        noise = {
+            "rotors": 5.0,
+            "position": 0.001,
+            "velocity": 0.02,
+            "attitude": 0.001,
+            "gyroscope": 0.012,
+            "accelerometer": 0.12,
+        }
+        columns = {"time_s": t}
+        for sensor, names in COLUMNS.items():
+            when = 1.0 + t - (late_s or {}).get(sensor, 0.0) - (growth or {}).get(sensor, 0.0) * t
+            values = self.truth[sensor](when)
+            if sensor == "accelerometer" and vibration:
+                psi = CubicSpline(self.time_s, self.phase)(when)
+                values[:, 0] += vibration * np.cos(psi + np.arange(4)).sum(axis=1)
+            values = values + noise[sensor] * self.rng.standard_normal(values.shape)
+            columns |= {n: values[:, k] for k, n in enumerate(names)}
+        return Run(name, pd.DataFrame(columns))
+
+
+COLUMNS = {
+    "rotors": tuple(f"rotor_speed_{i}_rad_s" for i in range(1, 5)),
+    "position": tuple(f"position_{a}_m" for a in "xyz"),
+    "velocity": tuple(f"velocity_{a}_m_s" for a in "xyz"),
+    "attitude": tuple(f"quaternion_{a}" for a in "wxyz"),
+    "gyroscope": tuple(f"angular_velocity_{a}_rad_s" for a in "xyz"),
+    "accelerometer": tuple(f"specific_force_{a}_m_s2" for a in "xyz"),
+}
+
+
+def recorded(*seeds: int, flight=None, vehicle: Vehicle | None = None, **how) -> RecordingSet:
+    """A set of one run for every seed."""
+    runs = tuple(Flight(seed, **(flight or {})).record(name=f"run{k:02d}", **how) for k, seed in enumerate(seeds))
+    return RecordingSet("hand-made", vehicle or quad(), runs)
+
+
+def with_table(recordings: RecordingSet, change) -> RecordingSet:
+    """The set with `change(table) -> table` applied to every run's copy."""
+    runs = tuple(Run(r.name, change(r.table.copy())) for r in recordings.runs)
+    return RecordingSet(recordings.name, recordings.vehicle, runs, recordings.held_out)

@@ -1,0 +1,51 @@
+"""Locations: nothing on noise, true edges of bursts and of what findings explain, the right regime."""
+
+import pytest
+
+from rotorid.mismatch.locate import locate
+from tests.unit.mismatch.synthetic import DASH_S, LENGTH_S, analysis, drag_finding
+
+
+@pytest.mark.parametrize("pole", [-0.6, 0.0, 0.6, 0.9])
+def test_noise_of_any_colour_is_located_nowhere(pole):
+    assert not any(locate(analysis(seed, pole=pole)) for seed in range(10))
+
+
+def test_an_unexplained_burst_is_found_to_a_fraction_of_a_second():
+    found = locate(analysis(bursts=[("b", "moment_y", 20.0, 23.0, 3.0)]))
+    assert [(f.run, f.channel) for f in found] == [("b", "moment_y")]
+    assert found[0].start_s == pytest.approx(20.0, abs=0.2)
+    assert found[0].stop_s == pytest.approx(23.0, abs=0.2)
+    # 120 samples at 10 σ² beside 1560 at 1 σ²: (120 · 10) / (1440 + 1200) = 0.45.
+    assert found[0].energy_share == pytest.approx(0.45, abs=0.1)
+    assert found[0].p_value < 1e-6
+
+
+def test_drag_is_located_in_the_dash_and_its_regime_is_airspeed():
+    found = locate(analysis(findings=[drag_finding()]))
+    assert [(f.run, f.channel) for f in found] == [(r, "force_x") for r in "abc"]
+    for f in found:
+        assert f.start_s == pytest.approx(DASH_S[0], abs=0.3)
+        assert f.stop_s == pytest.approx(DASH_S[1], abs=0.3)
+        assert f.regime.variable == "airspeed_m_s"
+        assert 0 < f.regime.low < 5.0 <= f.regime.high + 0.1
+
+
+def test_windows_that_a_finding_states_are_taken_as_they_are():
+    gust = drag_finding(id="gust", form=None, values=(), windows=(("c", 5.0, 8.0),))
+    (found,) = locate(analysis(findings=[gust]))
+    assert (found.run, found.channel) == ("c", "force_x")
+    assert found.start_s == pytest.approx(5.0, abs=0.03)
+    assert found.stop_s == pytest.approx(8.0, abs=0.03)
+
+
+def test_a_wrong_value_is_wrong_throughout():
+    made = analysis(findings=[drag_finding(status="absorbed")], values={"mass_kg": (0.6, 0.652, 0.65, 0.654)})
+    found = locate(made)
+    assert {f.channel for f in found} == {"force_x"}
+    assert all((f.start_s, f.stop_s) == (0.0, pytest.approx(LENGTH_S - 0.01)) for f in found)
+
+
+def test_the_same_analysis_gives_the_same_locations():
+    made = analysis(3, findings=[drag_finding()], bursts=[("a", "moment_x", 5, 7, 3.0)])
+    assert locate(made) == locate(made)

@@ -1,0 +1,288 @@
+"""Mistakes in a set are found, named with the right correction and undone; sound sets are left alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.recordings import RecordingSet
+
+from .flights import COLUMNS, quad, recorded, with_table
+
+
+@pytest.fixture(scope="module")
+def sound() -> RecordingSet:
+    """Two runs without a mistake."""
+    return recorded(1, 2)
+
+
+def ids(findings) -> list[str]:
+    return [f.id for f in findings]
+
+
+def one(findings, name: str):
+    assert ids(findings) == [name]
+    assert findings[0].status == "established"
+    assert findings[0].p_value < 1e-6
+    return findings[0]
+
+
+def column(recordings: RecordingSet, name: str) -> np.ndarray:
+    return np.concatenate([run.column(name) for run in recordings.runs])
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("rate_hz", [100.0, 250.0])
+def test_a_sound_set_is_left_alone(seed, rate_hz):
+    recordings = recorded(10 + seed, 20 + seed, rate_hz=rate_hz)
+    fixed, findings, _ = find_mistakes(recordings)
+    assert findings == ()
+    for before, after in zip(recordings.runs, fixed.runs, strict=True):
+        assert before.table.equals(after.table)
+
+
+@pytest.mark.parametrize(
+    "vehicle",
+    [
+        quad(torque_coefficient_n_m_s2=1.8558e-8 * 1.2),
+        quad(mass_kg=0.652 * 1.15),
+        quad(thrust_coefficient_n_s2=1.3877e-6 * 0.8),
+        quad(inertia_kg_m2={"xx": 2.489e-3 * 1.3, "yy": 2.5743e-3 * 0.8, "zz": 4.6838e-3}),
+    ],
+    ids=["torque", "mass", "thrust", "inertia"],
+)
+def test_wrong_values_are_no_mistakes(vehicle):
+    assert find_mistakes(recorded(3, 4, vehicle=vehicle))[1] == ()
+
+
+def test_strong_drag_is_no_mistake():
+    assert find_mistakes(recorded(5, 6, flight={"drag": 0.4}))[1] == ()
+
+
+def test_a_hover_that_moves_nothing_says_nothing():
+    assert find_mistakes(recorded(7, 8, flight={"excitation": 0.02}))[1] == ()
+
+
+def test_offsets_below_a_sample_are_not_reported():
+    assert find_mistakes(recorded(9, 10, late_s={"rotors": 0.003, "attitude": -0.002}))[1] == ()
+
+
+@pytest.mark.parametrize(
+    ("sensor", "factor", "word"),
+    [
+        ("rotors", 60 / (2 * np.pi), "rpm"),
+        ("gyroscope", 180 / np.pi, "deg/s"),
+        ("accelerometer", 1 / 9.80665, "g"),
+        ("velocity", 100.0, "cm/s"),
+        ("position", 1000.0, "mm"),
+    ],
+)
+def test_units(sound, sensor, factor, word):
+    def spoil(table):
+        table[list(COLUMNS[sensor])] *= factor
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    finding = one(findings, "unit_error")
+    assert f" hold {word}," in finding.sentence
+    estimate = finding.parameters[0]
+    # The measured ratio carries the believed values' error; the factor itself lies within a few percent.
+    assert estimate.value == pytest.approx(factor, rel=0.05)
+    for name in COLUMNS[sensor]:
+        assert column(fixed, name) == pytest.approx(column(sound, name), rel=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "make"), [("percent", lambda u: 100 * u), ("pulses", lambda u: 1000 + 1000 * u)])
+def test_throttle_units(sound, unit, make):
+    def to_throttle(table):
+        for i, name in enumerate(COLUMNS["rotors"]):
+            table[f"throttle_{i + 1}"] = make(table.pop(name) / 2500.0)
+        return table
+
+    bad = with_table(sound, to_throttle)
+    bad = RecordingSet(bad.name, quad(rotor_speed_limits_rad_s=[0, 2500]), bad.runs)
+    fixed, findings, _ = find_mistakes(bad)
+    assert unit in one(findings, "unit_error").sentence
+    assert column(fixed, "throttle_2") == pytest.approx(column(sound, "rotor_speed_2_rad_s") / 2500.0)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "angular_velocity_x_rad_s",
+        "angular_velocity_z_rad_s",
+        "specific_force_z_m_s2",
+        "velocity_y_m_s",
+        "velocity_z_m_s",
+        "position_x_m",
+    ],
+)
+def test_one_flipped_axis(sound, name):
+    def spoil(table):
+        table[name] *= -1.0
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    finding = one(findings, "axis_sign")
+    assert finding.channels == (name,)
+    for names in COLUMNS.values():
+        for n in names:
+            assert np.array_equal(column(fixed, n), column(sound, n))
+
+
+def test_exchanged_axes_of_the_velocity(sound):
+    def spoil(table):
+        # East-north-up instead of north-east-down.
+        x, y, z = (table[n].to_numpy() for n in COLUMNS["velocity"])
+        for name, values in zip(COLUMNS["velocity"], (y, x, -z), strict=True):
+            table[name] = values
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    assert "x, y, z hold y, x, −z" in one(findings, "axis_sign").sentence
+    assert np.array_equal(column(fixed, "velocity_x_m_s"), column(sound, "velocity_x_m_s"))
+
+
+def test_conjugated_attitude(sound):
+    def spoil(table):
+        table[list(COLUMNS["attitude"][1:])] *= -1.0
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    assert "conjugated" in one(findings, "axis_sign").sentence
+    assert np.array_equal(column(fixed, "quaternion_y"), column(sound, "quaternion_y"))
+
+
+def test_exchanged_rotor_columns(sound):
+    def spoil(table):
+        a, b = COLUMNS["rotors"][1], COLUMNS["rotors"][2]
+        table[[a, b]] = table[[b, a]].to_numpy()
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    sentence = one(findings, "rotor_order").sentence
+    assert "column 2 belongs to rotor 3" in sentence and "column 3 belongs to rotor 2" in sentence
+    for n in COLUMNS["rotors"]:
+        assert np.array_equal(column(fixed, n), column(sound, n))
+
+
+def test_rotor_columns_moved_round_by_one(sound):
+    def spoil(table):
+        table[list(COLUMNS["rotors"])] = table[list(np.roll(COLUMNS["rotors"], 1))].to_numpy()
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    one(findings, "rotor_order")
+    for n in COLUMNS["rotors"]:
+        assert np.array_equal(column(fixed, n), column(sound, n))
+
+
+@pytest.mark.parametrize("turned", [(1,), (0, 1, 2, 3)])
+def test_turning_senses(sound, turned):
+    other = {"ccw": "cw", "cw": "ccw"}
+    rotors = [
+        r.model_copy(update={"spin": other[r.spin]}) if i in turned else r for i, r in enumerate(sound.vehicle.rotors)
+    ]
+    vehicle = sound.vehicle.model_copy(update={"rotors": tuple(rotors)})
+    fixed, findings, _ = find_mistakes(RecordingSet("bad", vehicle, sound.runs))
+    one(findings, "spin_direction")
+    assert fixed.vehicle == sound.vehicle
+
+
+@pytest.mark.parametrize(
+    ("late_s", "sensors", "value"),
+    [
+        ({"rotors": 0.012}, ("rotor_speed_1_rad_s",), 0.012),
+        (
+            {"gyroscope": 0.0235, "accelerometer": 0.0235},
+            ("specific_force_x_m_s2", "angular_velocity_x_rad_s"),
+            0.0235,
+        ),
+        ({"attitude": -0.02}, ("quaternion_w",), -0.02),
+    ],
+    ids=["rotors", "imu", "attitude"],
+)
+def test_delays(late_s, sensors, value):
+    fixed, findings, _ = find_mistakes(recorded(31, 32, late_s=late_s))
+    finding = one(findings, "delay")
+    assert set(finding.channels) == set(sensors)
+    estimate = finding.parameters[0]
+    assert estimate.low <= value <= estimate.high
+    assert estimate.value == pytest.approx(value, abs=5e-4)
+    assert find_mistakes(fixed)[1] == ()
+
+
+@pytest.mark.parametrize("growth", [0.001, -0.006])
+def test_a_drifting_clock(growth):
+    fixed, findings, _ = find_mistakes(recorded(41, 42, growth={"rotors": growth}))
+    finding = one(findings, "clock_skew")
+    assert finding.channels == ("rotor_speed_1_rad_s",)
+    estimate = finding.parameters[0]
+    assert estimate.value == pytest.approx(growth, abs=6e-5)
+    assert find_mistakes(fixed)[1] == ()
+
+
+@pytest.mark.parametrize("kind", ["held", "zero", "missing"])
+def test_dropouts(sound, kind):
+    name = "rotor_speed_3_rad_s"
+
+    def spoil(table):
+        inside = (table["time_s"] >= 8.0) & (table["time_s"] <= 10.5)
+        before = table.loc[table["time_s"] < 8.0, name].iloc[-1]
+        table.loc[inside, name] = {"held": before, "zero": 0.0, "missing": np.nan}[kind]
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    finding = one(findings, "sensor_dropout")
+    assert kind in finding.sentence and finding.channels == (name,)
+    assert [w[0] for w in finding.windows] == ["run00", "run01"]
+    for _, start, stop in finding.windows:
+        assert start == pytest.approx(8.0, abs=0.006) and stop == pytest.approx(10.5, abs=0.006)
+    run = fixed.runs[0]
+    inside = (run.time_s >= 8.0) & (run.time_s <= 10.5)
+    assert np.isnan(run.column(name)[inside]).all() and np.isfinite(run.column(name)[~inside]).all()
+
+
+def test_a_rotor_that_is_hardly_ever_read(sound):
+    rng = np.random.default_rng(0)
+
+    def spoil(table):
+        keep = rng.random(len(table)) < 0.05
+        table["rotor_speed_1_rad_s"] = np.where(keep, 0.4 * table["rotor_speed_1_rad_s"], 0.0)
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    assert ids(findings) == ["sensor_dropout"]
+    assert not any(run.has("rotor_speed_1_rad_s") for run in fixed.runs)
+
+
+def test_a_vibration_that_follows_the_rotors():
+    # At 200 Hz the rotors' order (about 1070 rad/s, 170 Hz) is seen at an alias only.
+    _, findings, _ = find_mistakes(recorded(51, 52, vibration=0.5))
+    finding = one(findings, "vibration")
+    assert finding.channels == ("specific_force_x_m_s2",)
+    assert finding.parameters[0].value == pytest.approx(0.5, rel=0.15)
+
+
+def test_a_line_at_its_own_frequency_is_no_vibration_of_the_rotors(sound):
+    def shake(table):
+        table["specific_force_x_m_s2"] += 0.5 * np.cos(2 * np.pi * 31.0 * table["time_s"])
+        return table
+
+    assert find_mistakes(with_table(sound, shake))[1] == ()
+
+
+def test_two_mistakes_at_once(sound):
+    def spoil(table):
+        table[list(COLUMNS["rotors"])] *= 60 / (2 * np.pi)
+        a, b = COLUMNS["rotors"][0], COLUMNS["rotors"][3]
+        table[[a, b]] = table[[b, a]].to_numpy()
+        table["angular_velocity_y_rad_s"] *= -1.0
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    assert sorted(ids(findings)) == ["axis_sign", "rotor_order", "unit_error"]
+    for names in COLUMNS.values():
+        for n in names:
+            assert column(fixed, n) == pytest.approx(column(sound, n))

@@ -1,0 +1,101 @@
+"""The verdict: its file, its word, its sentence."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from rotorid.mismatch.locate import locate
+from rotorid.mismatch.verdict import SCHEMA_PATH, Verdict, make_verdict, schema_text
+from tests.unit.mismatch.synthetic import analysis, drag_finding
+
+
+def verdict_of(made, forward=None):
+    return make_verdict(made, locate(made), forward or {})
+
+
+def test_the_schema_is_in_step():
+    assert SCHEMA_PATH.read_text() == schema_text(), "python -m rotorid.mismatch.verdict --write-schema"
+
+
+def test_the_file_has_the_keys_of_the_contract():
+    content = json.loads(verdict_of(analysis(findings=[drag_finding()])).text())
+    assert list(content) == [
+        *("set", "kind", "runs", "verdict", "sentence", "channels", "locations", "effects", "parameters"),
+        *("not_testable", "unexplained", "next_experiment"),
+    ]
+    channel = content["channels"]["force_x"]
+    assert list(channel) == ["unit", "noise_floor", "rmse", "p_value"]
+    assert list(channel["rmse"]["held_out"]) == ["before", "refitted", "after"]
+    keys = ["run", "channel", "start_s", "stop_s", "p_value", "energy_share", "regime"]
+    assert list(content["locations"][0]) == keys
+    effect = content["effects"][0]
+    assert effect["parameters"] == [
+        {"symbol": "k_d", "value": 6e-05, "unit": "N s2/(rad m)", "interval_95": [5.8e-05, 6.2e-05]}
+    ]
+    assert effect["held_out_gain"] == {"rmse_ratio": 0.3, "interval_95": [0.25, 0.36]}
+    assert Verdict.model_validate(content).text() == verdict_of(analysis(findings=[drag_finding()])).text()
+
+
+def test_errors_are_the_root_mean_squares_of_the_runs_of_each_kind():
+    made = analysis(findings=[drag_finding()])
+    errors = verdict_of(made).channels["force_x"].rmse
+    held = next(t for t in made.traces if (t.run, t.channel) == ("b", "force_x"))
+    assert errors.held_out.before == pytest.approx(np.sqrt(np.mean(held.before**2)), rel=1e-5)
+    assert errors.held_out.after == pytest.approx(0.05, rel=0.1)
+
+
+def test_numbers_that_are_not_finite_are_written_as_null():
+    made = analysis(findings=[drag_finding(gain=(math.nan, 0.1, math.inf))], noise_floor={"force_x": math.nan})
+    content = json.loads(verdict_of(made).text(), parse_constant=pytest.fail)
+    assert content["channels"]["force_x"]["noise_floor"] is None
+    assert content["effects"][0]["held_out_gain"] == {"rmse_ratio": None, "interval_95": [0.1, None]}
+
+
+@pytest.mark.parametrize(
+    ("findings", "values", "share", "word"),
+    [
+        ((), {}, 0.0, "no_mismatch"),
+        ((drag_finding(status="not_established"),), {}, 0.0, "no_mismatch"),
+        ((drag_finding(),), {}, 0.1, "explained"),
+        ((drag_finding(status="ambiguous", alternatives=("rotor_drag", "frame_drag")),), {}, 0.0, "explained"),
+        ((drag_finding(),), {}, 0.4, "partly_explained"),
+        ((drag_finding(),), {}, 0.9, "unexplained"),
+        ((), {"mass_kg": (0.6, 0.65, 0.64, 0.66)}, 0.0, "explained"),
+        ((), {}, 0.5, "unexplained"),
+    ],
+)
+def test_the_word(findings, values, share, word):
+    made = analysis(findings=findings, values=values, unexplained_share=share, dash=False)
+    assert make_verdict(made, [], {}).verdict == word
+
+
+def test_a_burst_that_nothing_explains_is_unexplained():
+    made = analysis(bursts=[("b", "moment_y", 20.0, 23.0, 3.0)])
+    found = verdict_of(made)
+    assert found.verdict == "unexplained"
+    assert "pitch moment" in found.sentence and "None of the known effects" in found.sentence
+
+
+def test_the_sentence_says_where_what_and_how_much_better():
+    made = analysis(findings=[drag_finding()])
+    sentence = verdict_of(made).sentence
+    assert "m/s of airspeed on, the forward force is" in sentence
+    assert "Rotor drag was left out: the sideways force grows with airspeed times rotor speed" in sentence
+    assert "k_d = 6.00e-5 ± 0.20e-5 N s2/(rad m)" in sentence
+    assert "on flights not used for fitting" in sentence
+    assert "the sensor's own noise is 0.050 N" in sentence
+
+
+def test_a_mismatch_throughout_starts_with_what_is_off():
+    made = analysis(values={"mass_kg": (0.6, 0.652, 0.65, 0.654)}, findings=[drag_finding(status="absorbed")])
+    sentence = verdict_of(made).sentence
+    assert sentence[0].isupper()
+    assert "The mass is 0.6520 ± 0.0020 kg, not the 0.6000 kg believed." in sentence
+
+
+def test_an_ambiguous_class_is_named_in_full_with_what_would_settle_it():
+    finding = drag_finding(status="ambiguous", alternatives=("frame_drag", "rotor_drag"))
+    sentence = verdict_of(analysis(findings=[finding], next_manoeuvre="fly faster")).sentence
+    assert "Either rotor drag or" in sentence and "cannot tell which" in sentence and "fly faster" in sentence

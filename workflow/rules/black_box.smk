@@ -1,0 +1,96 @@
+"""Black box: the stand's wrench by the thesis's network, and an honest comparison."""
+
+
+rule prepare_experiments:
+    """The 48 dynamics experiments as samples."""
+    message:
+        "Black box: samples of the 48 experiments"
+    input:
+        logs=campaign_logs("dynamics"),
+        thrust=rules.fit_white_box.output.thrust,
+        vehicle=THESIS_VEHICLE,
+    output:
+        experiments="results/black_box/experiments.csv",
+    params:
+        seed=CONFIG.black_box.seed,
+        code=code_of("prepare_experiments"),
+    log:
+        "results/logs/prepare_experiments.log",
+    script:
+        "../scripts/prepare_experiments.py"
+
+
+rule train_black_box:
+    """The thesis's network and its held-out samples."""
+    message:
+        "Black box: training the 6-20-20-6 network"
+    input:
+        experiments=rules.prepare_experiments.output.experiments,
+    output:
+        history="results/black_box/history.csv",
+        tested="results/black_box/held_out_samples.csv",
+    params:
+        epochs=CONFIG.black_box.epochs,
+        rate=CONFIG.black_box.rate,
+        hidden=CONFIG.black_box.hidden,
+        held_out=CONFIG.black_box.held_out_samples,
+        seed=CONFIG.black_box.seed,
+        checkpoint="results/black_box/checkpoint.npz",
+        code=code_of("train_black_box"),
+    log:
+        "results/logs/train_black_box.log",
+    script:
+        "../scripts/train_black_box.py"
+
+
+rule compare_black_box:
+    """Models compared on whole experiments held out."""
+    message:
+        "Black box: comparison on whole experiments"
+    input:
+        experiments=rules.prepare_experiments.output.experiments,
+        vehicle=THESIS_VEHICLE,
+    output:
+        metrics="results/black_box/metrics.csv",
+        predictions="results/black_box/predictions.csv",
+        summary="results/black_box/summary.json",
+    params:
+        epochs=CONFIG.black_box.epochs,
+        rate=CONFIG.black_box.rate,
+        hidden=CONFIG.black_box.hidden,
+        fold_count=CONFIG.black_box.folds,
+        share=CONFIG.black_box.share,
+        seed=CONFIG.black_box.seed,
+        code=code_of("compare_black_box"),
+    log:
+        "results/logs/compare_black_box.log",
+    script:
+        "../scripts/compare_black_box.py"
+
+
+rule chapter_black_box:
+    """Figures and tables of the black-box chapter."""
+    message:
+        "Chapter black box: figures and tables"
+    input:
+        notebook=ROOT / "notebooks" / "black_box.ipynb",
+        history=rules.train_black_box.output.history,
+        tested=rules.train_black_box.output.tested,
+        metrics=rules.compare_black_box.output.metrics,
+        predictions=rules.compare_black_box.output.predictions,
+        summary=rules.compare_black_box.output.summary,
+        parameters=rules.fit_white_box.output.parameters,
+    output:
+        training="results/report/black_box/training.svg",
+        samples="results/report/black_box/samples.svg",
+        comparison="results/report/black_box/comparison.svg",
+        coverage="results/report/black_box/coverage.svg",
+        scores="results/report/black_box/scores.csv",
+        statements="results/report/black_box/statements.csv",
+    params:
+        code=code_of_chapter("black_box"),
+    log:
+        "results/logs/chapter_black_box/run.log",
+        notebook="results/logs/chapter_black_box/black_box.ipynb",
+    script:
+        "../scripts/run_notebook.py"

@@ -1,0 +1,46 @@
+"""The thesis's black box (section 4.4): 6-20-20-6, 50,000 epochs, tested on 15 samples drawn at random.
+
+- Continues from its checkpoint when interrupted; the same seed gives the same network.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid import log
+from rotorid.blackbox.experiments import OUTPUTS
+from rotorid.blackbox.models import fit_thesis_network
+
+
+def main(
+    experiments: str,
+    epochs: int,
+    rate: float,
+    hidden: tuple[int, ...],
+    held_out: int,
+    seed: int,
+    history: str,
+    tested: str,
+    checkpoint: str,
+) -> None:
+    """Write the error by epoch and the held-out samples with their predictions (CSV)."""
+    table = pd.read_csv(experiments)
+    chosen = np.random.default_rng(seed).choice(len(table), held_out, replace=False)
+    mask = np.zeros(len(table), bool)
+    mask[chosen] = True
+    predict, trained = fit_thesis_network(table[~mask], epochs, rate, tuple(hidden), seed, checkpoint=Path(checkpoint))
+    errors = pd.DataFrame(trained.mse, columns=list(OUTPUTS))
+    errors.insert(0, "epoch", trained.epochs)
+    errors.to_csv(history, index=False, float_format="%.6g")
+    rows = table[mask].reset_index(drop=True)
+    predicted = pd.DataFrame(predict(rows), columns=[f"predicted_{name}" for name in OUTPUTS])
+    pd.concat([rows, predicted], axis=1).to_csv(tested, index=False, float_format="%.9g")
+    # The finished network is in the results; a checkpoint left behind would make the next run skip the training.
+    Path(checkpoint).unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        settings = {k: v for k, v in snakemake.params.items() if k != "code"}
+        main(experiments=snakemake.input.experiments, **settings, **dict(snakemake.output.items()))
