@@ -8,6 +8,9 @@ CORES ?= 2
 # More for Snakemake, e.g. make report OPTIONS="--configfile tests/configs/small.yaml"
 OPTIONS ?=
 
+# Compiled modules are kept: without them every start of Snakemake and every job takes two seconds more.
+unexport PYTHONDONTWRITEBYTECODE
+
 BIN := .venv/bin
 READY := .venv/ready
 TESTED := .venv/tested

@@ -28,3 +28,7 @@ rule all:
         "All results are up to date"
     input:
         rules.report.input,
+
+
+# All rules have asked for their code by now.
+CODE.remember()

@@ -14,8 +14,12 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import os
+import sys
 from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 PACKAGE = "rotorid"
 
@@ -27,14 +31,18 @@ class Code:
     ----------
     root
         Top of the project: holds `src/rotorid`.
+    memory
+        File that keeps what was found, so that the next start need not parse what has not changed since (by
+        size and time of change). None keeps nothing.
     """
 
-    def __init__(self, root: str | Path) -> None:
+    def __init__(self, root: str | Path, memory: str | Path | None = None) -> None:
         self.root = Path(root).resolve()
         self._source = self.root / "src"
-        self._trees: dict[Path, ast.Module] = {}
-        self._digests: dict[Path, str] = {}
-        self._imports: dict[Path, list[Path]] = {}
+        self._facts: dict[Path, _Facts] = {}
+        self._files: dict[str, list[Path]] = {}
+        self._memory = Path(memory) if memory else None
+        self._remembered = self._recall()
 
     def of(self, script: str | Path) -> str:
         """Sixteen hexadecimal digits that stand for the code that `script` runs.
@@ -54,7 +62,8 @@ class Code:
         path = self.root / script
         if not path.is_file():
             raise FileNotFoundError(f"code_of: there is no file {path}.")
-        digests = [self._digest(file) for file in (path, *self.reached_modules(path))]
+        files = (path, *self.reached_modules(path))
+        digests = [f"{file.name} {self._facts_of(file).digest}" for file in files]
         return hashlib.sha256("\n".join(digests).encode()).hexdigest()[:16]
 
     def reached_modules(self, script: Path) -> list[Path]:
@@ -62,33 +71,65 @@ class Code:
         found: set[Path] = set()
         waiting = [script]
         while waiting:
-            new = set(self._imported_files(waiting.pop())) - found
+            names = self._facts_of(waiting.pop()).names
+            new = {file for name in names for file in self._files_of(name)} - found
             found |= new
             waiting += new
         return sorted(found)
 
-    def _imported_files(self, path: Path) -> list[Path]:
-        """Files of the library that one file imports itself."""
-        if path not in self._imports:
-            names = set(_imported_names(self._tree(path), _package_of(path, self._source), self._source))
-            self._imports[path] = sorted({file for name in names for file in _files_of(name, self._source)})
-        return self._imports[path]
+    def remember(self) -> None:
+        """Write the memory, whole or not at all, where it is wanted and something is new."""
+        entries = {str(path.relative_to(self.root)): asdict(facts) for path, facts in self._facts.items()}
+        if self._memory is None or entries.items() <= self._remembered.items():
+            return
+        self._memory.parent.mkdir(parents=True, exist_ok=True)
+        new = self._memory.with_suffix(f".{os.getpid()}")
+        new.write_text(json.dumps({"made_by": _made_by(), "files": entries}), encoding="utf-8")
+        new.replace(self._memory)
 
-    def _digest(self, path: Path) -> str:
-        """Hash of a file's syntax tree, with the file's name."""
-        if path not in self._digests:
-            tree = ast.dump(self._tree(path))
-            self._digests[path] = f"{path.name} {hashlib.sha256(tree.encode()).hexdigest()}"
-        return self._digests[path]
+    def _recall(self) -> dict[str, dict[str, Any]]:
+        try:
+            stored = json.loads(self._memory.read_text(encoding="utf-8")) if self._memory else {}
+            return stored["files"] if stored.get("made_by") == _made_by() else {}
+        except (OSError, ValueError):
+            return {}
 
-    def _tree(self, path: Path) -> ast.Module:
-        if path not in self._trees:
-            self._trees[path] = _parse(path)
-        return self._trees[path]
+    def _facts_of(self, path: Path) -> _Facts:
+        if path not in self._facts:
+            stat = path.stat()
+            stamp = [stat.st_size, stat.st_mtime_ns]
+            known = self._remembered.get(str(path.relative_to(self.root)))
+            if known and known["stamp"] == stamp:
+                self._facts[path] = _Facts(**known)
+            else:
+                tree = _parse(path)
+                names = sorted(set(_imported_names(tree, _package_of(path, self._source))))
+                digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+                self._facts[path] = _Facts(stamp, digest, names)
+        return self._facts[path]
+
+    def _files_of(self, name: str) -> list[Path]:
+        if name not in self._files:
+            self._files[name] = list(_files_of(name, self._source))
+        return self._files[name]
 
 
-def _imported_names(tree: ast.Module, package: str, source: Path) -> Iterator[str]:
-    """Dotted names of the library that a file mentions, found anywhere in it."""
+@dataclass(frozen=True)
+class _Facts:
+    """What one file says: its size and time of change, the hash of its syntax tree, the modules it names."""
+
+    stamp: list[int]
+    digest: str
+    names: list[str]
+
+
+def _made_by() -> list[str]:
+    """What a memory depends on beside the files: Python's syntax trees and this module."""
+    return [sys.version, hashlib.sha256(Path(__file__).read_bytes()).hexdigest()]
+
+
+def _imported_names(tree: ast.Module, package: str) -> Iterator[str]:
+    """Dotted names of the library that a file mentions, found anywhere in it; `package.*` for a whole package."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -99,7 +140,7 @@ def _imported_names(tree: ast.Module, package: str, source: Path) -> Iterator[st
         else:
             continue
         if "pkgutil" in names and package:
-            yield from _whole_package(package, source)
+            yield f"{package}.*"
         yield from (name for name in names if name.split(".")[0] == PACKAGE)
 
 
@@ -121,19 +162,16 @@ def _package_of(path: Path, source: Path) -> str:
     return ".".join(path.parent.relative_to(source).parts) if path.is_relative_to(source) else ""
 
 
-def _whole_package(package: str, source: Path) -> Iterator[str]:
-    for file in sorted((source / Path(*package.split("."))).rglob("*.py")):
-        yield ".".join(file.relative_to(source).with_suffix("").parts).removesuffix(".__init__")
-
-
 def _files_of(name: str, source: Path) -> Iterator[Path]:
     """Files that importing `name` runs: the packages on the way and the module itself, where they exist."""
-    parts = name.split(".")
+    parts = name.removesuffix(".*").split(".")
     for depth in range(1, len(parts) + 1):
         place = source.joinpath(*parts[:depth])
         for file in (place / "__init__.py", place.with_suffix(".py")):
             if file.is_file():
                 yield file
+    if name.endswith(".*"):
+        yield from sorted(source.joinpath(*parts).rglob("*.py"))
 
 
 def _parse(path: Path) -> ast.Module:

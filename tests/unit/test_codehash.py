@@ -1,6 +1,7 @@
 """The code hash reacts to what runs and to nothing else."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -106,3 +107,37 @@ def test_a_notebooks_code_cells_count_and_its_text_does_not(project: Path) -> No
 def test_a_script_that_is_not_there_is_named(project: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"there is no file .*nowhere\.py"):
         Code(project).of("workflow/scripts/nowhere.py")
+
+
+def test_a_memory_changes_no_answer_and_sees_every_edit(project: Path, tmp_path: Path) -> None:
+    memory = tmp_path / "kept" / "code.json"
+    code = Code(project, memory)
+    first = code.of("workflow/scripts/fit.py")
+    code.remember()
+    assert first == Code(project).of("workflow/scripts/fit.py")
+    assert Code(project, memory).of("workflow/scripts/fit.py") == first
+    edit(project, "src/rotorid/constants.py", "9.81", "9.82")
+    assert Code(project, memory).of("workflow/scripts/fit.py") == Code(project).of("workflow/scripts/fit.py")
+    assert Code(project, memory).of("workflow/scripts/fit.py") != first
+
+
+def test_a_memory_is_what_answers(project: Path, tmp_path: Path) -> None:
+    memory = tmp_path / "code.json"
+    code = Code(project, memory)
+    first = code.of("workflow/scripts/fit.py")
+    code.remember()
+    # Same size, same time of change, other content: only a memory can still give the first answer.
+    path = project / "src/rotorid/constants.py"
+    stat = path.stat()
+    path.write_text("G = 9.99\n")
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert Code(project, memory).of("workflow/scripts/fit.py") == first
+
+
+def test_a_spoilt_memory_is_made_anew(project: Path, tmp_path: Path) -> None:
+    memory = tmp_path / "code.json"
+    memory.write_text('{"files": ')
+    code = Code(project, memory)
+    assert code.of("workflow/scripts/fit.py") == Code(project).of("workflow/scripts/fit.py")
+    code.remember()
+    assert json.loads(memory.read_text())["files"]

@@ -8,7 +8,7 @@ from rotorid.codehash import Code
 from rotorid.config import ConfigError, check
 
 ROOT = Path(workflow.basedir)
-CODE = Code(ROOT)
+CODE = Code(ROOT, memory=".snakemake/code.json")
 
 try:
     CONFIG = check(config)
