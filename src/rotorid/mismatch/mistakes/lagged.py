@@ -256,9 +256,9 @@ def fit(
         score = cross_b[:, j] - gram_b[:, j] @ beta[j]
         spread = inverse @ (score.T @ score) @ inverse * count / (count - 1)
         sd[j] = np.sqrt(np.maximum(np.diag(spread), np.diag(inverse)))
-    # The delay's derivative -i 2π f M X is orthogonal to every real multiple of X itself.
+    # The delay's derivative -i 2π f M X is orthogonal to every real multiple of X itself, but not to Z.
     model = (blocks.x * phase[:, :, None]) @ beta[:, :p].T
-    turn = -2j * np.pi * frequency[None, :, None] * model
+    turn = beyond_nuisances(-2j * np.pi * frequency[None, :, None] * model, blocks.z, weight)
     w = weight.T[None]
     score = np.real(np.sum(w * turn.conj() * left, axis=(1, 2)))
     curvature = float(np.sum(w * np.abs(turn) ** 2))
@@ -267,6 +267,19 @@ def fit(
     rest = blocks.y - blocks.z @ without.T
     explained = 1 - np.sum(w * np.abs(left) ** 2, axis=(0, 1)) / np.sum(w * np.abs(rest) ** 2, axis=(0, 1))
     return LaggedFit(float(lag), lag_sd, beta[:, :p], sd[:, :p], explained, weight, beta[:, p:], count)
+
+
+def beyond_nuisances(turn: np.ndarray, z: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """A delay's derivative (b, m, q) without what the nuisances Z could take over (damping looks like a lead)."""
+    if not z.shape[2]:
+        return turn
+    out = np.empty_like(turn)
+    for j in range(turn.shape[2]):
+        w = weight[j][None, :, None]
+        gram = np.real(np.einsum("bmk,bml->kl", z.conj() * w, z))
+        cross = np.real(np.einsum("bmk,bm->k", z.conj() * w, turn[:, :, j]))
+        out[:, :, j] = turn[:, :, j] - z @ (np.linalg.pinv(gram, hermitian=True) @ cross)
+    return out
 
 
 def _peak(at: np.ndarray, score: np.ndarray) -> float:

@@ -181,6 +181,7 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: 
     # Newton's steps to the peak itself, and the likelihood's shape there.
     model = (blocks.x * phase[:, :, None]) @ found.gain.T
     turn = -2j * np.pi * blocks.frequency_hz[None, :, None] * model
+    turn = lagged.beyond_nuisances(turn, blocks.z, found.weight)
     left = blocks.y - model - blocks.z @ found.nuisance.T
     weight = found.weight.T[None]
     slope = np.real(np.sum(weight * turn.conj() * left, axis=(1, 2)))
