@@ -49,7 +49,8 @@ class Flight:
         self.vehicle = quad()
         count = int((duration_s + 2.0) * DENSE_HZ)
         t = np.arange(count) / DENSE_HZ
-        angles = np.stack([smooth(rng, count, s * excitation, f) for s, f in ((0.4, 1.5), (0.15, 4.0), (0.15, 4.0))], 1)
+        sizes = ((0.25, 1.0), (0.06, 3.0), (0.06, 3.0))
+        angles = np.stack([smooth(rng, count, size * excitation, highest) for size, highest in sizes], axis=1)
         rotation = Rotation.from_euler("ZYX", angles)
         q = rotation.as_quat()[:, [3, 0, 1, 2]]
         q *= np.where(np.einsum("ij,ij->i", q, np.roll(q, 1, axis=0)) < 0, -1.0, 1.0)[:, None]

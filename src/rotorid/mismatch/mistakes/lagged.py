@@ -22,6 +22,8 @@ OVERSAMPLING = 5.0
 """Rate of the thinned signals over the cutoff."""
 PERFECTION = 1e-3
 """Share of an output's own power that is always taken as noise: files hold columns computed from each other."""
+OVERLAP = 1.94
+"""Neighbouring frequencies of a Hann window are correlated: sums of squares vary by this more."""
 FEWEST_BLOCKS = 4
 LONGEST_LAG_S = 0.15
 
@@ -155,6 +157,32 @@ def noise_weight(blocks: Blocks, left: np.ndarray) -> np.ndarray:
     return 1.0 / (power + PERFECTION * own + 1e-30)
 
 
+def coherence(blocks: Blocks) -> np.ndarray:
+    """Share of every output's power at each frequency that X explains with any gain and phase, (q, m).
+
+    What chance would explain is taken off. Where only noise is left in X, its size must not shrink the gains.
+    """
+    x, y, width = blocks.x, blocks.y, 5
+    sxx = _around(np.einsum("bmk,bml->mkl", x.conj(), x), width)
+    sxy = _around(np.einsum("bmk,bmj->mkj", x.conj(), y), width)
+    syy = _around(np.sum(np.abs(y) ** 2, axis=0), width)
+    size = np.sqrt(np.real(np.einsum("mkk->mk", sxx)) + 1e-300)
+    scaled = sxx / size[:, :, None] / size[:, None, :] + 1e-9 * np.eye(x.shape[2])
+    cross = sxy / size[:, :, None]
+    share = np.real(np.einsum("mkj,mkj->mj", cross.conj(), np.linalg.solve(scaled, cross))) / (syy + 1e-300)
+    rank = np.mean(np.sum(np.linalg.eigvalsh(scaled) > 1e-3, axis=1))
+    chance = min(0.9, rank * OVERLAP / (width * blocks.count))
+    return np.clip((share - chance) / (1 - chance), 0.0, 1.0).T
+
+
+def _around(values: np.ndarray, width: int) -> np.ndarray:
+    """Running mean along axis 0 over a number of frequencies."""
+    width = min(width, len(values))
+    pad = [(width // 2, width - 1 - width // 2)] + [(0, 0)] * (values.ndim - 1)
+    padded = np.pad(values, pad, mode="edge")
+    return sum(padded[k : k + len(values)] for k in range(width)) / width
+
+
 def _moments(blocks: Blocks, weight, transfer):
     """Normal equations of every block: (b, q, K, K), (b, q, K)."""
     x = np.concatenate([blocks.x * transfer[:, :, None], blocks.z], axis=2)
@@ -191,7 +219,8 @@ def fit(
     if lags_s is None:
         step = 1.0 / (8 * frequency[-1])
         lags_s = np.arange(-LONGEST_LAG_S, LONGEST_LAG_S + step / 2, step)
-    weight = noise_weight(blocks, blocks.y)
+    trusted = coherence(blocks) + 1e-6
+    weight = trusted * noise_weight(blocks, blocks.y)
     for _ in range(2):
         scores = []
         for lag in lags_s:
@@ -212,7 +241,7 @@ def fit(
         beta = _solve(gram, cross)
         x = np.concatenate([blocks.x * phase[:, :, None], blocks.z], axis=2)
         left = blocks.y - x @ beta.T
-        new = noise_weight(blocks, left)
+        new = trusted * noise_weight(blocks, left)
         lags_s = lags_s if len(lags_s) == 1 else lag + np.linspace(-3, 3, 13) * (lags_s[1] - lags_s[0])
         weight = new
     gram_b, cross_b = _moments(blocks, weight, phase)
@@ -227,9 +256,9 @@ def fit(
         score = cross_b[:, j] - gram_b[:, j] @ beta[j]
         spread = inverse @ (score.T @ score) @ inverse * count / (count - 1)
         sd[j] = np.sqrt(np.maximum(np.diag(spread), np.diag(inverse)))
-    # The delay's derivative -i 2π f M X is orthogonal to every real multiple of X itself.
+    # The delay's derivative -i 2π f M X is orthogonal to every real multiple of X itself, but not to Z.
     model = (blocks.x * phase[:, :, None]) @ beta[:, :p].T
-    turn = -2j * np.pi * frequency[None, :, None] * model
+    turn = beyond_nuisances(-2j * np.pi * frequency[None, :, None] * model, blocks.z, weight)
     w = weight.T[None]
     score = np.real(np.sum(w * turn.conj() * left, axis=(1, 2)))
     curvature = float(np.sum(w * np.abs(turn) ** 2))
@@ -238,6 +267,19 @@ def fit(
     rest = blocks.y - blocks.z @ without.T
     explained = 1 - np.sum(w * np.abs(left) ** 2, axis=(0, 1)) / np.sum(w * np.abs(rest) ** 2, axis=(0, 1))
     return LaggedFit(float(lag), lag_sd, beta[:, :p], sd[:, :p], explained, weight, beta[:, p:], count)
+
+
+def beyond_nuisances(turn: np.ndarray, z: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """A delay's derivative (b, m, q) without what the nuisances Z could take over (damping looks like a lead)."""
+    if not z.shape[2]:
+        return turn
+    out = np.empty_like(turn)
+    for j in range(turn.shape[2]):
+        w = weight[j][None, :, None]
+        gram = np.real(np.einsum("bmk,bml->kl", z.conj() * w, z))
+        cross = np.real(np.einsum("bmk,bm->k", z.conj() * w, turn[:, :, j]))
+        out[:, :, j] = turn[:, :, j] - z @ (np.linalg.pinv(gram, hermitian=True) @ cross)
+    return out
 
 
 def _peak(at: np.ndarray, score: np.ndarray) -> float:

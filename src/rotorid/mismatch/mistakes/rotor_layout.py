@@ -18,7 +18,7 @@ from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Result, Turn, apply_turn, axis_finding, signals_of
-from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit, Signal
+from rotorid.mismatch.mistakes.lagged import OVERLAP, Blocks, LaggedFit, Signal
 from rotorid.mismatch.mistakes.signals import Signals, replace_columns, sensor_columns
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
@@ -29,8 +29,6 @@ LEAST_LIKELIHOOD = 25.0
 LEAST_ADVANTAGE = 1.5
 """What the right layout explains over what the believed one explains, at least."""
 LEAST_STEP = 0.6
-OVERLAP = 1.94
-"""Neighbouring frequencies of a Hann window are correlated: sums of squares vary by this more."""
 P_LIMIT = 1e-6
 TIED_LIKELIHOOD, TIED_SHARE = 12.0, 0.02
 """Layouts within this log-likelihood, or this share of what is explained, are not told apart."""

@@ -43,6 +43,9 @@ COARSE_SKEWS = 6
 COARSE_LAGS_S = np.arange(-0.12, 0.121, 0.01)
 MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 LAG_STEP_S = 0.001
+DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
+UNDECIDED = 12.0
+"""Motor lags within this log-likelihood are not told apart."""
 LATE_FLOOR_S = 2e-5
 
 
@@ -118,20 +121,30 @@ def comparisons(all_signals: list[Signals], vehicle: Vehicle) -> list[tuple[str,
 
 def _through_motor(blocks: Blocks) -> tuple[float, Blocks]:
     """Commands replaced by what a first-order motor makes of them, its time constant fitted beside the delay."""
-    best = (-np.inf, 0.0, blocks)
     base = lagged.fit(blocks)
     if base is None:
         return 0.0, blocks
-    for tau in MOTOR_LAGS_S:
+    trials = {}
+
+    def attempt(tau):
         through = 1.0 / (1.0 + 2j * np.pi * blocks.frequency_hz * tau)
-        trial = Blocks(
-            blocks.frequency_hz, blocks.y, blocks.x * through[None, :, None], blocks.z, blocks.run, blocks.time_s
-        )
-        found = lagged.fit(trial, np.arange(-0.03, 0.061, 0.005))
-        left = np.sum(lagged.loss_by_block(trial, _weighted(found, base), found.gain, found.lag_s))
-        if -left > best[0]:
-            best = (-left, tau, trial)
-    return best[1:]
+        trial = replace(blocks, x=blocks.x * through[None, :, None])
+        found = lagged.fit(trial, DEAD_TIMES_S)
+        left = float(np.sum(lagged.loss_by_block(trial, _weighted(found, base), found.gain, found.lag_s)))
+        trials[float(tau)] = (left, abs(found.lag_s), trial)
+
+    for tau in MOTOR_LAGS_S:
+        attempt(tau)
+    for width in (0.09, 0.03):
+        best = min(trials, key=lambda tau: trials[tau][0])
+        for factor in (1 - width, 1 - width / 2, 1 + width / 2, 1 + width):
+            attempt(best * factor)
+    best = min(trials, key=lambda tau: trials[tau][0])
+    # Slow motion cannot tell a lag from a dead time: where it fits as well with hardly any, there is none.
+    plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + UNDECIDED]
+    least = min(plausible, key=lambda tau: trials[tau][1])
+    chosen = least if trials[least][1] < 0.5 * trials[best][1] else best
+    return chosen, trials[chosen][2]
 
 
 def _weighted(found: LaggedFit, base: LaggedFit) -> LaggedFit:
@@ -168,6 +181,7 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: 
     # Newton's steps to the peak itself, and the likelihood's shape there.
     model = (blocks.x * phase[:, :, None]) @ found.gain.T
     turn = -2j * np.pi * blocks.frequency_hz[None, :, None] * model
+    turn = lagged.beyond_nuisances(turn, blocks.z, found.weight)
     left = blocks.y - model - blocks.z @ found.nuisance.T
     weight = found.weight.T[None]
     slope = np.real(np.sum(weight * turn.conj() * left, axis=(1, 2)))
@@ -471,6 +485,15 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
         right = [d for d in found if not ({d.late, d.over} & ({n for n, _ in wrong} - set(cluster)))]
         amount, sd = across(right or found, cluster, 0)
         everywhere = cluster + (["position"] if {"velocity", "attitude"} <= set(cluster) else [])
+        nearly, steps = recordings, round(amount / sample) * sample
+        for sensor in everywhere:
+            nearly = shifted(nearly, sensor, steps, 0.0)
+        again = differences(comparisons(signals_of(nearly), recordings.vehicle), drifting=False)
+        again = [d for d in again if not ({d.late, d.over} & ({n for n, _ in wrong} - set(cluster)))]
+        if any((d.late in cluster) != (d.over in cluster) for d in again):
+            # Measured once more from close by, where the blocks of the two sensors hold the same motion.
+            rest, sd = across(again, cluster, 0)
+            amount = steps + rest
         for sensor in everywhere:
             fixed = shifted(fixed, sensor, amount, 0.0)
         word = "late" if amount > 0 else "early"

@@ -26,7 +26,7 @@ ORDERS = (1, 2)
 P_LIMIT = 1e-9
 LEAST_AMPLITUDE = 0.5
 """Line over the reading's own scatter beside it (one sigma a sample), at least, to matter."""
-LOWEST_HZ = 12.0
+LOWEST_HZ = 8.0
 """Aliases below this fall among the flight's own motion and are left out."""
 
 
@@ -87,13 +87,15 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
         if length < 24:
             continue
         line, beside, crowd, floor = demodulated(s, sensor, axis, order, length)
-        good = np.isfinite(line).all(axis=1) & np.isfinite(beside).all(axis=1) & (beside.min(axis=1) > 0)
+        seen = np.isfinite(line) & np.isfinite(beside) & (beside > 0)
+        good = seen.any(axis=1)
         if not good.any():
             continue
+        line, beside, crowd, floor = (np.where(seen, values, np.nan) for values in (line, beside, crowd, floor))
         # Rotors at nearly one speed see the same line: count each window once, by their mean.
-        ratios.append((line[good] / beside[good]).mean(axis=1))
-        powers.append(((line - beside)[good] / crowd[good]).mean(axis=1))
-        levels.append(floor[good].mean(axis=1))
+        ratios.append(np.nanmean(line[good] / beside[good], axis=1))
+        powers.append(np.nanmean((line - beside)[good] / crowd[good], axis=1))
+        levels.append(np.nanmean(floor[good], axis=1))
         lengths.append(np.full(good.sum(), length))
     if not ratios or sum(map(len, ratios)) < 20:
         return None
