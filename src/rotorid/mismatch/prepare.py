@@ -215,7 +215,7 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
 
 
 def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, np.ndarray]]):
-    """Force and moment of the baseline plus effects, native rate, for the value columns."""
+    """Force and moment of the baseline plus effects, native rate, for the accelerations in regressors."""
     force, arm, torque = baseline_wrench(segment.motion, vehicle)
     total = {"force": force, "moment": arm + torque}
     for form, values in effects:
@@ -227,8 +227,13 @@ def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, n
     return total
 
 
-def with_predictions(segment: Segment, vehicle: Vehicle, model: dict[str, np.ndarray]) -> Segment:
+def with_predictions(
+    segment: Segment, vehicle: Vehicle, model: dict[str, np.ndarray], reading: dict[str, np.ndarray] | None = None
+) -> Segment:
     """The segment with the accelerations that the model predicts, for use in regressors.
+
+    `reading` is what the accelerometer's own errors multiply (the model where None): without a second source a
+    scale error of readings that an effect makes would be that effect's exact copy.
 
     The measured ones are the response itself: a column s·a beside a response m·a fits anything perfectly, and
     the noise of a differentiated body rate would bias every coefficient that multiplies it.
@@ -237,7 +242,7 @@ def with_predictions(segment: Segment, vehicle: Vehicle, model: dict[str, np.nda
     if motion.specific_force is not None:
         changed["specific_force"] = model["force"] / vehicle.mass_kg
         if motion.accelerometer is not None:
-            changed["accelerometer"] = changed["specific_force"]
+            changed["accelerometer"] = (model if reading is None else reading)["force"] / vehicle.mass_kg
     if motion.angular_acceleration is not None:
         inertia, rate = vehicle.inertia_kg_m2.matrix(), motion.angular_velocity
         changed["angular_acceleration"] = (model["moment"] - np.cross(rate, rate @ inertia)) @ np.linalg.inv(inertia)
@@ -270,8 +275,10 @@ def assemble_rows(
     effects: list[tuple[Form, np.ndarray]] | None = None,
     measured_moment: bool = False,
 ) -> list[Rows]:
-    """Rows of every segment for the given terms; `effects` only shape the value columns.
+    """Rows of every segment for the given terms; `effects` only shape the accelerations in regressors.
 
+    The columns of believed values are built on the baseline alone: with effects in them, a thrust and a mass that
+    grow together would leave a copy of the effects for themselves, and loose trust in values would swallow physics.
     `measured_moment` puts the measured moments into the value columns in place of the predicted ones.
     """
     vehicle, groups = prepared.vehicle, prepared.groups
@@ -282,8 +289,9 @@ def assemble_rows(
         if measured_moment and "moment" in groups:
             reverse = moment_of(segment, vehicle)
         if segment.motion.rotor_speed is not None:
-            model = model_wrench(segment, vehicle, effects or [])
-            segment = with_predictions(segment, vehicle, model)
+            model = model_wrench(segment, vehicle, [])
+            known = model_wrench(segment, vehicle, effects) if effects else model
+            segment = with_predictions(segment, vehicle, known, None if "accelerometer" in groups else model)
         for term in terms:
             if term.run and term.run != segment.run:
                 columns += [{}] * term.size
