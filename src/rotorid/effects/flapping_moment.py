@@ -25,14 +25,14 @@ def forms(vehicle):
         Form(
             "at the hubs",
             "M = k_flap Σ ω_i (e3 × v_i)",
-            (Parameter("k_flap", "N m s2/(rad m)"),),
+            (Parameter("k_flap", "N m s2/(rad m)", 0.0),),
             hub_moment,
             ("velocity", "rotor_speed"),
         ),
         Form(
             "independent of rotor speed",
             "M = k_m (e3 × v)",
-            (Parameter("k_m", "N s"),),
+            (Parameter("k_m", "N s", 0.0),),
             independent_of_speed,
             ("velocity",),
         ),

@@ -35,9 +35,34 @@ def rigid(motion, vehicle, values):
     return Contribution(force=-mass_kg * motion.specific_force, moment=-np.cross(lever, motion.specific_force))
 
 
+def rigid_with_inertia(motion, vehicle, values):
+    """The rigid payload and the products of inertia that it brings (its moments of inertia count as values)."""
+    extra = np.zeros((3, 3))
+    extra[0, 1], extra[0, 2], extra[1, 2] = values[3:]
+    extra += extra.T
+    rate = motion.angular_velocity
+    turning = motion.angular_acceleration @ extra + np.cross(rate, rate @ extra)
+    carried = rigid(motion, vehicle, values[:3])
+    return Contribution(force=carried.force, moment=carried.moment - turning)
+
+
 def forms(vehicle):
     mass = vehicle.mass_kg or 1.0
+    bound = 1.0 if vehicle.inertia_kg_m2 is None else vehicle.inertia_kg_m2.zz
     return (
+        Form(
+            "rigid with its products of inertia",
+            "F = −m_p a, M = −m_p r × a − (E dΩ/dt + Ω × E Ω)",
+            (
+                Parameter("m_p", "kg", 0.0, 2 * mass),
+                Parameter("m_p x", "kg m"),
+                Parameter("m_p y", "kg m"),
+                *(Parameter(name, "kg m2", -bound, bound) for name in ("J_xy", "J_xz", "J_yz")),
+            ),
+            rigid_with_inertia,
+            ("specific_force", "angular_velocity", "angular_acceleration"),
+            must_show=(0,),
+        ),
         Form(
             "rigid",
             "F = −m_p a, M = −m_p r × a",

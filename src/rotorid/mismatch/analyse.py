@@ -99,7 +99,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         reverse_regression(prepared, model, segments),
         size,
     )
-    findings = [payload_or_offset(f, values) for f in findings]
+    findings = payload_or_offset(findings, values)
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
     if model.wind is None:
@@ -216,13 +216,21 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
     return out
 
 
-def payload_or_offset(finding: Finding, values: dict) -> Finding:
-    """A centre of mass off its place on a vehicle that is heavier than believed may be a payload as well."""
+def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
+    """A centre of mass off its place on a vehicle that is heavier than believed may be a payload as well.
+
+    The payload would bring products of inertia along: found beside such an offset they belong to the same question.
+    """
     heavier = values.get("mass", (0.0, 0.0))[0] > 0 or values.get("thrust", (0.0, 0.0))[0] < 0
-    if finding.id != "com_offset" or finding.status not in ("established", "ambiguous") or not heavier:
-        return finding
-    both = tuple(sorted({"com_offset", "payload", *finding.alternatives}))
-    return replace(finding, status="ambiguous", alternatives=both)
+    stated = {f.id for f in findings if f.status in ("established", "ambiguous")}
+    if "com_offset" not in stated or not heavier:
+        return findings
+    out = []
+    for f in findings:
+        if f.id in ("com_offset", "inertia_products") and f.id in stated:
+            f = replace(f, status="ambiguous", alternatives=tuple(sorted({f.id, "payload", *f.alternatives})))
+        out.append(f)
+    return out
 
 
 def throttle_or_thrust(finding: Finding) -> Finding:

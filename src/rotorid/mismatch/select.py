@@ -149,30 +149,49 @@ class Search:
         return max(judged, key=lambda c: c.score).key
 
     def simpler(self, active: list[str]) -> list[str] | None:
-        """A model with one id less and another form of one that stays, if it explains nearly as much.
+        """A model with one id less and other forms of those that stay, if it explains nearly as much.
 
-        Drag at the hubs, for example, is the same as drag at the centre of mass with a yaw damping beside it.
+        Drag and inflow at the hubs, for example, are the same as at the centre of mass with a damping beside them.
         """
         if len(active) < 2:
             return None
-
-        def worth(keys: list[str]) -> float:
-            parameters = sum(self.terms[k].size for k in keys)
-            gain = self.regression.fit(self.always + keys).gain
-            return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys)
-
-        best, found = worth(active), None
+        best, found = self.worth(active), None
         for gone in active:
-            for stays in active:
-                if stays == gone or self.terms[stays].run or self.terms[gone].run:
-                    continue
-                for other in self.terms.values():
-                    if other.kind != "effect" or other.effect != self.terms[stays].effect:
+            if self.terms[gone].run:
+                continue
+            trial = [k for k in active if k != gone]
+            value = self.worth(trial)
+            for place in 2 * [i for i, k in enumerate(trial) if not self.terms[k].run]:
+                for form in self.terms.values():
+                    if form.kind != "effect" or form.effect != self.terms[trial[place]].effect:
                         continue
-                    trial = [other.key if k == stays else k for k in active if k != gone]
-                    value = worth(trial)
-                    if value > best and self._all_physical(trial):
-                        best, found = value, trial
+                    other = [*trial[:place], form.key, *trial[place + 1 :]]
+                    if (worth := self.worth(other)) > value:
+                        trial, value = other, worth
+            if value > best and self._all_physical(trial):
+                best, found = value, trial
+        return found
+
+    def worth(self, keys: list[str]) -> float:
+        """Whitened squares that a model explains, less what its parameters and ids cost."""
+        parameters = sum(self.terms[k].size for k in keys)
+        gain = self.regression.fit(self.always + keys).gain
+        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys)
+
+    def swapped(self, active: list[str]) -> list[str] | None:
+        """A model with one id in another's place, if it is worth more: the first to enter may be an imitation."""
+        taken = {self.terms[k].effect for k in active}
+        best, found = self.worth(active) + COST_PER_EFFECT, None
+        for gone in active:
+            if self.terms[gone].run:
+                continue
+            for other in self.terms.values():
+                if other.kind != "effect" or other.run or other.effect in taken:
+                    continue
+                trial = [other.key if k == gone else k for k in active]
+                value = self.worth(trial)
+                if value > best and self._all_physical(trial):
+                    best, found = value, trial
         return found
 
     def _all_physical(self, active: list[str]) -> bool:
@@ -229,23 +248,23 @@ class Search:
                     active += pair
                     trail.append(f"+ {' and '.join(pair)} together")
                     grown = True
-            changed = grown
             for key in list(active):
                 better = self.best_form(key, active)
                 if better != key:
                     active[active.index(key)] = better
                     trail.append(f"  {key} → {better}")
-                    changed = True
             if (simpler := self.simpler(active)) is not None:
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
-                active, changed = simpler, True
+                active = simpler
+            if not grown and (swapped := self.swapped(active)) is not None:
+                trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(swapped)}")
+                active, grown = swapped, True
             while (weak := self.weak(active)) is not None:
                 key, reason = weak
                 active.remove(key)
                 dropped[self.terms[key].effect] = reason
                 trail.append(f"- {key}: {reason}")
-                changed = True
-            if not changed or not grown:
+            if not grown:
                 break
         while (failed := self.failed_held_out(active)) is not None:
             active.remove(failed)

@@ -20,7 +20,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import SpeedForm, SpeedPath
 from rotorid.effects.delay import shifted
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.regression import at_least, autoregression
+from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
 from rotorid.signal import kernels
 
 ENTER_P = 1e-5
@@ -120,6 +120,7 @@ class SpeedProblem:
     rate_hz: float = 0.0
 
     def whitened(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
+        """Whitened residual of every segment, (n, channels), and after them what priors add to the squares."""
         out = []
         for part in self.raw(chain, values, shift_s):
             if self.filters is None:
@@ -222,7 +223,9 @@ class WrenchOnly(SpeedProblem):
         gram = sum(np.einsum("ncp,ncq->pq", c, c) for c in columns) + np.diag(self.precision)
         cross = sum(np.einsum("ncp,nc->p", c, r) for c, r in zip(columns, rows, strict=True))
         beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) / size * np.eye(size), cross)
-        return [r - c @ beta for r, c in zip(rows, columns, strict=True)]
+        # What a chain's gain and the believed values could share goes to the chain: the values pay for moving.
+        moved = (np.sqrt(self.precision) * beta)[:, None]
+        return [*(r - c @ beta for r, c in zip(rows, columns, strict=True)), moved]
 
     def _white_columns(self):
         key = (id(self.filters), id(self.columns))
@@ -325,7 +328,10 @@ class SpeedSearch:
         count = own.stop - own.start
         inflation = fit.inflation
         gain = (base.cost - fit.cost) / inflation
-        return float(chi2.sf(max(gain, 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
+        # What the fit gains and what its parameters are sure of must agree: the shift in time bends the first.
+        away = fit.values[own] - np.array(fit.of(key)[0].neutral)
+        sure = gain if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
+        return float(chi2.sf(max(min(gain, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
 
     def run(self) -> SpeedResult:
         """The whole search."""
