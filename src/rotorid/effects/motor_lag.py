@@ -50,7 +50,7 @@ EFFECT = Effect(
     sentence="rotor speed follows its command late and smoothed",
     forms=lambda vehicle: (),
     speed_forms=(
-        SpeedForm("one constant", "dω/dt = (ω_c − ω)/τ", (_tau("tau"),), 4, one_constant, (0.0,)),
+        SpeedForm("one constant", "dω/dt = (ω_c − ω)/τ", (_tau("tau"),), 4, one_constant, (0.0,), excited_by="change"),
         SpeedForm(
             "up and down",
             "dω/dt = (ω_c − ω)/τ_up or τ_down",
@@ -58,10 +58,16 @@ EFFECT = Effect(
             4,
             up_and_down,
             (0.0, 0.0),
+            excited_by="change",
         ),
-        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), 4, on_thrust, (0.0,)),
+        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), 4, on_thrust, (0.0,), excited_by="change"),
     ),
-    source="physics.md F1; Quan, Introduction to Multicopter Design and Control, ch. 6",
+    source="Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F1",
+    sign="positive τ follows later; τ_up for speeds that grow, τ_down for speeds that fall",
+    validity=(
+        "first order, the same for all rotors, amplitudes below the speed controllers' rate limits; "
+        "below about 2 Hz it equals a delay"
+    ),
     confusers=("delay", "throttle_curve"),
     separating_manoeuvre="excite collective and attitude up to 8 Hz, or record rotor speeds",
 )
