@@ -12,12 +12,12 @@ def bias(motion, vehicle, values):
 
 def scale(motion, vehicle, values):
     """a_m = (1 + s) a per axis."""
-    return Contribution(specific_force=np.asarray(values) * motion.specific_force)
+    return Contribution(specific_force=np.asarray(values) * motion.accelerometer)
 
 
 def misalignment(motion, vehicle, values):
     """a_m = a + θ × a: the sensor is turned by small angles θ."""
-    return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.specific_force))
+    return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.accelerometer))
 
 
 def all_errors(motion, vehicle, values):
@@ -69,7 +69,7 @@ EFFECT = Effect(
         "are left out. With the accelerometer as only source of force, a bias equals a constant force "
         "and a scale error equals a wrong mass"
     ),
-    excited_by=("specific_force",),
+    excited_by=("accelerometer",),
     confusers=("thrust_tilt", "steady_wind"),
     separating_manoeuvre="a static six-face calibration, or record position beside the accelerometer",
     kind="sensor",

@@ -18,7 +18,7 @@ def _axes(sensor, names):
 
     parameters = tuple(Parameter(f"a_{a}", "1", -3.0, 3.0, meaning=f"axis that column {a} holds") for a in "xyz")
     equation = "column_i = sign(a_i) · component |a_i| (1, 2, 3 for x, y, z)"
-    return SetForm(f"of the {sensor}", equation, parameters, apply, (1.0, 2.0, 3.0), (1.0, -2.0, 3.0), names)
+    return SetForm(f"of the {sensor}", equation, parameters, apply, (1.0, 2.0, 3.0), (1.0, 2.0, -3.0), names)
 
 
 def _conjugated(recordings, values):

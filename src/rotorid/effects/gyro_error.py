@@ -28,7 +28,7 @@ def misalignment(motion, vehicle, values):
 
 
 def forms(vehicle):
-    needs = ("gyroscope", "rotation")
+    needs = ("gyroscope", "rotation", "angular_velocity", "angular_acceleration")
 
     def each(symbol, unit, low, high, meaning, negligible):
         return tuple(
@@ -39,7 +39,7 @@ def forms(vehicle):
     s = each("s", "1", -0.9, 2.0, "scale error about", 0.005)
     t = each("theta", "rad", -0.5, 0.5, "turn of the sensor about", 0.003)
     return (
-        Form("bias", "Ω_m = Ω + b", b, bias, needs, excited_by=("always",)),
+        Form("bias", "Ω_m = Ω + b", b, bias, needs[:2], excited_by=("always",)),
         Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs),
         Form("misalignment", "Ω_m = Ω + θ × Ω", t, misalignment, needs),
     )

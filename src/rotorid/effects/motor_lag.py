@@ -21,7 +21,9 @@ def _lag(command, up, down):
 
 
 def lagged(command, tau_up_s, tau_down_s, dt_s):
-    """dω/dt = (ω_c - ω)/τ, exact over a sample, shape (n, k)."""
+    """dω/dt = (ω_c - ω)/τ, exact over a sample, shape (n, k); no lag at all for time constants of zero."""
+    if tau_up_s <= 0.0 and tau_down_s <= 0.0:
+        return command
     up = 1.0 - np.exp(-dt_s / max(tau_up_s, 1e-5))
     down = 1.0 - np.exp(-dt_s / max(tau_down_s, 1e-5))
     return _lag(np.ascontiguousarray(command), up, down)

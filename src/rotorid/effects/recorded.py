@@ -36,7 +36,7 @@ def with_columns(recordings: RecordingSet, names: tuple[str, ...], change: Calla
     for run in recordings.runs:
         if run.has(*names):
             table = run.table.copy()
-            table[list(names)] = change(run, run.array(names))
+            table[list(names)] = change(run, run.array(names).copy())
             run = Run(run.name, table)
         runs.append(run)
     return replace(recordings, runs=tuple(runs))

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion, SpeedForm
 from rotorid.mismatch.motion import Segment
 from rotorid.recordings import Vehicle
@@ -56,10 +57,20 @@ def entry(effect_id: str, form, values) -> dict:
     return {"id": effect_id, "form": form.name, "parameters": parameters}
 
 
-def fly(entries=(), voltage_v=None) -> Trace:
-    """The flight of a vehicle whose file states some effects."""
-    stated = audit_vehicle(effects=tuple(entries))
-    return simulate_as_stated(stated, commands(), DURATION_S, STEP_S, voltage_v, start=start())
+_FLOWN: dict[str, Trace] = {}
+
+
+def fly(effect_id: str = "", form: Form | None = None) -> Trace:
+    """The flight of a vehicle whose file states one effect with its typical values, or none; flown once each."""
+    key = f"{effect_id}/{form.name if form else ''}"
+    if key not in _FLOWN:
+        effects = (entry(effect_id, form, typical_values(effect_id, form)),) if form else ()
+        if form and catalogue()[effect_id].kind == "sensor":
+            # Sideways forces, so that errors of the horizontal accelerometers show.
+            effects += ({"id": "rotor_drag", "form": "independent of rotor speed", "parameters": {"d": 0.5}},)
+        stated = audit_vehicle(effects=effects)
+        _FLOWN[key] = simulate_as_stated(stated, commands(), DURATION_S, STEP_S, start=start())
+    return _FLOWN[key]
 
 
 def motions(trace: Trace) -> list[Motion]:
@@ -74,7 +85,7 @@ def segment(motion: Motion, **changes) -> Segment:
 
 def typical_values(effect_id: str, form: Form | SpeedForm) -> np.ndarray:
     """Plain values of a form's parameters: a starting value of the nonlinear ones, a small share of the bounds else."""
-    share = {"gust": 2e-3, "payload": 0.05, "accelerometer_error": 0.02, "gyro_error": 0.05}.get(effect_id, 0.1)
+    share = {"gust": 2e-3, "payload": 0.05, "accelerometer_error": 0.02, "gyro_error": 0.02}.get(effect_id, 0.1)
     values = []
     for number, p in enumerate(form.parameters):
         if p.nonlinear:
