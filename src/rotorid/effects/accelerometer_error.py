@@ -12,12 +12,12 @@ def bias(motion, vehicle, values):
 
 def scale(motion, vehicle, values):
     """a_m = (1 + s) a per axis."""
-    return Contribution(specific_force=np.asarray(values) * motion.specific_force)
+    return Contribution(specific_force=np.asarray(values) * motion.accelerometer)
 
 
 def misalignment(motion, vehicle, values):
     """a_m = a + θ × a: the sensor is turned by small angles θ."""
-    return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.specific_force))
+    return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.accelerometer))
 
 
 def all_errors(motion, vehicle, values):

@@ -27,7 +27,7 @@ EFFECT = Effect(
             (Parameter("w_high", "ω_max", 0.3, 1.2, nonlinear=True, starts=(0.95, 0.9, 0.8, 0.7)),),
             2,
             upper,
-            (1.2,),
+            (1.0,),
         ),
         SpeedForm(
             "lower limit",
@@ -35,7 +35,7 @@ EFFECT = Effect(
             (Parameter("w_low", "ω_max", -0.1, 0.6, nonlinear=True, starts=(0.1, 0.2, 0.3)),),
             2,
             lower,
-            (-0.1,),
+            (0.0,),
         ),
     ),
     source="physics.md F25",

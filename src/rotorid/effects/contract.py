@@ -47,6 +47,8 @@ class Motion:
     """Velocity over ground, (n, 3), m/s, body axes."""
     wind: np.ndarray | None = None
     """Velocity of the air over ground, (3,) or (n, 3), m/s, world axes; None for still air."""
+    position: np.ndarray | None = None
+    """Position of the body origin, (n, 3), m, world axes."""
     height: np.ndarray | None = None
     """Height of the centre of mass above ground, (n,), m."""
     voltage: np.ndarray | None = None
@@ -217,6 +219,7 @@ class Effect:
 LACK = {
     "velocity": "no velocity or position recorded",
     "rotation": "no attitude recorded",
+    "position": "no position recorded",
     "height": "no height above ground",
     "voltage": "no battery voltage",
     "angular_velocity": "no body rates or attitude recorded",

@@ -24,7 +24,7 @@ EFFECT = Effect(
         SpeedForm(
             "of the command",
             "ω(t) = ω_c(t − T)",
-            (Parameter("T", "s", -0.05, 0.3, nonlinear=True, starts=(0.01, 0.03, 0.1)),),
+            (Parameter("T", "s", -0.05, 0.3, nonlinear=True, starts=(0.01, 0.03, 0.1), negligible=0.001),),
             3,
             shifted,
             (0.0,),

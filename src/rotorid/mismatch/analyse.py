@@ -22,6 +22,7 @@ from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, residual
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import (
     WrenchModel,
     chosen,
@@ -67,7 +68,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
 
     if model.wind is not None:
         findings.append(wind_finding(model))
-        segments = in_wind(segments, model.wind)
+        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
     if found is None:
         reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
     else:
@@ -109,7 +110,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in values.items()})
     traces = make_traces(prepared, model, found, measured, plain_values, values)
     before, after, depends = dependence(prepared, model, segments)
-    share, channels, description = leftover(prepared, model, segments, before, after, depends)
+    share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}
     return Analysis(
         recordings=recordings,
@@ -126,7 +127,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         regimes=regimes_by_run(segments, prepared),
         unexplained_share=share,
         unexplained_channels=channels,
-        unexplained_depends_on=tuple(depends),
+        unexplained_depends_on=depends,
         unexplained_description=description,
         force_source=segments[0].force_source,
         notes=tuple(notes),
@@ -251,7 +252,7 @@ def absorbed_findings(model: WrenchModel, values: dict, findings: list[Finding])
     taken = {f.id for f in findings}
     out: dict[str, Finding] = {}
     for term in model.regression.terms:
-        if term.kind != "effect" or term.effect in taken or term.effect in out:
+        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
             continue
         fit = model.regression.fit([*held, *model.selection.active, term.key])
         p = model.regression.wald(fit, model.regression.columns([term.key]), search.blocks)
@@ -326,6 +327,7 @@ def make_traces(
     loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
     plain = regression.fit(offsets_of(model) + list(plain_values), loose=loose)
     full = regression.fit(offsets_of(model) + list(values) + model.selection.active, loose=loose)
+    named = np.where(model.unnamed(full.columns), 0.0, full.beta)
     out = []
     for r, segment in zip(model.rows, prepared.segments, strict=True):
         before = r.y
@@ -336,7 +338,7 @@ def make_traces(
                 if group in groups:
                     before[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
         refitted = r.y - r.x[:, :, plain.columns] @ plain.beta
-        after = r.y - r.x[:, :, full.columns] @ full.beta
+        after = r.y - r.x[:, :, full.columns] @ named
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
                 unit = UNITS[CHANNELS[c].split("_")[0]]

@@ -13,6 +13,7 @@ from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
@@ -104,6 +105,8 @@ def wrench_findings(
     findings = []
     for key in selection.active:
         term = search.terms[key]
+        if term.effect in UNKNOWNS:
+            continue  # told as unexplained
         effect = effects[term.effect]
         beta, _ = coefficients(regression, selection.fit, key)
         rest = [k for k in selection.active if k != key]
@@ -139,6 +142,8 @@ def wrench_findings(
             )
         )
     for effect_id, reason in selection.not_established.items():
+        if effect_id in UNKNOWNS:
+            continue
         effect = effects[effect_id]
         findings.append(
             Finding(id=effect_id, status="not_established", sentence=f"{effect.name} did not hold: {reason}")

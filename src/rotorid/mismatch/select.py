@@ -8,10 +8,13 @@ import numpy as np
 
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 ENTER_P = 1e-4
 """A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
 KEEP_P = 1e-4
+FINAL_P = 1e-3
+"""The same with a jackknife over blocks, which no single moment of the flight can decide."""
 COST_PER_PARAMETER = 8.0
 """Whitened squares that each further parameter must explain before a richer form is preferred."""
 SMALLEST_SIZE = 0.15
@@ -20,6 +23,9 @@ SHARE_OF_LARGEST = 0.04
 """Nor does one below this share of the largest effect in its channel: no form is known better than that."""
 COST_PER_EFFECT = 20.0
 """Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
+COST_OF_UNKNOWN = 40.0
+"""Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
+SHARE_OF_UNKNOWN = 0.1
 ALTERNATIVE_P = 0.01
 """A term that beside an alternative is less significant than this could be that alternative instead."""
 MOST_EXTRA_PARAMETERS = 3
@@ -46,11 +52,14 @@ class Candidate:
     inflation: float
     physical: bool
     """Coefficients inside their bounds, and regressors that are more than their own noise."""
+    named: bool = True
+    """Whether it is of the catalogue."""
 
     @property
     def score(self) -> float:
         """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
-        return self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
+        score = self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
+        return score if self.named else (1 - SHARE_OF_UNKNOWN) * score - COST_OF_UNKNOWN * self.inflation
 
 
 @dataclass
@@ -105,7 +114,7 @@ class Search:
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         physical = physical and self.regression.noise_share(keys, key, beta) < MOST_ATTENUATION
-        return Candidate(key, beta, p_value, gain, inflation, physical)
+        return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
@@ -175,13 +184,14 @@ class Search:
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
         parameters = sum(self.terms[k].size for k in keys)
+        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
         gain = self.regression.fit(self.always + keys).gain
-        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys)
+        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def swapped(self, active: list[str]) -> list[str] | None:
         """A model with one id in another's place, if it is worth more: the first to enter may be an imitation."""
         taken = {self.terms[k].effect for k in active}
-        best, found = self.worth(active) + COST_PER_EFFECT, None
+        best, found = self.worth(active) + COST_PER_PARAMETER / 2, None
         for gone in active:
             if self.terms[gone].run:
                 continue
@@ -277,8 +287,15 @@ class Search:
             active.remove(unsteady)
             dropped[self.terms[unsteady].effect] = "it differs from run to run"
             trail.append(f"- {unsteady}: differs from run to run")
-        fit = self.regression.fit(self.always + active, jackknife=True)
-        final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
+        while True:
+            fit = self.regression.fit(self.always + active, jackknife=True)
+            final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
+            doubtful = max(active, key=lambda k: final[k], default=None)
+            if doubtful is None or final[doubtful] <= FINAL_P:
+                break
+            active.remove(doubtful)
+            dropped[self.terms[doubtful].effect] = f"p = {final[doubtful]:.2g} where each block has its say"
+            trail.append(f"- {doubtful}: fails the jackknife")
         kept = {self.terms[k].effect for k in active}
         return Selection(active, fit, final, trail, {e: r for e, r in dropped.items() if e not in kept})
 
@@ -359,7 +376,7 @@ class Search:
         for term in self.terms.values():
             if term.kind != "effect" or term.effect in taken or term.effect == self.terms[key].effect:
                 continue
-            if term.effect in found:
+            if term.effect in found or term.effect in UNKNOWNS:
                 continue
             other = self.judge(term.key, rest, self.without(key, active))
             if not other.physical or other.p_value > 1e-3 or other.gain < 0.5 * own.gain:

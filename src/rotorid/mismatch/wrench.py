@@ -24,6 +24,7 @@ from rotorid.mismatch.speedpath import (
     commanded_path,
     smoothed_acceleration,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 LONGEST_BLOCKS = 400
 
@@ -43,6 +44,11 @@ class WrenchModel:
     wind: np.ndarray | None = None
     """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
     wind_sd: np.ndarray | None = None
+
+    def unnamed(self, columns: np.ndarray) -> np.ndarray:
+        """Mask of the columns that belong to empirical terms, which no finding may count as its own."""
+        keys = [k for k in self.selection.active if self.search.terms[k].effect in UNKNOWNS]
+        return np.isin(columns, self.regression.columns(keys))
 
 
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:
