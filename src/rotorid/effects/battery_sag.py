@@ -51,7 +51,7 @@ EFFECT = Effect(
         SpeedForm(
             "drift in time",
             "ω = ω_c (1 − k t)",
-            (Parameter("k", "1/min", 0.0, 1.0, meaning="share of the speed lost per minute"),),
+            (Parameter("k", "1/min", 0.0, 1.0, meaning="share of the speed lost per minute", negligible=0.01),),
             1,
             drift,
             (0.0,),

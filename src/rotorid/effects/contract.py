@@ -48,6 +48,8 @@ class Motion:
     """Velocity over ground, (n, 3), m/s, body axes."""
     wind: np.ndarray | None = None
     """Velocity of the air over ground, (3,) or (n, 3), m/s, world axes; None for still air."""
+    position: np.ndarray | None = None
+    """Position of the body origin, (n, 3), m, world axes."""
     height: np.ndarray | None = None
     """Height of the centre of mass above ground, (n,), m."""
     voltage: np.ndarray | None = None
@@ -264,6 +266,7 @@ COLUMNS_OF = {
     "gyroscope": "angular_velocity_*_rad_s and quaternion_*",
     "rotation": "quaternion_*",
     "velocity": "velocity_*_m_s (or position_*_m) and quaternion_*",
+    "position": "position_*_m",
     "height": "height_m, or position_z_m where vehicle.yaml states ground_z_m",
     "voltage": "battery_voltage_v",
 }
@@ -272,6 +275,7 @@ COLUMNS_OF = {
 LACK = {
     "velocity": "no velocity or position recorded",
     "rotation": "no attitude recorded",
+    "position": "no position recorded",
     "height": "no height above ground",
     "voltage": "no battery voltage",
     "angular_velocity": "no body rates or attitude recorded",

@@ -31,7 +31,18 @@ EFFECT = Effect(
         SpeedForm(
             "of the command",
             "ω(t) = ω_c(t − T)",
-            (Parameter("T", "s", -0.05, 0.3, nonlinear=True, starts=(0.01, 0.03, 0.1), meaning="time behind"),),
+            (
+                Parameter(
+                    "T",
+                    "s",
+                    -0.05,
+                    0.3,
+                    nonlinear=True,
+                    starts=(0.01, 0.03, 0.1),
+                    meaning="time behind",
+                    negligible=0.001,
+                ),
+            ),
             3,
             shifted,
             (0.0,),

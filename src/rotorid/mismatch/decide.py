@@ -13,7 +13,10 @@ from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
+from rotorid.mismatch.unknowns import UNKNOWNS
 
+HELD_SD = 1e-5
+"""Values with a prior below this are held: these data cannot see them."""
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
 MOST_VALUES = 3
@@ -104,6 +107,8 @@ def wrench_findings(
     findings = []
     for key in selection.active:
         term = search.terms[key]
+        if term.effect in UNKNOWNS:
+            continue  # told as unexplained
         effect = effects[term.effect]
         beta, _ = coefficients(regression, selection.fit, key)
         rest = [k for k in selection.active if k != key]
@@ -139,6 +144,8 @@ def wrench_findings(
             )
         )
     for effect_id, reason in selection.not_established.items():
+        if effect_id in UNKNOWNS:
+            continue
         effect = effects[effect_id]
         findings.append(
             Finding(id=effect_id, status="not_established", sentence=f"{effect.name} did not hold: {reason}")
@@ -162,7 +169,7 @@ def wrong_values(
     units of the noise (`size_of(key, relative change)`).
     """
     nuisance = [t.key for t in regression.terms if t.kind in ("nuisance", "wind")]
-    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
+    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value" and t.prior_sd[0] > HELD_SD}
     always = nuisance + selection.active
     loose = {key: max(sd, WIDEST_TRUST) for key, sd in trust.items()}
     count = int(regression.training.sum())

@@ -35,8 +35,6 @@ class Segment:
     command: np.ndarray | None = None
     """Commanded rotor speeds, (n, k), rad/s; throttle times the upper limit where only throttle is recorded."""
     measured_speed: bool = True
-    position: np.ndarray | None = None
-    """World position, (n, 3), m."""
     extra: dict[str, np.ndarray] = field(default_factory=dict)
     """Unknown columns of the run, candidates for a regime variable."""
 
@@ -275,6 +273,7 @@ def build_segments(
             gyroscope=rate if gyro is not None and kinematic_rate is not None else None,
             rotation=rotation,
             velocity=body_velocity,
+            position=core(position),
             height=above,
             voltage=None if voltage is None else core(voltage)[:, 0],
         )
@@ -289,7 +288,6 @@ def build_segments(
                 kinematic_angular_velocity=kinematic_rate,
                 command=core(command),
                 measured_speed=measured,
-                position=core(position),
                 extra=extra,
             )
         )

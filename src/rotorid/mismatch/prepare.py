@@ -28,6 +28,7 @@ from rotorid.mismatch.rows import (
 from rotorid.mismatch.rows import (
     measured_moment as moment_of,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
@@ -160,7 +161,7 @@ def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[
     for key in OFFSETS:
         if partner[key] in groups:
             terms.append(Term(key, "nuisance", prior_sd=(0.5 * longest_sample,)))
-    for effect in catalogue().values():
+    for effect in (*catalogue().values(), *UNKNOWNS.values()):
         found, why = [], None
         for form in effect.forms(vehicle):
             reason = next((r for s in segments if (r := not_testable_reason(form, s.motion, vehicle))), None)
@@ -169,7 +170,7 @@ def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[
                 continue
             found += form_terms(effect.id, form)
         terms += found
-        if not found:
+        if not found and effect.id not in UNKNOWNS:
             reasons[effect.id] = why or "no column of the recording shows it"
     return terms, reasons
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 from scipy.stats import chi2, f
 
@@ -31,6 +32,10 @@ AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
 MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
+MOST_DISTRUST = 3.0
+"""Standard deviations of trust that a believed value may be off."""
+RIDGE = 1e-10
+"""Trace of ridge on every normal matrix, in units of its diagonal."""
 NOISE_SAFETY = 2.0
 """Sensor noise is often more than its white part; energies of it are taken this much larger when they exclude."""
 
@@ -144,7 +149,8 @@ class Regression:
             for key, sd in loose.items():
                 precision[self.columns([key])] = 1.0 / sd**2
         prior = np.diag(precision[cols])
-        inverse = ridge_inverse(gram - bias + prior)
+        normal = gram - bias + prior
+        inverse = ridge_inverse(normal)
         beta = inverse @ (cross - bias_cross)
         count = int(mask.sum())
         every = self.gram[np.ix_(np.arange(len(mask)), cols, cols)]
@@ -155,7 +161,8 @@ class Regression:
             scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
         spread = scores.T @ scores * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse
-        plain = inverse @ (gram + prior) @ inverse
+        # With the ridge, or two columns that are copies of each other would seem to be known.
+        plain = inverse @ (gram + prior + RIDGE * np.diag(np.diag(normal))) @ inverse
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
         shift = DOUBT_OF_CORRECTION * (beta - ridge_inverse(gram + prior) @ cross)
         covariance = at_least(robust, plain) + np.outer(shift, shift)
@@ -210,11 +217,23 @@ class Regression:
         return float(((grams @ shift) @ shift).sum())
 
     def beyond(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Columns and coefficients of a term's own part: what `keys` would absorb of it is taken off."""
+        """Columns and coefficients of a term's own part: what `keys` would absorb of it is taken off.
+
+        No value absorbs more than MOST_DISTRUST times its trust allows.
+        """
         others, own = self.columns(keys), self.columns([key])
         gram = self._total_gram
         inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
-        taken = -inner @ gram[np.ix_(others, own)] @ beta
+        with np.errstate(divide="ignore"):
+            most = MOST_DISTRUST / np.sqrt(self.precision[others])
+        pull = gram[np.ix_(others, own)] @ beta
+        taken = -inner @ pull
+        if (np.abs(taken) > most).any():
+            root = np.linalg.cholesky((inner + inner.T) / 2).T
+            # |R⁻ᵀ x + R pull|² with inner = Rᵀ R is the same square, completed.
+            back = np.linalg.inv(root).T
+            unit = np.sqrt(np.diag(inner))
+            taken = lsq_linear(back * unit, -root @ pull, bounds=(-most / unit, most / unit)).x * unit
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
@@ -247,7 +266,7 @@ def inverse_root(diagonal: np.ndarray) -> np.ndarray:
 def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric normal matrix, scaled to unit diagonal, with a trace of ridge."""
     scale = inverse_root(np.diag(matrix))
-    scaled = matrix * np.outer(scale, scale) + 1e-10 * np.eye(len(matrix))
+    scaled = matrix * np.outer(scale, scale) + RIDGE * np.eye(len(matrix))
     return np.linalg.inv(scaled) * np.outer(scale, scale)
 
 

@@ -8,10 +8,13 @@ import numpy as np
 
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 ENTER_P = 1e-4
 """A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
 KEEP_P = 1e-4
+FINAL_P = 1e-3
+"""The same with a jackknife over blocks, which no single moment of the flight can decide."""
 COST_PER_PARAMETER = 8.0
 """Whitened squares that each further parameter must explain before a richer form is preferred."""
 SMALLEST_SIZE = 0.15
@@ -20,6 +23,9 @@ SHARE_OF_LARGEST = 0.04
 """Nor does one below this share of the largest effect in its channel: no form is known better than that."""
 COST_PER_EFFECT = 20.0
 """Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
+COST_OF_UNKNOWN = 40.0
+"""Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
+SHARE_OF_UNKNOWN = 0.1
 ALTERNATIVE_P = 0.01
 """A term that beside an alternative is less significant than this could be that alternative instead."""
 MOST_EXTRA_PARAMETERS = 3
@@ -30,6 +36,8 @@ BURST_SIZE = 3.0
 MOST_EFFECTS = 10
 EXPECTED_HELD_OUT = 25.0
 """Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
+MOST_STRAIN = 4.0
+"""Standard deviations of trust that an effect may push a believed value to."""
 UNSTEADY_P = 1e-6
 UNSTEADY_SHARE = 0.4
 """A coefficient that spreads by more than this share of itself between runs is no constant of the vehicle."""
@@ -46,11 +54,14 @@ class Candidate:
     inflation: float
     physical: bool
     """Coefficients inside their bounds, and regressors that are more than their own noise."""
+    named: bool = True
+    """Whether it is of the catalogue."""
 
     @property
     def score(self) -> float:
         """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
-        return self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
+        score = self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
+        return score if self.named else (1 - SHARE_OF_UNKNOWN) * score - COST_OF_UNKNOWN * self.inflation
 
 
 @dataclass
@@ -105,7 +116,20 @@ class Search:
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         physical = physical and self.regression.noise_share(keys, key, beta) < MOST_ATTENUATION
-        return Candidate(key, beta, p_value, gain, inflation, physical)
+        physical = physical and not self.strains(fit, base)
+        return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
+
+    def strains(self, fit: Fit, base: Fit) -> bool:
+        """Whether a term needs a believed value far from its belief that the model without it does not need."""
+        for term in self.regression.terms:
+            if term.kind != "value":
+                continue
+            column = self.regression.start[term.key]
+            with_it = abs(fit.beta[fit.columns == column][0])
+            without = abs(base.beta[base.columns == column][0])
+            if with_it > MOST_STRAIN * term.prior_sd[0] and with_it > without + term.prior_sd[0]:
+                return True
+        return False
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
@@ -175,13 +199,14 @@ class Search:
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
         parameters = sum(self.terms[k].size for k in keys)
+        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
         gain = self.regression.fit(self.always + keys).gain
-        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys)
+        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
-    def swapped(self, active: list[str]) -> list[str] | None:
+    def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it is worth more: the first to enter may be an imitation."""
-        taken = {self.terms[k].effect for k in active}
-        best, found = self.worth(active) + COST_PER_EFFECT, None
+        taken = {self.terms[k].effect for k in active} | set(dropped)
+        best, found = self.worth(active) + COST_PER_PARAMETER / 2, None
         for gone in active:
             if self.terms[gone].run:
                 continue
@@ -195,14 +220,7 @@ class Search:
         return found
 
     def _all_physical(self, active: list[str]) -> bool:
-        fit = self.regression.fit(self.always + active)
-        for key in active:
-            cols = self.regression.columns([key])
-            where = [list(fit.columns).index(c) for c in cols]
-            sd = np.sqrt(np.diag(fit.covariance)[where])
-            if not self.physical(self.terms[key], fit.beta[where], sd):
-                return False
-        return True
+        return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
     def weak(self, active: list[str]) -> tuple[str, str] | None:
         """The worst term of the model that fails a test, with the reason; None if all hold."""
@@ -256,7 +274,7 @@ class Search:
             if (simpler := self.simpler(active)) is not None:
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
                 active = simpler
-            if not grown and (swapped := self.swapped(active)) is not None:
+            if not grown and (swapped := self.swapped(active, dropped)) is not None:
                 trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(swapped)}")
                 active, grown = swapped, True
             while (weak := self.weak(active)) is not None:
@@ -277,8 +295,15 @@ class Search:
             active.remove(unsteady)
             dropped[self.terms[unsteady].effect] = "it differs from run to run"
             trail.append(f"- {unsteady}: differs from run to run")
-        fit = self.regression.fit(self.always + active, jackknife=True)
-        final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
+        while True:
+            fit = self.regression.fit(self.always + active, jackknife=True)
+            final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
+            doubtful = max(active, key=lambda k: final[k], default=None)
+            if doubtful is None or final[doubtful] <= FINAL_P:
+                break
+            active.remove(doubtful)
+            dropped[self.terms[doubtful].effect] = f"p = {final[doubtful]:.2g} where each block has its say"
+            trail.append(f"- {doubtful}: fails the jackknife")
         kept = {self.terms[k].effect for k in active}
         return Selection(active, fit, final, trail, {e: r for e, r in dropped.items() if e not in kept})
 
@@ -359,7 +384,7 @@ class Search:
         for term in self.terms.values():
             if term.kind != "effect" or term.effect in taken or term.effect == self.terms[key].effect:
                 continue
-            if term.effect in found:
+            if term.effect in found or term.effect in UNKNOWNS:
                 continue
             other = self.judge(term.key, rest, self.without(key, active))
             if not other.physical or other.p_value > 1e-3 or other.gain < 0.5 * own.gain:

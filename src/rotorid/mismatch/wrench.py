@@ -12,7 +12,15 @@ from rotorid.effects.contract import Form
 from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
-from rotorid.mismatch.regression import AGREEMENT, Regression, autoregression, build, full_fit_residuals
+from rotorid.mismatch.regression import (
+    AGREEMENT,
+    MOST_ATTENUATION,
+    NOISE_SAFETY,
+    Regression,
+    autoregression,
+    build,
+    full_fit_residuals,
+)
 from rotorid.mismatch.rows import Rows, Term, residual
 from rotorid.mismatch.select import Search, Selection
 from rotorid.mismatch.speedpath import (
@@ -24,8 +32,11 @@ from rotorid.mismatch.speedpath import (
     commanded_path,
     smoothed_acceleration,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 LONGEST_BLOCKS = 400
+HELD_SD = 1e-6
+"""Prior of a value or an offset that is held at its belief."""
 
 
 @dataclass
@@ -43,6 +54,11 @@ class WrenchModel:
     wind: np.ndarray | None = None
     """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
     wind_sd: np.ndarray | None = None
+
+    def unnamed(self, columns: np.ndarray) -> np.ndarray:
+        """Mask of the columns that belong to empirical terms, which no finding may count as its own."""
+        keys = [k for k in self.selection.active if self.search.terms[k].effect in UNKNOWNS]
+        return np.isin(columns, self.regression.columns(keys))
 
 
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:
@@ -72,6 +88,8 @@ def wrench_model(
     noisy_segments = prepared.noisy_segments if noisy_segments is None else noisy_segments
     rows = assemble_rows(prepared, terms, segments, effects)
     noisy = assemble_rows(prepared, terms, noisy_segments, effects) if noisy_segments else None
+    if noisy is not None:
+        terms = hold_unseen_values(terms, rows, noisy)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, _ = full_fit_residuals(rows, precision)
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
@@ -97,6 +115,30 @@ def wrench_model(
 
     search = Search(regression, sizes_of, known_sizes)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
+
+
+def hold_unseen_values(terms: list[Term], rows: list[Rows], noisy: list[Rows]) -> list[Term]:
+    """Terms with every believed value and offset held whose column is mostly the sensors' own noise.
+
+    In a calm flight the rotors' moment is noise that the residual has with the other sign: a free value would take
+    it away and call itself wrong.
+    """
+    weight = 1.0 / np.maximum(np.nanvar(np.concatenate([r.y for r in rows]), axis=0), 1e-300)
+    weight = np.where(np.isfinite(weight), weight, 0.0)
+    out, at = [], 0
+    for term in terms:
+        cols = slice(at, at + term.size)
+        at += term.size
+        if term.kind in ("value", "nuisance"):
+            energy = sum(np.einsum("ncq,ncq,c->", r.x[:, :, cols], r.x[:, :, cols], weight) for r in rows)
+            noise = sum(
+                np.einsum("ncq,ncq,c->", b.x[:, :, cols] - a.x[:, :, cols], b.x[:, :, cols] - a.x[:, :, cols], weight)
+                for a, b in zip(rows, noisy, strict=True)
+            )
+            if NOISE_SAFETY * noise > MOST_ATTENUATION * energy:
+                term = replace(term, prior_sd=(HELD_SD,) * term.size)
+        out.append(term)
+    return out
 
 
 def local_sizes(
