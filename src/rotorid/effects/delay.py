@@ -17,7 +17,7 @@ def shifted(path, values):
 
 
 def set_forms(vehicle):
-    parameters = (Parameter("T", "s", -0.5, 0.5, meaning="time behind"),)
+    parameters = (Parameter("T", "s", -0.5, 0.5, meaning="time behind", negligible=0.001),)
     return late_sensors(vehicle, "written at t: the value of t − T", parameters, (0.03,), lambda t, values: values[0])
 
 

@@ -15,8 +15,6 @@ from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
 
-HELD_SD = 1e-5
-"""Values with a prior below this are held: these data cannot see them."""
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
 MOST_VALUES = 3
@@ -169,7 +167,7 @@ def wrong_values(
     units of the noise (`size_of(key, relative change)`).
     """
     nuisance = [t.key for t in regression.terms if t.kind in ("nuisance", "wind")]
-    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value" and t.prior_sd[0] > HELD_SD}
+    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
     loose = {key: max(sd, WIDEST_TRUST) for key, sd in trust.items()}
     count = int(regression.training.sum())

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
+from scipy.signal import lfilter, welch
 
 from rotorid.effects.contract import Form
 from rotorid.mismatch.bursts import gust_terms, windows
@@ -14,8 +14,6 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
-    MOST_ATTENUATION,
-    NOISE_SAFETY,
     Regression,
     autoregression,
     build,
@@ -35,8 +33,10 @@ from rotorid.mismatch.speedpath import (
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 LONGEST_BLOCKS = 400
-HELD_SD = 1e-6
-"""Prior of a value or an offset that is held at its belief."""
+NOISE_BAND = (0.5, 0.85)
+"""Band, as shares of the cutoff, in which noise is told from motion."""
+MOST_NOISE = 0.3
+"""Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 
 
 @dataclass
@@ -89,7 +89,7 @@ def wrench_model(
     rows = assemble_rows(prepared, terms, segments, effects)
     noisy = assemble_rows(prepared, terms, noisy_segments, effects) if noisy_segments else None
     if noisy is not None:
-        terms = hold_unseen_values(terms, rows, noisy)
+        rows, noisy = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, _ = full_fit_residuals(rows, precision)
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
@@ -117,28 +117,33 @@ def wrench_model(
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
 
 
-def hold_unseen_values(terms: list[Term], rows: list[Rows], noisy: list[Rows]) -> list[Term]:
-    """Terms with every believed value and offset held whose column is mostly the sensors' own noise.
+def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float):
+    """Rows (and their noisy copies) in which a column that is mostly noise in a channel says nothing there.
 
-    In a calm flight the rotors' moment is noise that the residual has with the other sign: a free value would take
-    it away and call itself wrong.
+    In a calm flight, say, the rotors' moment is noise that the residual has with the other sign: a free believed
+    value (or a scale error) would take it away and call itself wrong. How much noise there is, is measured where
+    little else is: near the cutoff.
     """
-    weight = 1.0 / np.maximum(np.nanvar(np.concatenate([r.y for r in rows]), axis=0), 1e-300)
-    weight = np.where(np.isfinite(weight), weight, 0.0)
-    out, at = [], 0
-    for term in terms:
-        cols = slice(at, at + term.size)
-        at += term.size
-        if term.kind in ("value", "nuisance"):
-            energy = sum(np.einsum("ncq,ncq,c->", r.x[:, :, cols], r.x[:, :, cols], weight) for r in rows)
-            noise = sum(
-                np.einsum("ncq,ncq,c->", b.x[:, :, cols] - a.x[:, :, cols], b.x[:, :, cols] - a.x[:, :, cols], weight)
-                for a, b in zip(rows, noisy, strict=True)
-            )
-            if NOISE_SAFETY * noise > MOST_ATTENUATION * energy:
-                term = replace(term, prior_sd=(HELD_SD,) * term.size)
-        out.append(term)
-    return out
+    band = tuple(share * cutoff_hz for share in NOISE_BAND)
+    more = np.ones(12)
+    for c in np.flatnonzero(np.isfinite(rows[0].y).all(axis=0)):
+        found = band_power([r.y[:, c] for r in rows], rate_hz, band)
+        added = band_power([b.y[:, c] - a.y[:, c] for a, b in zip(rows, noisy, strict=True)], rate_hz, band)
+        more[c] = max(1.0, found / added) if added > 0 else 1.0
+    energy = sum(np.einsum("ncq,ncq->cq", r.x, r.x) for r in rows)
+    noise = sum(np.einsum("ncq,ncq->cq", b.x - a.x, b.x - a.x) for a, b in zip(rows, noisy, strict=True))
+    seen = more[:, None] * noise <= MOST_NOISE * energy
+    return [replace(r, x=r.x * seen) for r in rows], [replace(r, x=r.x * seen) for r in noisy]
+
+
+def band_power(parts: list[np.ndarray], rate_hz: float, band: tuple[float, float]) -> float:
+    """Mean power density of stretches in a band of frequency."""
+    power = []
+    for part in parts:
+        if len(part) >= 32:
+            frequency, density = welch(part, fs=rate_hz, nperseg=min(len(part), 256))
+            power.append(density[(frequency >= band[0]) & (frequency <= band[1])].mean() * len(part))
+    return float(sum(power) / max(sum(len(p) for p in parts if len(p) >= 32), 1))
 
 
 def local_sizes(
