@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Effect, Parameter, SpeedForm
+from rotorid.effects.recorded import late_sensors
 
 
 def shifted(path, values):
@@ -15,22 +16,42 @@ def shifted(path, values):
     return (1 - part) * path.speed[low] + part * path.speed[high]
 
 
+def set_forms(vehicle):
+    parameters = (Parameter("T", "s", -0.5, 0.5, meaning="time behind", negligible=0.001),)
+    return late_sensors(vehicle, "written at t: the value of t − T", parameters, (0.03,), lambda t, values: values[0])
+
+
 EFFECT = Effect(
     id="delay",
     name="a delay",
     sentence="one recording follows another late, without being smoothed",
     forms=lambda vehicle: (),
+    set_forms=set_forms,
     speed_forms=(
         SpeedForm(
             "of the command",
             "ω(t) = ω_c(t − T)",
-            (Parameter("T", "s", -0.05, 0.3, nonlinear=True, starts=(0.01, 0.03, 0.1), negligible=0.001),),
+            (
+                Parameter(
+                    "T",
+                    "s",
+                    -0.05,
+                    0.3,
+                    nonlinear=True,
+                    starts=(0.01, 0.03, 0.1),
+                    meaning="time behind",
+                    negligible=0.001,
+                ),
+            ),
             3,
             shifted,
             (0.0,),
+            excited_by="change",
         ),
     ),
-    source="physics.md F20",
+    source="signal theory (phase linear in frequency, gain one); catalogue F20",
+    sign="positive T is late: what is written at t happened at t − T",
+    validity="a constant delay; the part below one sample is a nuisance and never reported",
     confusers=("motor_lag", "clock_skew"),
     separating_manoeuvre="excite collective and attitude up to 8 Hz",
     kind="sensor",

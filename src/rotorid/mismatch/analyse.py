@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
@@ -20,11 +21,12 @@ from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, residual
-from rotorid.mismatch.select import Selection
-from rotorid.mismatch.speedpath import SpeedResult, commanded_path
+from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
+from rotorid.mismatch.speedpath import SpeedResult, commanded_path, nothing_between
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import (
     WrenchModel,
+    after_residual,
     chosen,
     in_wind,
     nonlinear_intervals,
@@ -36,7 +38,7 @@ from rotorid.mismatch.wrench import (
     with_wind,
     wrench_model,
 )
-from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.recordings import RecordingSet, Vehicle, columns
 
 ABSORBED_P = 1e-6
 UNITS = {"force": "N", "moment": "N m"}
@@ -65,6 +67,12 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         segments = path_segments(prepared.segments, *found, cutoff)
         noisy = path_segments(prepared.noisy_segments, *found, cutoff)
         model = refined_model(prepared, segments, noisy)
+    if found is not None and not measured and [k for k, _ in found[0].fit.chain] == ["throttle_curve"]:
+        # A curve alters differences between rotors too: unequal rotors at one throttle look like one.
+        plain = refined_model(prepared, prepared.segments, prepared.noisy_segments)
+        if cost_of(plain, model.regression.filters) < cost_of(model, model.regression.filters) + curve_cost(found[0]):
+            segments, noisy, model = prepared.segments, prepared.noisy_segments, plain
+            found = (nothing_between(found[0]), *found[1:])
 
     if model.wind is not None:
         findings.append(wind_finding(model))
@@ -100,6 +108,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         reverse_regression(prepared, model, segments),
         size,
     )
+    told = speed_for_coefficients(values, prepared.vehicle) if only_throttle(recordings) else values
     findings = payload_or_offset(findings, values)
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
@@ -107,7 +116,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         nothing = Selection([], model.selection.fit)
         plain_values = wrong_values(model.regression, model.search, nothing, None, size)
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
-    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in values.items()})
+    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
     traces = make_traces(prepared, model, found, measured, plain_values, values)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
@@ -119,7 +128,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         refitted=refitted,
         improved=improved,
         findings=tuple(together(findings)),
-        values=contract_values(prepared.vehicle, values),
+        values=contract_values(prepared.vehicle, told),
         not_testable={k: v for k, v in reasons.items() if k not in known},
         traces=traces,
         noise_floor=noise_floors(prepared, model, found, measured),
@@ -151,6 +160,21 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
         terms = [t for t in model.terms if not t.run]
     return with_gusts(prepared, model, segments, noisy, terms)
+
+
+def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
+    """Whitened squares that a model leaves, and what its ids and parameters cost."""
+    left = 0.0
+    for part in after_residual(model):
+        for channel, taps in filters.items():
+            left += float((lfilter(taps, [1.0], part[:, channel])[len(taps) :] ** 2).sum())
+    terms = [model.search.terms[k] for k in model.selection.active]
+    return left + sum(COST_PER_EFFECT + COST_PER_PARAMETER * t.size for t in terms)
+
+
+def curve_cost(result: SpeedResult) -> float:
+    """What the forms between command and rotor speed cost."""
+    return sum(COST_PER_EFFECT + COST_PER_PARAMETER * len(form.parameters) for _, form in result.fit.chain)
 
 
 def wind_finding(model: WrenchModel) -> Finding:
@@ -234,6 +258,31 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     return out
 
 
+def only_throttle(recordings: RecordingSet) -> bool:
+    """Whether rotor speeds are known from the throttle and a believed full speed alone."""
+    count = recordings.vehicle.rotor_count
+    return all(
+        run.has(*columns.rotor_columns("throttle", count))
+        and not run.has(*columns.rotor_columns("rotor_command", count))
+        and not run.has(*columns.rotor_columns("rotor_speed", count))
+        for run in recordings.runs
+    )
+
+
+def speed_for_coefficients(values: dict, vehicle: Vehicle) -> dict:
+    """Thrust and torque coefficients off by one factor are one speed at full throttle off by its root."""
+    if not {"thrust", "torque"} <= set(values) or vehicle.rotor_speed_limits_rad_s is None:
+        return values
+    (thrust, thrust_sd), (torque, torque_sd) = values["thrust"], values["torque"]
+    if abs(thrust - torque) > 2.0 * np.hypot(thrust_sd, torque_sd) + 0.005:
+        return values
+    weight = 1.0 / np.square([thrust_sd, torque_sd])
+    change = float(weight @ [thrust, torque] / weight.sum())
+    factor = np.sqrt(1.0 + change)
+    rest = {k: v for k, v in values.items() if k not in ("thrust", "torque")}
+    return {**rest, "speed": (float(factor - 1.0), float(0.5 / factor / np.sqrt(weight.sum())))}
+
+
 def throttle_or_thrust(finding: Finding) -> Finding:
     """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
     if finding.id != "thrust_curve" or finding.status not in ("established", "ambiguous"):
@@ -286,6 +335,8 @@ def believed_value(vehicle: Vehicle, key: str) -> float:
         return float(vehicle.thrust_coefficients_n_s2().mean())
     if key == "torque":
         return float(vehicle.torque_coefficients_n_m_s2().mean())
+    if key == "speed":
+        return vehicle.rotor_speed_limits_rad_s[1]
     if key == "arm":
         return 1.0
     return getattr(vehicle.inertia_kg_m2, key[-2:])
@@ -305,6 +356,9 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
     if inertia:
         old = vehicle.inertia_kg_m2
         change["inertia_kg_m2"] = old.model_copy(update={k: getattr(old, k) * f for k, f in inertia.items()})
+    if "speed" in relative:
+        low, high = vehicle.rotor_speed_limits_rad_s
+        change["rotor_speed_limits_rad_s"] = (low, high * (1 + relative["speed"]))
     if "arm" in relative:
         f = 1 + relative["arm"]
         change["rotors"] = tuple(r.model_copy(update={"x_m": r.x_m * f, "y_m": r.y_m * f}) for r in vehicle.rotors)

@@ -122,8 +122,8 @@ def slow_excess(prepared, model, segments, noisy) -> dict[str, tuple[float, floa
     A regression on known inputs cannot see a mass that slides or a tank that slops; the noise can: it is known what
     the sensors' own noise does to each channel (`noisy` are the same segments with that noise added once more).
     """
-    if not noisy:
-        return {}
+    if not noisy or not all(s.measured_speed for s in segments):
+        return {}  # what rotors make of their commands is not known well enough
     rate = prepared.thinner.rate_hz
     fast = tuple(share * prepared.thinner.cutoff_hz for share in FAST_BAND)
     full = model.regression.fit(model.search.always + model.selection.active)

@@ -199,7 +199,7 @@ def build_segments(
     position = take(c.POSITION, "position")
     height = take((c.HEIGHT,), "height")
     voltage = take((c.BATTERY_VOLTAGE,), "voltage", smooth=False)
-    needed = [a for a in (used_speed, gyro, attitude, accelerometer, velocity, position) if a is not None]
+    needed = [a for a in (used_speed, command, gyro, attitude, accelerometer, velocity, position) if a is not None]
     good = np.ones(len(grid), bool)
     for array in needed:
         good &= np.isfinite(array).all(axis=1)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 from scipy.stats import chi2, f
 
@@ -223,8 +224,16 @@ class Regression:
         others, own = self.columns(keys), self.columns([key])
         gram = self._total_gram
         inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
-        most = MOST_DISTRUST / np.sqrt(self.precision[others])
-        taken = np.clip(-inner @ gram[np.ix_(others, own)] @ beta, -most, most)
+        with np.errstate(divide="ignore"):
+            most = MOST_DISTRUST / np.sqrt(self.precision[others])
+        pull = gram[np.ix_(others, own)] @ beta
+        taken = -inner @ pull
+        if (np.abs(taken) > most).any():
+            root = np.linalg.cholesky((inner + inner.T) / 2).T
+            # |R⁻ᵀ x + R pull|² with inner = Rᵀ R is the same square, completed.
+            back = np.linalg.inv(root).T
+            unit = np.sqrt(np.diag(inner))
+            taken = lsq_linear(back * unit, -root @ pull, bounds=(-most / unit, most / unit)).x * unit
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:

@@ -28,6 +28,7 @@ PARAMETER_NAMES = {
     "inertia_yy": "inertia_yy_kg_m2",
     "inertia_zz": "inertia_zz_kg_m2",
     "arm": "arm_scale",
+    "speed": "rotor_speed_limits_rad_s",
 }
 
 SUSTAINED_S = 3.0

@@ -36,6 +36,8 @@ BURST_SIZE = 3.0
 MOST_EFFECTS = 10
 EXPECTED_HELD_OUT = 25.0
 """Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
+MOST_STRAIN = 4.0
+"""Standard deviations of trust that an effect may push a believed value to."""
 UNSTEADY_P = 1e-6
 UNSTEADY_SHARE = 0.4
 """A coefficient that spreads by more than this share of itself between runs is no constant of the vehicle."""
@@ -114,7 +116,20 @@ class Search:
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         physical = physical and self.regression.noise_share(keys, key, beta) < MOST_ATTENUATION
+        physical = physical and not self.strains(fit, base)
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
+
+    def strains(self, fit: Fit, base: Fit) -> bool:
+        """Whether a term needs a believed value far from its belief that the model without it does not need."""
+        for term in self.regression.terms:
+            if term.kind != "value":
+                continue
+            column = self.regression.start[term.key]
+            with_it = abs(fit.beta[fit.columns == column][0])
+            without = abs(base.beta[base.columns == column][0])
+            if with_it > MOST_STRAIN * term.prior_sd[0] and with_it > without + term.prior_sd[0]:
+                return True
+        return False
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
@@ -188,9 +203,9 @@ class Search:
         gain = self.regression.fit(self.always + keys).gain
         return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
-    def swapped(self, active: list[str]) -> list[str] | None:
+    def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it is worth more: the first to enter may be an imitation."""
-        taken = {self.terms[k].effect for k in active}
+        taken = {self.terms[k].effect for k in active} | set(dropped)
         best, found = self.worth(active) + COST_PER_PARAMETER / 2, None
         for gone in active:
             if self.terms[gone].run:
@@ -205,14 +220,7 @@ class Search:
         return found
 
     def _all_physical(self, active: list[str]) -> bool:
-        fit = self.regression.fit(self.always + active)
-        for key in active:
-            cols = self.regression.columns([key])
-            where = [list(fit.columns).index(c) for c in cols]
-            sd = np.sqrt(np.diag(fit.covariance)[where])
-            if not self.physical(self.terms[key], fit.beta[where], sd):
-                return False
-        return True
+        return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
     def weak(self, active: list[str]) -> tuple[str, str] | None:
         """The worst term of the model that fails a test, with the reason; None if all hold."""
@@ -266,7 +274,7 @@ class Search:
             if (simpler := self.simpler(active)) is not None:
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
                 active = simpler
-            if not grown and (swapped := self.swapped(active)) is not None:
+            if not grown and (swapped := self.swapped(active, dropped)) is not None:
                 trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(swapped)}")
                 active, grown = swapped, True
             while (weak := self.weak(active)) is not None:

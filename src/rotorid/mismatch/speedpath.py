@@ -28,6 +28,7 @@ COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
 LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
+LIMIT_STAGE = 2
 MOST_SAMPLES = 40_000
 """Rotor-speed samples per fit; longer recordings are represented by stretches spread over all runs."""
 
@@ -100,6 +101,13 @@ def commanded_path(
     for _, apply, own in sorted(steps, key=lambda s: s[0]):
         path = replace(path, speed=apply(path, own))
     return path.speed
+
+
+def nothing_between(result: SpeedResult) -> SpeedResult:
+    """The result of a search that found nothing: rotors turn as commanded."""
+    fit = SpeedFit((), np.zeros(0), 0.0, result.fit.cost, np.zeros((0, 0)))
+    why = "the differences between the rotors explain as much"
+    return SpeedResult(fit, {}, {}, {}, {**result.dropped, **{k: why for k, _ in result.fit.chain}}, None)
 
 
 class SpeedProblem:
@@ -331,9 +339,16 @@ class SpeedSearch:
         inflation = fit.inflation
         gain = (base.cost - fit.cost) / inflation
         # What the fit gains and what its parameters are sure of must agree: the shift in time bends the first.
-        away = fit.values[own] - np.array(fit.of(key)[0].neutral)
+        away = fit.values[own] - self.neutral(fit.of(key)[0])
         sure = gain if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
         return float(chi2.sf(max(min(gain, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
+
+    def neutral(self, form: SpeedForm) -> np.ndarray:
+        """Parameter values that change nothing; of a limit, the outermost command."""
+        if form.stage != LIMIT_STAGE:
+            return np.array(form.neutral)
+        shares = [s.command / self.problem.full_speed for s in self.problem.segments]
+        return np.clip(form.neutral, min(float(s.min()) for s in shares), max(float(s.max()) for s in shares))
 
     def run(self) -> SpeedResult:
         """The whole search."""
