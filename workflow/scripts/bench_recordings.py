@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid import log
-from rotorid.bench.recordings import bench_force, bench_set
 from rotorid.bench.reconstruct import read_geometry
+from rotorid.bench.recordings import bench_force, bench_set
 from rotorid.io.tables import read_sessions
 from rotorid.recordings import write_set
 
