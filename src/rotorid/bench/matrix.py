@@ -75,3 +75,14 @@ def calibrate(volts: np.ndarray, force_n: np.ndarray) -> Calibration:
     weight = np.diag(1 / residual**2)
     inverse = np.linalg.solve(response @ weight @ response.T, response @ weight)
     return Calibration(response.T, inverse, np.linalg.inv(force_n.T @ force_n), residual, freedom)
+
+
+def as_dict(calibration: Calibration) -> dict:
+    """The calibration for a JSON file."""
+    return {
+        "response_v_n": calibration.response_v_n.tolist(),
+        "response_half_width_95_v_n": calibration.response_interval().tolist(),
+        "matrix_n_v": calibration.matrix_n_v.tolist(),
+        "residual_v": calibration.residual_v.tolist(),
+        "degrees_of_freedom": calibration.degrees_of_freedom,
+    }
