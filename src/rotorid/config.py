@@ -78,6 +78,10 @@ class BenchSettings(Section):
     """The load-cell bench."""
 
     noise_n: float = Field(ge=0, description="Believed one-sigma noise of a sample of the bench's force [N].")
+    matrix_largest_n: float = Field(
+        gt=0,
+        description="Largest load that the calibration matrix is fitted to: beyond it cells leave their range [N].",
+    )
     reference_noise_n: float = Field(ge=0, description="Believed one-sigma noise of the reference sensor [N].")
 
 

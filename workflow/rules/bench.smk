@@ -47,3 +47,69 @@ for bench_name, bench_folder in BENCH_SETS.items():
             f"results/logs/bench_recordings/{bench_name}.log",
         script:
             "../scripts/bench_recordings.py"
+
+
+rule reconstruct_static:
+    """Force of every static recording, by the thesis's equations and by a calibration matrix."""
+    message:
+        "Bench: static tests"
+    input:
+        bench=["results/filtered/static/bench.parquet", "results/ingest/static/bench.csv"],
+        jr3=["results/filtered/static/jr3.parquet", "results/ingest/static/jr3.csv"],
+        combined=["results/filtered/combined/bench.parquet", "results/ingest/combined/bench.csv"],
+        calibration=rules.calibrate_campaign.output.coefficients,
+        geometry=BENCH_GEOMETRY,
+    output:
+        points="results/bench/static_points.csv",
+        loads="results/bench/static_loads.csv",
+        series="results/bench/static_series.csv",
+        comparison="results/bench/reconstruction.json",
+    params:
+        matrix_largest_n=CONFIG.bench.matrix_largest_n,
+        code=code_of("reconstruct_static"),
+    log:
+        "results/logs/reconstruct_static.log",
+    script:
+        "../scripts/reconstruct_static.py"
+
+
+rule evaluate_dynamic:
+    """Thrust over time on three platforms, three sets."""
+    message:
+        "Bench: dynamic tests"
+    input:
+        bench=["results/filtered/dynamic/bench.parquet", "results/ingest/dynamic/bench.csv"],
+        jr3=["results/filtered/dynamic/jr3.parquet", "results/ingest/dynamic/jr3.csv"],
+        calibration=rules.calibrate_campaign.output.coefficients,
+        geometry=BENCH_GEOMETRY,
+    output:
+        flights="results/bench/dynamic.parquet",
+        figures="results/bench/dynamic_flights.csv",
+        levels="results/bench/dynamic_levels.csv",
+        summary="results/bench/dynamic.json",
+    params:
+        code=code_of("evaluate_dynamic"),
+    log:
+        "results/logs/evaluate_dynamic.log",
+    script:
+        "../scripts/evaluate_dynamic.py"
+
+
+rule evaluate_tensile:
+    """Modulus, strength and yield of printed PLA by infill density."""
+    message:
+        "Bench: tensile tests"
+    input:
+        samples="results/ingest/tensile/tensile.parquet",
+        recordings="results/ingest/tensile/tensile.csv",
+        printed="raw/thesis/table_2_5.csv",
+    output:
+        specimens="results/bench/tensile_specimens.csv",
+        infill="results/bench/tensile.csv",
+        curves="results/bench/tensile.parquet",
+    params:
+        code=code_of("evaluate_tensile"),
+    log:
+        "results/logs/evaluate_tensile.log",
+    script:
+        "../scripts/evaluate_tensile.py"

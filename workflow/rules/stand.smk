@@ -18,9 +18,12 @@ rule stand_recordings:
         torque_rotor=ingested("torque", "rotor"),
         torque_wrench=ingested("torque", "wrench"),
         thrust=ingested("thrust", "rotor"),
-        vehicle="raw/vehicle/thesis.yaml",
+        thrust_points=rules.fit_white_box.output.thrust,
+        vehicle=THESIS_VEHICLE,
     output:
         **{key: directory(folder) for key, folder in STAND_SETS.items()},
+        clocks="results/stand/clocks.csv",
+        summary="results/stand/clocks.json",
     params:
         clock_error=CONFIG.stand.clock_error,
         force_noise_n=CONFIG.stand.force_noise_n,
@@ -38,3 +41,24 @@ rule campaign_sets:
     """Every recording set made of the campaign."""
     input:
         [*BENCH_SETS.values(), *STAND_SETS.values()],
+
+
+rule evaluate_stand:
+    """Steady wrenches of the 48 experiments, the weight under tilt, the rotor's characteristics."""
+    message:
+        "Stand: steady wrenches and characteristics"
+    input:
+        recordings=STAND_SETS["dynamics"],
+        thrust=rules.fit_white_box.output.thrust,
+        torque=rules.fit_white_box.output.torque,
+        parameters=rules.fit_white_box.output.parameters,
+    output:
+        experiments="results/stand/experiments.csv",
+        weight="results/stand/weight.json",
+        characteristic="results/stand/characteristic.json",
+    params:
+        code=code_of("evaluate_stand"),
+    log:
+        "results/logs/evaluate_stand.log",
+    script:
+        "../scripts/evaluate_stand.py"

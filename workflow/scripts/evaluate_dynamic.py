@@ -21,9 +21,16 @@ KINDS = ("", "_low_pass", "_zero_phase")
 
 
 def main(
-    bench: Sequence[str], jr3: Sequence[str], calibration: str, geometry: str, flights: str, figures: str, levels: str
+    bench: Sequence[str],
+    jr3: Sequence[str],
+    calibration: str,
+    geometry: str,
+    flights: str,
+    figures: str,
+    levels: str,
+    summary: str,
 ) -> None:
-    """Write the flights (Parquet), one row a flight (CSV) and the platforms' agreement (CSV)."""
+    """Write the flights (Parquet), one row a flight (CSV), the levels held (CSV) and the platforms' ratios (JSON)."""
     cells = json.loads(Path(calibration).read_text(encoding="utf-8"))["cells"]
     coefficients = np.array([[cell["a0_gf"], cell["a1_gf_per_10uv"]] for cell in cells])
     distances = read_geometry(geometry)
@@ -39,7 +46,10 @@ def main(
     flown = pd.concat(parts, ignore_index=True)
     flown.to_parquet(flights, index=False)
     dynamic.figures(flown).to_csv(figures, index=False, float_format="%.9g")
-    dynamic.agreement(flown).to_csv(levels, index=False, float_format="%.9g")
+    held = dynamic.agreement(flown)
+    held.to_csv(levels, index=False, float_format="%.9g")
+    found = {entry["platform"]: entry for entry in dynamic.ratios(held)}
+    Path(summary).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 def _force_z(table: pd.DataFrame, kind: str, coefficients: np.ndarray, geometry: Geometry) -> np.ndarray:
@@ -60,4 +70,5 @@ if __name__ == "__main__":
             flights=snakemake.output.flights,
             figures=snakemake.output.figures,
             levels=snakemake.output.levels,
+            summary=snakemake.output.summary,
         )

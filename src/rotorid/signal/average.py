@@ -15,5 +15,7 @@ def mean_and_error(values: np.ndarray) -> tuple[float, float]:
     values = values[np.isfinite(values)]
     if len(values) < 2:
         return (float(values.mean()) if len(values) else float("nan")), float("nan")
-    blocks = values if len(values) < 16 else np.array([b.mean() for b in np.array_split(values, int(len(values) ** 0.5))])
+    blocks = (
+        values if len(values) < 16 else np.array([b.mean() for b in np.array_split(values, int(len(values) ** 0.5))])
+    )
     return float(values.mean()), float(blocks.std(ddof=1) / np.sqrt(len(blocks)))

@@ -61,3 +61,114 @@ def _lower_hull(x: np.ndarray, y: np.ndarray) -> np.ndarray:
             hull.pop()
         hull.append(i)
     return np.array(hull)
+
+
+@dataclass(frozen=True)
+class Lag:
+    """By how much one signal follows another: delay_s at the middle of the record, and its growth over time."""
+
+    delay_s: float
+    delay_error_s: float
+    """Standard error."""
+    skew: float
+    """Seconds of further delay per second."""
+    skew_error: float
+    gain: float
+    """Of the signal, per unit of the cause."""
+
+
+STEPS = 20
+BLOCKS = 24
+"""Parts of a record whose residuals are taken as independent of each other."""
+
+
+def follow(
+    time_s: np.ndarray,
+    signal: np.ndarray,
+    cause: np.ndarray,
+    largest_s: float,
+    others: np.ndarray | None = None,
+    with_skew: bool = False,
+) -> Lag:
+    """Delay with which a signal follows its cause, from their shapes alone.
+
+    signal(t) = a + k cause(t − d − s (t − t̄)) + others(t) b, by Gauss and Newton from the best of a coarse search.
+
+    Parameters
+    ----------
+    time_s
+        Shape (n,), evenly spaced, s.
+    signal, cause
+        Shape (n,), smoothed alike if at all; any unit.
+    largest_s
+        Largest delay looked for, either way, s.
+    others
+        What else the signal depends on at once, shape (n, m).
+    with_skew
+        Whether the delay may grow over time.
+
+    Raises
+    ------
+    InputError
+        A constant cause.
+    """
+    time_s, signal, cause = (np.asarray(v, float) for v in (time_s, signal, cause))
+    if np.ptp(cause) == 0:
+        raise InputError("a constant cause tells no delay")
+    at_once = np.column_stack([np.ones_like(time_s), *([] if others is None else np.asarray(others, float).T)])
+    step = float(np.median(np.diff(time_s)))
+    delay, skew = _coarse(time_s, signal, cause, at_once, np.arange(-largest_s, largest_s + step, 2 * step)), 0.0
+    centred = time_s - time_s.mean()
+    slope = np.gradient(cause, time_s)
+    for _ in range(STEPS):
+        when = time_s - delay - skew * centred
+        steep = np.interp(when, time_s, slope)
+        base = np.column_stack([np.interp(when, time_s, cause), at_once])
+        gain = np.linalg.lstsq(base, signal, rcond=None)[0][0]
+        moves = [-gain * steep, *([-gain * steep * centred] if with_skew else [])]
+        columns = np.column_stack([*moves, base])
+        solution = np.linalg.lstsq(columns, signal, rcond=None)[0]
+        delay += float(solution[0])
+        skew += float(solution[1]) if with_skew else 0.0
+        if abs(solution[0]) < 1e-7:
+            break
+    covariance = _robust_covariance(columns, signal - columns @ solution)
+    return Lag(
+        delay_s=delay,
+        delay_error_s=float(np.sqrt(covariance[0, 0])),
+        skew=skew,
+        skew_error=float(np.sqrt(covariance[1, 1])) if with_skew else 0.0,
+        gain=float(gain),
+    )
+
+
+def _coarse(time_s, signal, cause, at_once, delays) -> float:
+    """Of some delays that which leaves least of the signal."""
+    left = []
+    for delay in delays:
+        base = np.column_stack([np.interp(time_s - delay, time_s, cause), at_once])
+        solution = np.linalg.lstsq(base, signal, rcond=None)[0]
+        left.append(np.sum((signal - base @ solution) ** 2))
+    return float(delays[int(np.argmin(left))])
+
+
+def _robust_covariance(columns: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Covariance of least squares whose residuals are correlated within the parts of a record (sandwich)."""
+    scale = np.linalg.norm(columns, axis=0)
+    unit = columns / scale
+    inverse = np.linalg.pinv(unit.T @ unit)
+    parts = zip(np.array_split(unit, BLOCKS), np.array_split(residual, BLOCKS), strict=True)
+    scores = np.array([part.T @ rest for part, rest in parts])
+    middle = scores.T @ scores * BLOCKS / (BLOCKS - columns.shape[1])
+    return inverse @ middle @ inverse / np.outer(scale, scale)
+
+
+def pooled(lags: list[Lag]) -> tuple[float, float]:
+    """Mean delay, weighted by its errors, and its standard error, s; widened where the delays disagree."""
+    if not lags:
+        raise InputError("no delays to pool")
+    delays, errors = np.array([lag.delay_s for lag in lags]), np.array([lag.delay_error_s for lag in lags])
+    weight = 1 / errors**2
+    mean = float(weight @ delays / weight.sum())
+    spread = float(weight @ (delays - mean) ** 2 / max(len(lags) - 1, 1))
+    return mean, float(np.sqrt(max(spread, 1.0) / weight.sum()))

@@ -1,8 +1,8 @@
 """The stand's tests as recording sets of kind `stand`.
 
-Two instruments with their own clocks are put on the host's (`rotorid.stand.clocks`); a run's samples are the
-wrench sensor's, with throttle, speed and voltage interpolated to them. Before and after a programme the vehicle
-sends nothing: its motors stand.
+Two instruments with their own clocks are put on one (`rotorid.stand.align`); a run's samples are the wrench sensor's,
+with throttle, speed and voltage interpolated to them. Before and after a programme the vehicle sends nothing: its
+motors stand.
 """
 
 from __future__ import annotations
@@ -10,29 +10,24 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.sequence import Quality
 from rotorid.io.tables import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.stand.clocks import lower_edge
+from rotorid.stand.align import Aligned, Pair, on_host, pair_of, torque_offset
 
 RPM = 2 * np.pi / 60
 WRENCH = (*c.FORCE, *c.MOMENT)
 THROTTLES = c.rotor_columns("throttle", 4)
 
 
-def host_times(table: pd.DataFrame, largest_error: float) -> np.ndarray:
-    """When the device took its samples, on the host's clock, s."""
-    device_s = table["time_s"].to_numpy()
-    return lower_edge(device_s, table["host_time_s"].to_numpy(), largest_error).host(device_s)
-
-
-def _wrench_run(wrench: pd.DataFrame, largest_error: float) -> tuple[np.ndarray, pd.DataFrame]:
-    """Host times of the sensor's samples, s, and their wrench; a saturated channel's sample is empty."""
+def _felt(wrench: pd.DataFrame, offset_s: float) -> tuple[np.ndarray, pd.DataFrame]:
+    """Times of the sensor's samples, s, its offset taken off, and their wrench; a saturated channel's are empty."""
     out = wrench[list(WRENCH)].astype(float).reset_index(drop=True)
     out.loc[(wrench["quality"].to_numpy() & int(Quality.SATURATED)) != 0] = np.nan
-    return host_times(wrench, largest_error), out
+    return wrench["host_s"].to_numpy() - offset_s, out
 
 
 def _within(when: np.ndarray, times: np.ndarray, values: np.ndarray, outside: float) -> np.ndarray:
@@ -40,10 +35,11 @@ def _within(when: np.ndarray, times: np.ndarray, values: np.ndarray, outside: fl
     return np.interp(when, times, values, left=outside, right=outside)
 
 
-def experiment_run(name: str, session, quadrotor: pd.DataFrame, wrench: pd.DataFrame, largest_error: float) -> Run:
+def experiment_run(session, aligned: Aligned) -> Run:
     """One of the 48 experiments: throttles, battery voltage, attitude of the mount, wrench."""
-    when, felt = _wrench_run(wrench, largest_error)
-    sent = host_times(quadrotor, largest_error)
+    quadrotor = aligned.pair.quadrotor
+    when, felt = _felt(aligned.pair.wrench, aligned.offset_s)
+    sent = quadrotor["host_s"].to_numpy()
     table = pd.DataFrame({c.TIME: when - when[0]})
     for column in THROTTLES:
         table[column] = _within(when, sent, quadrotor[column].to_numpy(), 0.0)
@@ -51,13 +47,13 @@ def experiment_run(name: str, session, quadrotor: pd.DataFrame, wrench: pd.DataF
     table["roll_rad"] = np.radians(session.mount_roll_deg)
     table["pitch_rad"] = np.radians(session.mount_pitch_deg)
     table[list(WRENCH)] = felt
-    return Run(name, table)
+    return Run(aligned.pair.name, table)
 
 
-def torque_run(name: str, rotor: pd.DataFrame, wrench: pd.DataFrame, largest_error: float) -> Run:
-    """One torque test: motor 1 alone turns, driven and counted by the thrust tester."""
-    when, felt = _wrench_run(wrench, largest_error)
-    sent = host_times(rotor, largest_error)
+def torque_run(name: str, rotor: pd.DataFrame, wrench: pd.DataFrame, offset_s: float) -> Run:
+    """One torque test: motor 1 alone turns, driven and counted by the thrust tester; both tables have `host_s`."""
+    when, felt = _felt(wrench, offset_s)
+    sent = rotor["host_s"].to_numpy()
     table = pd.DataFrame({c.TIME: when - when[0]})
     table["throttle_1"] = _within(when, sent, rotor["throttle"].to_numpy(), 0.0)
     table["rotor_speed_1_rad_s"] = _within(when, sent, rotor["speed_rpm"].to_numpy() * RPM, 0.0)
@@ -115,31 +111,52 @@ def pairs(first: pd.DataFrame, second: pd.DataFrame) -> list[tuple]:
     return [(row, others[row.group]) for row in first.itertuples() if row.group in others]
 
 
-def dynamics_set(
-    name: str, quadrotor: tuple, wrench: tuple, believed: Vehicle, noise: dict[str, float], largest_error: float
-) -> RecordingSet:
-    """The 48 experiments; `quadrotor` and `wrench` are (samples, recordings) of `rotorid.io.tables`."""
+def read_pairs(quadrotor: tuple, wrench: tuple, largest_error: float) -> list[Pair]:
+    """The experiments' two recordings each; both arguments are (samples, recordings) of `rotorid.io.tables`."""
     commands, felt = by_recording(quadrotor[0]), by_recording(wrench[0])
-    runs = []
-    for sent, read in pairs(quadrotor[1], wrench[1]):
-        runs.append(experiment_run(sent.group, read, commands[sent.id], felt[read.id], largest_error))
-    return RecordingSet(
-        name, stand_vehicle(name, believed, next(wrench[1].itertuples()), noise), tuple(sorted(runs, key=_name))
-    )
+    return [
+        pair_of(
+            sent.group,
+            EXPERIMENTS[int(sent.experiment)].frequency_hz is not None,
+            commands[sent.id],
+            felt[read.id],
+            largest_error,
+        )
+        for sent, read in pairs(quadrotor[1], wrench[1])
+    ]
+
+
+def dynamics_set(
+    name: str, aligned: list[Aligned], recordings: pd.DataFrame, believed: Vehicle, noise: dict[str, float]
+) -> RecordingSet:
+    """The 48 experiments; `recordings` are the wrench sensor's."""
+    session_of = {session.group: session for session in recordings.itertuples()}
+    runs = [experiment_run(session_of[entry.pair.name], entry) for entry in aligned]
+    first = session_of[aligned[0].pair.name]
+    return RecordingSet(name, stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
+
+
+LARGEST_OFFSET_ERROR_S = 0.01
 
 
 def torque_set(
     name: str, rotor: tuple, wrench: tuple, believed: Vehicle, noise: dict[str, float], largest_error: float
 ) -> RecordingSet:
-    """The 20 torque tests."""
+    """The 20 torque tests; where a test's lift is too weak to tell its clocks' offset, the others' median is taken."""
     counted, felt = by_recording(rotor[0]), by_recording(wrench[0])
-    runs = [
-        torque_run(drive.group, counted[drive.id], felt[read.id], largest_error)
+    tests = [
+        (drive.group, on_host(counted[drive.id], largest_error)[0], on_host(felt[read.id], largest_error)[0])
         for drive, read in pairs(rotor[1], wrench[1])
     ]
-    return RecordingSet(
-        name, stand_vehicle(name, believed, next(wrench[1].itertuples()), noise), tuple(sorted(runs, key=_name))
-    )
+    lags = [torque_offset(speed, reading) for _, speed, reading in tests]
+    clear = [lag.delay_s for lag in lags if lag.delay_error_s < LARGEST_OFFSET_ERROR_S]
+    usual = float(np.median(clear)) if clear else 0.0
+    runs = [
+        torque_run(test, speed, reading, lag.delay_s if lag.delay_error_s < LARGEST_OFFSET_ERROR_S else usual)
+        for (test, speed, reading), lag in zip(tests, lags, strict=True)
+    ]
+    first = next(wrench[1].itertuples())
+    return RecordingSet(name, stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
 
 
 def thrust_set(name: str, rotor: tuple, believed: Vehicle, noise: dict[str, float]) -> RecordingSet:

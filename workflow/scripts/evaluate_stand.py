@@ -1,0 +1,58 @@
+"""Steady wrenches of the 48 experiments, the weight under tilt, the rotor's characteristics.
+
+- Plateau (or whole cycles of a sine) of each experiment, the rest reading before and after taken off.
+- The believed vehicle's wrench at the same throttles, by the thrust tests' curve, beside it.
+- Mass and centre of mass from the readings at rest under all tilts.
+- C_F and C_Q beside the thesis's, and how the speed follows throttle and voltage.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid import log
+from rotorid.blackbox.experiments import stand_wrench, thrust_of_throttle
+from rotorid.io.experiments import EXPERIMENTS
+from rotorid.recordings import read_set
+from rotorid.stand import wrench
+from rotorid.stand.characteristic import speed_law
+
+
+def main(
+    recordings: str, thrust: str, torque: str, parameters: str, experiments: str, weight: str, characteristic: str
+) -> None:
+    """Write the experiments (CSV), the weight (JSON) and the characteristics (JSON)."""
+    stand = read_set(Path(recordings))
+    evaluated = [wrench.evaluate(run, EXPERIMENTS[int(run.name.split("-")[1])].frequency_hz) for run in stand.runs]
+    points = pd.read_csv(thrust)
+    curve = thrust_of_throttle(points)
+    forces = np.array([np.clip(curve(entry.throttle), 0, None) for entry in evaluated])
+    tilts = np.array([[entry.roll_rad, entry.pitch_rad] for entry in evaluated])
+    expected = stand_wrench(stand.vehicle, forces, tilts[:, 0], tilts[:, 1])
+    table = wrench.table(evaluated, expected)
+    table.to_csv(experiments, index=False, float_format="%.9g")
+    believed = -np.asarray(stand.vehicle.sensor_position_m)
+    found = wrench.fit_weight(evaluated, stand.vehicle.mass_kg, believed, stand.vehicle.gravity_m_s2)
+    Path(weight).write_text(
+        json.dumps(wrench.weight_as_dict(found, stand.vehicle.mass_kg, believed, table), indent=1) + "\n",
+        encoding="utf-8",
+    )
+    fits = json.loads(Path(parameters).read_text(encoding="utf-8"))
+    both = pd.concat([points, pd.read_csv(torque)], ignore_index=True)
+    laws = {"c_f": fits["c_f"], "c_q": fits["c_q"], "speed": speed_law(both)}
+    Path(characteristic).write_text(json.dumps(laws, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            recordings=snakemake.input.recordings,
+            thrust=snakemake.input.thrust,
+            torque=snakemake.input.torque,
+            parameters=snakemake.input.parameters,
+            experiments=snakemake.output.experiments,
+            weight=snakemake.output.weight,
+            characteristic=snakemake.output.characteristic,
+        )
