@@ -113,3 +113,47 @@ rule evaluate_tensile:
         "results/logs/evaluate_tensile.log",
     script:
         "../scripts/evaluate_tensile.py"
+
+
+rule chapter_bench:
+    """Figures and tables of the bench chapter."""
+    message:
+        "Chapter bench: figures and tables"
+    input:
+        notebook="notebooks/bench.ipynb",
+        campaign=rules.calibrate_campaign.output.coefficients,
+        thesis=rules.calibrate_load_cells.output.coefficients,
+        readings=rules.calibrate_campaign.output.readings,
+        prepared="results/filtered/calibration/bench.parquet",
+        recordings="results/ingest/calibration/bench.csv",
+        points=rules.reconstruct_static.output.points,
+        loads=rules.reconstruct_static.output.loads,
+        series=rules.reconstruct_static.output.series,
+        reconstruction=rules.reconstruct_static.output.comparison,
+        flights=rules.evaluate_dynamic.output.flights,
+        flight_figures=rules.evaluate_dynamic.output.figures,
+        ratios=rules.evaluate_dynamic.output.summary,
+        specimens=rules.evaluate_tensile.output.specimens,
+        infill=rules.evaluate_tensile.output.infill,
+        curves=rules.evaluate_tensile.output.curves,
+    output:
+        reading="results/report/bench/reading.svg",
+        calibration="results/report/bench/calibration.svg",
+        residuals="results/report/bench/residuals.svg",
+        static_z="results/report/bench/static_z.svg",
+        static_axes="results/report/bench/static_axes.svg",
+        methods="results/report/bench/methods.svg",
+        dynamic="results/report/bench/dynamic.svg",
+        tensile="results/report/bench/tensile.svg",
+        coefficients="results/report/bench/coefficients.csv",
+        metrology="results/report/bench/metrology.csv",
+        platforms="results/report/bench/platforms.csv",
+        compared="results/report/bench/compared.csv",
+        flown_table="results/report/bench/flown_table.csv",
+    params:
+        code=code_of_chapter("bench"),
+    log:
+        "results/logs/chapter_bench/run.log",
+        notebook="results/logs/chapter_bench/bench.ipynb",
+    script:
+        "../scripts/run_notebook.py"

@@ -56,9 +56,44 @@ rule evaluate_stand:
         experiments="results/stand/experiments.csv",
         weight="results/stand/weight.json",
         characteristic="results/stand/characteristic.json",
+        speed="results/stand/speed.csv",
     params:
         code=code_of("evaluate_stand"),
     log:
         "results/logs/evaluate_stand.log",
     script:
         "../scripts/evaluate_stand.py"
+
+
+rule chapter_stand:
+    """Figures and tables of the stand chapter."""
+    message:
+        "Chapter stand: figures and tables"
+    input:
+        notebook="notebooks/stand.ipynb",
+        quadrotor="results/ingest/dynamics/quadrotor.parquet",
+        wrench="results/ingest/dynamics/wrench.parquet",
+        recordings=STAND_SETS["dynamics"],
+        clock_table=rules.stand_recordings.output.clocks,
+        summary=rules.stand_recordings.output.summary,
+        experiments=rules.evaluate_stand.output.experiments,
+        weight=rules.evaluate_stand.output.weight,
+        characteristic=rules.evaluate_stand.output.characteristic,
+        speed=rules.evaluate_stand.output.speed,
+        thrust=rules.fit_white_box.output.thrust,
+        torque=rules.fit_white_box.output.torque,
+    output:
+        clocks="results/report/stand/clocks.svg",
+        experiment="results/report/stand/experiment.svg",
+        steady="results/report/stand/steady.svg",
+        weight_figure="results/report/stand/weight_figure.svg",
+        characteristics="results/report/stand/characteristics.svg",
+        means="results/report/stand/means.csv",
+        parameters="results/report/stand/parameters.csv",
+    params:
+        code=code_of_chapter("stand"),
+    log:
+        "results/logs/chapter_stand/run.log",
+        notebook="results/logs/chapter_stand/stand.ipynb",
+    script:
+        "../scripts/run_notebook.py"

@@ -17,13 +17,20 @@ from rotorid.blackbox.experiments import stand_wrench, thrust_of_throttle
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.recordings import read_set
 from rotorid.stand import wrench
-from rotorid.stand.characteristic import speed_law
+from rotorid.stand.characteristic import PARAMETERS, law, speed_law
 
 
 def main(
-    recordings: str, thrust: str, torque: str, parameters: str, experiments: str, weight: str, characteristic: str
+    recordings: str,
+    thrust: str,
+    torque: str,
+    parameters: str,
+    experiments: str,
+    weight: str,
+    characteristic: str,
+    curve_of_throttle: str,
 ) -> None:
-    """Write the experiments (CSV), the weight (JSON) and the characteristics (JSON)."""
+    """Write the experiments (CSV), the weight (JSON), the characteristics (JSON) and speed by throttle (CSV)."""
     stand = read_set(Path(recordings))
     evaluated = [wrench.evaluate(run, EXPERIMENTS[int(run.name.split("-")[1])].frequency_hz) for run in stand.runs]
     points = pd.read_csv(thrust)
@@ -31,17 +38,28 @@ def main(
     forces = np.array([np.clip(curve(entry.throttle), 0, None) for entry in evaluated])
     tilts = np.array([[entry.roll_rad, entry.pitch_rad] for entry in evaluated])
     expected = stand_wrench(stand.vehicle, forces, tilts[:, 0], tilts[:, 1])
-    table = wrench.table(evaluated, expected)
+    vehicle = stand.vehicle
+    believed = -np.asarray(vehicle.sensor_position_m)
+    found = wrench.fit_weight(evaluated, vehicle.mass_kg, believed, vehicle.gravity_m_s2)
+    at_rest = [
+        wrench.weights(evaluated, mass, centre, vehicle.gravity_m_s2)
+        for mass, centre in ((vehicle.mass_kg, believed), (found.mass_kg, found.centre_m))
+    ]
+    table = wrench.table(evaluated, expected, *at_rest)
     table.to_csv(experiments, index=False, float_format="%.9g")
-    believed = -np.asarray(stand.vehicle.sensor_position_m)
-    found = wrench.fit_weight(evaluated, stand.vehicle.mass_kg, believed, stand.vehicle.gravity_m_s2)
     Path(weight).write_text(
-        json.dumps(wrench.weight_as_dict(found, stand.vehicle.mass_kg, believed, table), indent=1) + "\n",
+        json.dumps(wrench.weight_as_dict(found, vehicle.mass_kg, believed, table), indent=1) + "\n",
         encoding="utf-8",
     )
     fits = json.loads(Path(parameters).read_text(encoding="utf-8"))
     both = pd.concat([points, pd.read_csv(torque)], ignore_index=True)
-    laws = {"c_f": fits["c_f"], "c_q": fits["c_q"], "speed": speed_law(both)}
+    speed = speed_law(both)
+    throttle = np.linspace(0.01, 0.5, 50)
+    shape = np.array([speed[name] for name in PARAMETERS])
+    pd.DataFrame({"throttle": throttle, "speed_rad_s": law(shape, throttle, np.ones(50))}).to_csv(
+        curve_of_throttle, index=False, float_format="%.9g"
+    )
+    laws = {"c_f": fits["c_f"], "c_q": fits["c_q"], "speed": speed}
     Path(characteristic).write_text(json.dumps(laws, indent=1) + "\n", encoding="utf-8")
 
 
@@ -55,4 +73,5 @@ if __name__ == "__main__":
             experiments=snakemake.output.experiments,
             weight=snakemake.output.weight,
             characteristic=snakemake.output.characteristic,
+            curve_of_throttle=snakemake.output.speed,
         )

@@ -17,7 +17,6 @@ from rotorid.rotor.campaign import generated_points, thrust_points, torque_point
 from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
 from rotorid.vehicle.mass_properties import compose, read_components
 
-
 LEAST_TORQUE_SD_N_M = 1e-6
 
 

@@ -27,8 +27,8 @@ FEWEST_STEADY = 50
 def readings(prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
     """One row per calibration recording: cell, weight, repeat, mean reading and how it was had.
 
-    Columns `id cell weight_gf repeat reading_10uv noise_10uv samples slope_v_s`; the reading is in 1e-5 V, as in
-    the thesis's table 2.7. Raises InputError where a recording never became steady under its weight.
+    Columns `id cell weight_gf repeat reading_10uv mean_from_s noise_10uv samples slope_v_s`; the reading is in
+    1e-5 V, as in the thesis's table 2.7. Raises InputError where a recording never became steady under its weight.
     """
     parts = by_recording(prepared)
     rows = []
@@ -48,6 +48,7 @@ def readings(prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
                 "weight_gf": session.load_gf,
                 "repeat": session.repeat,
                 "reading_10uv": volts.mean() * 1e5,
+                "mean_from_s": time_s[0],
                 "noise_10uv": volts.std(ddof=1) * 1e5,
                 "samples": len(kept),
                 "slope_v_s": _slope(time_s, volts),

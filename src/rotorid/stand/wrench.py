@@ -138,6 +138,11 @@ class Weight:
     """… and of what the fitted one leaves."""
 
 
+def weights(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:
+    """The weight's wrench in the attitude of each experiment, shape (n, 6)."""
+    return np.array([weight_wrench(mass_kg, gravity_m_s2, centre_m, tilt(e.roll_rad, e.pitch_rad)) for e in evaluated])
+
+
 def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> Weight:
     """Mass and centre of mass from the readings at rest under all tilts, beside the believed ones.
 
@@ -161,8 +166,7 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
     half = student_t.ppf(0.975, len(left) - 3) * np.sqrt(np.diag(covariance))
 
     def rms(m: float, place: np.ndarray) -> np.ndarray:
-        expected = np.array([weight_wrench(m, gravity_m_s2, place, r) for r in rotations])
-        return np.sqrt(((rest - expected) ** 2).mean(axis=0))
+        return np.sqrt(((rest - weights(evaluated, m, place, gravity_m_s2)) ** 2).mean(axis=0))
 
     return Weight(
         mass_kg=float(mass),
@@ -174,13 +178,16 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
     )
 
 
-def table(evaluated: list[Evaluated], expected: np.ndarray) -> pd.DataFrame:
-    """One row an experiment: throttles, attitude, voltage, mean wrench with its interval, the model's, the drift.
+def table(
+    evaluated: list[Evaluated], expected: np.ndarray, believed_rest: np.ndarray, fitted_rest: np.ndarray
+) -> pd.DataFrame:
+    """One row an experiment: throttles, attitude, voltage, mean wrench with its interval, the model's, rest, drift.
 
-    `expected` is the believed vehicle's wrench at these throttles without weight, shape (n, 6).
+    `expected` is the believed vehicle's wrench at these throttles without weight, `believed_rest` and `fitted_rest`
+    that of the weight with the believed and the fitted centre of mass, shape (n, 6) each.
     """
     rows = []
-    for entry, model in zip(evaluated, expected, strict=True):
+    for entry, model, believed, fitted in zip(evaluated, expected, believed_rest, fitted_rest, strict=True):
         row = {
             "experiment": int(entry.name.split("-")[1]),
             "kind": entry.kind,
@@ -188,6 +195,8 @@ def table(evaluated: list[Evaluated], expected: np.ndarray) -> pd.DataFrame:
             "roll_deg": np.degrees(entry.roll_rad),
             "pitch_deg": np.degrees(entry.pitch_rad),
             "voltage_v": entry.voltage_v,
+            "start_s": entry.start_s,
+            "stop_s": entry.stop_s,
             "samples": entry.steady.samples,
         }
         for k, name in enumerate(WRENCH):
@@ -197,6 +206,8 @@ def table(evaluated: list[Evaluated], expected: np.ndarray) -> pd.DataFrame:
                 f"{name}_half_95": half,
                 f"{name}_model": model[k],
                 f"{name}_rest": entry.rest.mean[k],
+                f"{name}_rest_believed": believed[k],
+                f"{name}_rest_fitted": fitted[k],
                 f"{name}_drift": entry.drift[k],
             }
         rows.append(row)
