@@ -35,7 +35,7 @@ def main(
     evaluated = [wrench.evaluate(run, EXPERIMENTS[int(run.name.split("-")[1])].frequency_hz) for run in stand.runs]
     points = pd.read_csv(thrust)
     curve = thrust_of_throttle(points)
-    forces = np.array([np.clip(curve(entry.throttle), 0, None) for entry in evaluated])
+    forces = np.array([wrench.mean_thrust(run, entry, curve) for run, entry in zip(stand.runs, evaluated, strict=True)])
     tilts = np.array([[entry.roll_rad, entry.pitch_rad] for entry in evaluated])
     expected = stand_wrench(stand.vehicle, forces, tilts[:, 0], tilts[:, 1])
     vehicle = stand.vehicle

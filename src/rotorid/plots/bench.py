@@ -193,7 +193,7 @@ def tensile(curves: pd.DataFrame, specimens: pd.DataFrame) -> Figure:
         close.plot(100 * found["yield_strain"], found["yield_mpa"], "o", color=colour, markersize=4)
     for axis in (whole, close):
         axis.set_xlabel("strain (%)")
-    whole.set_ylabel("stress (MPa)")
+    whole.set(xlim=(0, None), ylim=(0, None), ylabel="stress (MPa)")
     whole.legend(title="infill")
     close.set(xlim=(0, 1.6), ylim=(0, 24), title="0.2 % yield")
     return fig

@@ -6,6 +6,7 @@ what turns with the vehicle is the arm from the sensor to the centre of mass, an
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,15 +16,13 @@ from scipy.stats import t as student_t
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Run
-from rotorid.signal.average import mean_and_error
+from rotorid.signal.average import block_count, mean_and_error
 from rotorid.stand import plateaus
 
 WRENCH = (*c.FORCE, *c.MOMENT)
 SETTLE_S = 0.5
 """Left off the beginning of a plateau and of the rest after a programme: motors and structure settle."""
 REST_MARGIN_S = 0.15
-QUANTILE = float(student_t.ppf(0.975, 20))
-"""For means of about 20 blocks."""
 
 
 def tilt(roll_rad: float, pitch_rad: float) -> np.ndarray:
@@ -43,20 +42,30 @@ def weight_wrench(mass_kg: float, gravity_m_s2: float, centre_m: np.ndarray, rot
 
 @dataclass(frozen=True)
 class Steady:
-    """Mean wrench of one stretch, N and N m, shape (6,), and its standard error."""
+    """Mean wrench of one stretch, N and N m, shape (6,), and its standard error from the means of some blocks."""
 
     mean: np.ndarray
     error: np.ndarray
     samples: int
+    blocks: int
+
+    @property
+    def half_width_95(self) -> np.ndarray:
+        """Half width of the 95 % intervals, shape (6,)."""
+        return student_t.ppf(0.975, self.blocks - 1) * self.error
 
 
-def steady_mean(run: Run, start_s: float, stop_s: float) -> Steady:
-    """Mean wrench between two times. Raises InputError for fewer than two samples."""
+def steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = None) -> Steady:
+    """Mean wrench between two times, which hold `periods` of a periodic signal if given.
+
+    Raises InputError for fewer than two samples.
+    """
     inside = (run.time_s >= start_s) & (run.time_s <= stop_s)
     if inside.sum() < 2:
         raise InputError(f"{run.name}: no samples between {start_s:.2f} and {stop_s:.2f} s")
-    pairs = [mean_and_error(column) for column in run.array(WRENCH)[inside].T]
-    return Steady(np.array([m for m, _ in pairs]), np.array([e for _, e in pairs]), int(inside.sum()))
+    blocks = periods or block_count(int(inside.sum()))
+    pairs = [mean_and_error(column, blocks) for column in run.array(WRENCH)[inside].T]
+    return Steady(np.array([m for m, _ in pairs]), np.array([e for _, e in pairs]), int(inside.sum()), blocks)
 
 
 @dataclass(frozen=True)
@@ -90,10 +99,11 @@ def evaluate(run: Run, frequency_hz: float | None) -> Evaluated:
     found = plateaus.segments(run.time_s, throttle)
     active = plateaus.programme(found)
     flat = plateaus.longest(found, plateaus.PLATEAU)
+    cycles = None
     if frequency_hz:
         cycles = int((active.length_s - SETTLE_S) * frequency_hz)
-        if cycles < 1:
-            raise InputError(f"{run.name}: less than one cycle of {frequency_hz:g} Hz")
+        if cycles < 2:
+            raise InputError(f"{run.name}: less than two cycles of {frequency_hz:g} Hz")
         start, stop, kind = active.start_s + SETTLE_S, active.start_s + SETTLE_S + cycles / frequency_hz, "cycles"
     elif flat is not None:
         start, stop, kind = flat.start_s + SETTLE_S, flat.stop_s - REST_MARGIN_S, "plateau"
@@ -101,12 +111,12 @@ def evaluate(run: Run, frequency_hz: float | None) -> Evaluated:
         raise InputError(f"{run.name}: no plateau and no frequency of a sine")
     before = steady_mean(run, -np.inf, active.start_s - REST_MARGIN_S)
     after = steady_mean(run, active.stop_s + SETTLE_S, np.inf)
-    loaded = steady_mean(run, start, stop)
+    loaded = steady_mean(run, start, stop, cycles)
     first, last = active.start_s / 2, (active.stop_s + run.time_s[-1]) / 2
     share = ((start + stop) / 2 - first) / (last - first)
     rest = before.mean + share * (after.mean - before.mean)
     rest_error = np.hypot((1 - share) * before.error, share * after.error)
-    steady = Steady(loaded.mean - rest, np.hypot(loaded.error, rest_error), loaded.samples)
+    steady = Steady(loaded.mean - rest, np.hypot(loaded.error, rest_error), loaded.samples, loaded.blocks)
     inside = (run.time_s >= start) & (run.time_s <= stop)
     return Evaluated(
         name=run.name,
@@ -121,6 +131,15 @@ def evaluate(run: Run, frequency_hz: float | None) -> Evaluated:
         stop_s=float(stop),
         kind=kind,
     )
+
+
+def mean_thrust(run: Run, entry: Evaluated, thrust_of: Callable) -> np.ndarray:
+    """Thrust that the throttles ask of each motor, N, shape (4,), mean over the steady stretch.
+
+    The mean of the thrust, not the thrust of the mean throttle: over a sine they differ.
+    """
+    inside = (run.time_s >= entry.start_s) & (run.time_s <= entry.stop_s)
+    return np.clip(thrust_of(run.array(c.rotor_columns("throttle", 4))[inside]), 0.0, None).mean(axis=0)
 
 
 @dataclass(frozen=True)
@@ -200,10 +219,9 @@ def table(
             "samples": entry.steady.samples,
         }
         for k, name in enumerate(WRENCH):
-            half = QUANTILE * entry.steady.error[k]
             row |= {
                 name: entry.steady.mean[k],
-                f"{name}_half_95": half,
+                f"{name}_half_95": entry.steady.half_width_95[k],
                 f"{name}_model": model[k],
                 f"{name}_rest": entry.rest.mean[k],
                 f"{name}_rest_believed": believed[k],
