@@ -182,6 +182,9 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
     centre, *_ = np.linalg.lstsq(rows, moments, rcond=None)
     left = moments - rows @ centre
     covariance = np.linalg.inv(rows.T @ rows) * (left @ left) / (len(left) - 3)
+    # The moments give W c; that the weight itself is known so well only adds to the arm along c.
+    mass_share = rest[:, 2].std(ddof=1) / np.sqrt(len(rest)) / pull
+    covariance += mass_share**2 * np.outer(centre, centre)
     half = student_t.ppf(0.975, len(left) - 3) * np.sqrt(np.diag(covariance))
 
     def rms(m: float, place: np.ndarray) -> np.ndarray:

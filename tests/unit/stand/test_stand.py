@@ -1,5 +1,7 @@
 """Plateaus, steady wrenches, the weight under tilt, the law of speed: against numbers done by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -86,20 +88,35 @@ def test_intervals_of_the_steady_wrench_cover() -> None:
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
 
+TILTS = [(0, 0), (0.26, 0), (-0.26, 0), (0, 0.26), (0, -0.26), (0.52, 0), (0, 0.52), (-0.52, 0)]
+CENTRE = np.array([0.003, -0.002, -0.045])
+
+
 def test_the_weight_under_tilt_gives_mass_and_centre() -> None:
-    tilts = [(0, 0), (0.26, 0), (-0.26, 0), (0, 0.26), (0, -0.26), (0.52, 0), (0, 0.52), (-0.52, 0)]
-    truth = np.array([0.003, -0.002, -0.045])
-    inside = []
-    for draw in range(40):
-        evaluated = [wrench.evaluate(experiment(*tilt, 100 * draw + i), None) for i, tilt in enumerate(tilts)]
-        found = wrench.fit_weight(evaluated, 0.652, np.array([0, 0, -0.045]), 9.81)
-        assert found.centre_m == pytest.approx(truth, abs=1e-4)
-        assert found.mass_kg == pytest.approx(0.652, abs=1e-3)
-        low, high = found.centre_interval_95.T
-        inside += [*((low < truth) & (truth < high)), found.mass_interval_95[0] < 0.652 < found.mass_interval_95[1]]
-    assert np.mean(inside) == pytest.approx(0.95, abs=0.04)
+    evaluated = [wrench.evaluate(experiment(*tilt, seed), None) for seed, tilt in enumerate(TILTS)]
+    found = wrench.fit_weight(evaluated, 0.652, np.array([0, 0, -0.045]), 9.81)
+    assert found.mass_kg == pytest.approx(0.652, abs=1e-3)
+    assert found.centre_m == pytest.approx(CENTRE, abs=1e-4)
     assert found.rms_before[4] == pytest.approx(0.652 * 9.81 * 0.003, rel=0.05)
     assert found.rms_after[4] < 3e-4
+
+
+def test_intervals_of_mass_and_centre_cover() -> None:
+    rng = np.random.default_rng(0)
+    like = wrench.evaluate(experiment(0.0, 0.0), None)
+    inside = []
+    for _ in range(500):
+        evaluated = []
+        for roll, pitch in TILTS:
+            exact = wrench.weight_wrench(0.652, 9.81, CENTRE, wrench.tilt(roll, pitch))
+            rest = replace(like.rest, mean=exact + rng.normal(0, 1, 6) * np.array([0.007] * 3 + [7e-5] * 3))
+            evaluated.append(replace(like, roll_rad=roll, pitch_rad=pitch, rest=rest))
+        found = wrench.fit_weight(evaluated, 0.652, CENTRE, 9.81)
+        low, high = found.centre_interval_95.T
+        inside.append(
+            [*((low < CENTRE) & (CENTRE < high)), found.mass_interval_95[0] < 0.652 < found.mass_interval_95[1]]
+        )
+    assert np.mean(inside, axis=0) == pytest.approx(np.full(4, 0.95), abs=0.03)
 
 
 def test_the_law_of_speed_comes_back() -> None:
