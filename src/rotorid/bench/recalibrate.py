@@ -1,6 +1,6 @@
 """Calibration of the cells from raw logs: readings of known weights, lines, and what a metrologist asks for.
 
-- A reading is the mean of the tared voltage from where it is steady under the weight to the end (fig. 2.34).
+- A reading is the mean of the tared voltage from where it stays steady under the weight to the end (fig. 2.34).
 - Linearity: largest distance of a weight's mean reading from the line. Repeatability: standard deviation of
   readings of the same weight. Both in gf and as a share of the largest weight.
 - Drift: slope in time of cells that carry nothing. Creep: slope under load, beyond the drift, per gf.
@@ -35,10 +35,12 @@ def readings(prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
     for session in sessions.itertuples():
         table = parts[session.id]
         loaded = table[table["index"] > session.mark_load]
-        where = np.flatnonzero(loaded["steady"].to_numpy())
-        if len(where) == 0 or len(loaded) - where[0] < FEWEST_STEADY:
-            raise InputError(f"{session.id}: the reading never became steady for {FEWEST_STEADY} samples")
-        kept = loaded.iloc[where[0] :]
+        # Steady until the end: before the weight is really on, the reading at rest is steady too.
+        unsteady = np.flatnonzero(~loaded["steady"].to_numpy())
+        first = int(unsteady[-1]) + 1 if len(unsteady) else 0
+        if len(loaded) - first < FEWEST_STEADY:
+            raise InputError(f"{session.id}: the reading was not steady for the last {FEWEST_STEADY} samples")
+        kept = loaded.iloc[first:]
         kept = kept[kept["quality"] == 0]
         volts, time_s = kept["cell_v"].to_numpy(), kept["time_s"].to_numpy()
         rows.append(
