@@ -127,12 +127,12 @@ def test_a_reading_that_never_settles_is_refused(tmp_path) -> None:
 MARKS = {"tare_start": 20, "tare_stop": 44, "load": 70, "read_start": 120, "read_stop": 169}
 
 
-def static_log(folder, name, loaded_v, axis, load_gf, repeat=1, spike_at=None, noise_v=NOISE_V):
+def static_log(folder, name, loaded_v, axis, load_gf, repeat=1, spike_at=None, noise_v=NOISE_V, minute=0):
     values = cells(np.asarray(loaded_v, float), noise_v=noise_v, seed=repeat)
     if spike_at is not None:
         values[spike_at] += 1e-4
     setup = Setup(kind="static", platform="al", axis=axis, load_gf=load_gf, repeat=repeat)
-    return write_log(folder, name, "bench", values, setup, MARKS)
+    return write_log(folder, name, "bench", values, setup, MARKS, f"2024-03-04T09:{minute:02d}:00-06:00")
 
 
 def test_a_static_reading_without_its_spike(tmp_path) -> None:
@@ -167,7 +167,7 @@ def test_points_by_hand() -> None:
 def test_a_static_series_becomes_a_bench_set(tmp_path) -> None:
     paths = [
         # Without noise: eq. 2.8 would turn the noise of the idle cells 1 and 5 into force.
-        static_log(tmp_path, f"s{i}", [0, 0, v, 0, 0, 0], "z", w, noise_v=0.0)
+        static_log(tmp_path, f"s{i}", [0, 0, v, 0, 0, 0], "z", w, noise_v=0.0, minute=i)
         for i, (v, w) in enumerate([(1e-5, 40), (2e-5, 80)])
     ]
     samples, sessions = tables(paths, tmp_path)
