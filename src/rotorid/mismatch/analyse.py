@@ -44,7 +44,7 @@ ABSORBED_P = 1e-6
 RUN_P = 1e-6
 RUN_SPREAD = 0.007
 """Relative spread of the thrust coefficient between runs below which one number serves all."""
-RUN_TRUST = 0.05
+RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
 UNITS = {"force": "N", "moment": "N m"}
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")

@@ -35,6 +35,10 @@ DOUBT_OF_CORRECTION = 0.5
 MOST_REMEMBERED = 2000
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
+VALUE_LIMITS = (0.15, 0.4)
+"""A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
+mismatch that needs a third of the arm is no wrong ruler."""
+HOLD = 1e6
 RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
 NOISE_SAFETY = 2.0
@@ -122,6 +126,10 @@ class Regression:
     def __post_init__(self):
         self._total_gram = self.gram[self.training].sum(axis=0)
         self._total_cross = self.cross[self.training].sum(axis=0)
+        self.limit = np.full(len(self._total_cross), np.inf)
+        for term in self.terms:
+            if term.kind == "value":
+                self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
         self._fits: dict[tuple[tuple[str, ...], bool], Fit] = {}
 
     def _normal(self, cols: np.ndarray, mask: np.ndarray):
@@ -166,8 +174,7 @@ class Regression:
                 precision[self.columns([key])] = 1.0 / sd**2
         prior = np.diag(precision[cols])
         normal = gram - bias + prior
-        inverse = ridge_inverse(normal)
-        beta = inverse @ (cross - bias_cross)
+        beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
         self._fit_held_out_scales(cols, beta, mask)
         count = int(mask.sum())
         every = self.gram[np.ix_(np.arange(len(mask)), cols, cols)]
@@ -179,9 +186,10 @@ class Regression:
         spread = scores.T @ scores * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse
         # With the ridge, or two columns that are copies of each other would seem to be known.
-        plain = inverse @ (gram + prior + RIDGE * np.diag(np.diag(normal))) @ inverse
+        plain = inverse @ (gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))) @ inverse
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
-        shift = DOUBT_OF_CORRECTION * (beta - ridge_inverse(gram + prior) @ cross)
+        uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
+        shift = DOUBT_OF_CORRECTION * (beta - uncorrected)
         covariance = at_least(robust, plain) + np.outer(shift, shift)
         rss = self.square - 2 * self.cross[:, cols] @ beta + (every @ beta) @ beta
         gain = float(self.square[mask].sum() - rss[mask].sum())
@@ -206,7 +214,8 @@ class Regression:
         """Whitened squares that terms explain on the training blocks: the gain of `fit` without the rest of it."""
         cols = self.columns(keys)
         gram, cross, bias, bias_cross = self._normal(cols, self.training)
-        beta = ridge_inverse(gram - bias + np.diag(self.precision[cols])) @ (cross - bias_cross)
+        normal = gram - bias + np.diag(self.precision[cols])
+        beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
         return float(2 * cross @ beta - beta @ gram @ beta)
 
     def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
@@ -302,6 +311,24 @@ def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
     dead = diagonal <= 1e-24
     return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+
+
+def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
+    """Solution of normal equations with |solution| within `limit` (n,): solution, inverse, and what holds it where.
+
+    The one that is furthest out is held at its limit by an overwhelming prior, until none is out.
+    """
+    held, at = np.zeros(len(right)), np.zeros(len(right))
+    for _ in range(len(right) + 1):
+        inverse = ridge_inverse(normal + np.diag(held))
+        solution = inverse @ (right + held * at)
+        out = np.where(held > 0, 0.0, np.abs(solution) / limit)
+        worst = int(np.argmax(out)) if len(out) else 0
+        if not len(out) or out[worst] <= 1.0:
+            break
+        held[worst] = HOLD * max(normal[worst, worst], 1e-300)
+        at[worst] = np.sign(solution[worst]) * limit[worst]
+    return solution, inverse, held, at
 
 
 def ridge_inverse(matrix: np.ndarray) -> np.ndarray:

@@ -279,10 +279,15 @@ class Search:
                     trail.append(f"  {key} → {better}")
             if (simpler := self.simpler(active)) is not None:
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
+                for key in active:
+                    if self.terms[key].effect not in {self.terms[k].effect for k in simpler}:
+                        dropped[self.terms[key].effect] = "the others explain as much in other forms"
                 active = simpler
             exchanged = None if added else self.swapped(active, dropped)
             if exchanged is not None:
                 trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
+                for gone in set(active) - set(exchanged):
+                    dropped[self.terms[gone].effect] = "another explains more in its place"
                 active = exchanged
             while (weak := self.weak(active)) is not None:
                 key, reason = weak
@@ -297,10 +302,11 @@ class Search:
         """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
         if len(active) >= MOST_EFFECTS:
             return None
-        for candidate in self.candidates(active):
+        # A cause without a name is looked at only where none with a name is left to enter.
+        for candidate in sorted(self.candidates(active), key=lambda c: not c.named):
             effect = self.terms[candidate.key].effect
             if candidate.score <= 0:
-                break
+                continue
             if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
                 continue
             size = self.weight(candidate.key, candidate.beta, active)

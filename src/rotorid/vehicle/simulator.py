@@ -186,7 +186,7 @@ def simulate(
 
 def _fresh(controller: Controller) -> Controller:
     """A copy of the controller as it is before the flight, so that a flight can be repeated."""
-    return copy.copy(controller)
+    return copy.deepcopy(controller)
 
 
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
