@@ -156,6 +156,7 @@ class GreyBox(Section):
     design_period_s: float = Field(gt=0, description="Period of the excitation [s].")
     design_candidates: int = Field(ge=4, description="Excitations tried by the search [1].")
     flight_s: float = Field(gt=0, description="Length of the identification flight [s].")
+    flight_step_s: float = Field(gt=0, description="Time for which that flight's motor commands are held [s].")
     motor_time_s: float = Field(ge=0, description="Time constant of the motors on that flight [s].")
     draws: int = Field(ge=1, description="Identification flights, each with its own disturbance and noise [1].")
     band_hz: tuple[float, float] = Field(

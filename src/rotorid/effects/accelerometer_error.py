@@ -12,12 +12,12 @@ def bias(motion, vehicle, values):
 
 def scale(motion, vehicle, values):
     """a_m = (1 + s) a per axis."""
-    return Contribution(specific_force=np.asarray(values) * motion.specific_force)
+    return Contribution(specific_force=np.asarray(values) * motion.accelerometer)
 
 
 def misalignment(motion, vehicle, values):
     """a_m = a + θ × a: the sensor is turned by small angles θ."""
-    return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.specific_force))
+    return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.accelerometer))
 
 
 def all_errors(motion, vehicle, values):
@@ -32,14 +32,28 @@ def all_errors(motion, vehicle, values):
 
 def forms(vehicle):
     needs = ("accelerometer",)
-    b = tuple(Parameter(f"b_{a}", "m/s2", -20.0, 20.0, negligible=0.01) for a in "xyz")
-    s = tuple(Parameter(f"s_{a}", "1", -0.9, 2.0, negligible=0.003) for a in "xyz")
-    t = tuple(Parameter(f"theta_{a}", "rad", -0.5, 0.5, negligible=0.001) for a in "xyz")
+
+    def each(symbol, unit, low, high, meaning, negligible):
+        return tuple(
+            Parameter(f"{symbol}_{a}", unit, low, high, meaning=f"{meaning} {a}", negligible=negligible) for a in "xyz"
+        )
+
+    b = each("b", "m/s2", -20.0, 20.0, "bias along", 0.01)
+    s = each("s", "1", -0.9, 2.0, "scale error along", 0.003)
+    t = each("theta", "rad", -0.5, 0.5, "turn of the sensor about", 0.001)
+    bias_too = ("always",)
     return (
-        Form("bias", "a_m = a + b", b, bias, needs),
+        Form("bias", "a_m = a + b", b, bias, needs, excited_by=bias_too),
         Form("scale", "a_m = (1 + s) a", s, scale, needs),
         Form("misalignment", "a_m = a + θ × a", t, misalignment, needs),
-        Form("bias, scale and misalignment", "a_m = (1 + s) a + θ × a + b", b + s + t, all_errors, needs),
+        Form(
+            "bias, scale and misalignment",
+            "a_m = (1 + s) a + θ × a + b",
+            b + s + t,
+            all_errors,
+            needs,
+            excited_by=bias_too,
+        ),
     )
 
 
@@ -48,7 +62,14 @@ EFFECT = Effect(
     name="an error of the accelerometer",
     sentence="the accelerometer reads a constant, a factor or a tilt off",
     forms=forms,
-    source="physics.md F21",
+    source="Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., ch. 4; catalogue F21",
+    sign=("positive b and s make the reading larger along the axis; θ is a right-handed turn of the reading"),
+    validity=(
+        "constant over a recording and small turns (below 0.5 rad); temperature and g-sensitive drift "
+        "are left out. With the accelerometer as only source of force, a bias equals a constant force "
+        "and a scale error equals a wrong mass"
+    ),
+    excited_by=("accelerometer",),
     confusers=("thrust_tilt", "steady_wind"),
     separating_manoeuvre="a static six-face calibration, or record position beside the accelerometer",
     kind="sensor",

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+from rotorid.effects.scale import scale
 
 
 def at_the_hubs(motion, vehicle, values):
@@ -29,18 +30,20 @@ def independent_of_speed(motion, vehicle, values):
 
 
 def forms(vehicle):
-    k_z = Parameter("k_z", "N s2/(rad m)", 0.0, meaning="thrust lost per rotor speed and climb speed")
+    size = scale(vehicle)
+    k_z = Parameter(
+        "k_z",
+        "N s2/(rad m)",
+        0.0,
+        size.drag_per_rotor_speed,
+        meaning="thrust lost per rotor speed and climb speed",
+    )
+    d_z = Parameter("d_z", "N s/m", 0.0, size.drag_per_speed, meaning="thrust lost per climb speed")
     needs = ("velocity", "rotor_speed")
     return (
         Form("at the hubs", "T_i −= k_z ω_i v_z,i (climbing)", (k_z,), at_the_hubs, needs),
         Form("at the centre of mass", "T −= k_z Σω v_z (climbing)", (k_z,), at_the_centre, needs),
-        Form(
-            "independent of rotor speed",
-            "F_z = −d_z v_z",
-            (Parameter("d_z", "N s/m", 0.0),),
-            independent_of_speed,
-            ("velocity",),
-        ),
+        Form("independent of rotor speed", "F_z = −d_z v_z", (d_z,), independent_of_speed, ("velocity",)),
     )
 
 
@@ -49,7 +52,15 @@ EFFECT = Effect(
     name="axial inflow",
     sentence="thrust falls when climbing and grows when sinking",
     forms=forms,
-    source="physics.md F9; Hoffmann et al., 2007",
+    source="Hoffmann et al., Quadrotor helicopter flight dynamics and control, AIAA GNC 2007; catalogue F9",
+    sign=(
+        "positive k_z takes thrust from a climbing rotor and gives thrust to a sinking one; at the hubs "
+        "it damps roll and pitch"
+    ),
+    validity=(
+        "axial speeds small against the induced velocity (climb or descent below half the hover inflow), no vortex ring"
+    ),
+    excited_by=("velocity", "angular_velocity"),
     confusers=("frame_drag", "motor_lag", "rotational_damping"),
     separating_manoeuvre="fly steady climbs and descents",
 )

@@ -21,6 +21,8 @@ def drift(path, values):
     return path.speed * np.maximum(1.0 - values[0] * minutes, 0.05)[:, None]
 
 
+P = Parameter("p", "1", 0.0, 3.0, meaning="exponent of the voltage; 1 for a speed proportional to it")
+
 EFFECT = Effect(
     id="battery_sag",
     name="the sag of the battery",
@@ -30,16 +32,17 @@ EFFECT = Effect(
         SpeedForm(
             "power of voltage",
             "ω = ω_c (V/V_0)^p",
-            (Parameter("p", "1", 0.0, 3.0),),
+            (P,),
             1,
             power,
             (0.0,),
             ("voltage",),
+            "voltage",
         ),
         SpeedForm(
             "power of voltage, own reference",
             "ω = (1 + g) ω_c (V/V_0)^p",
-            (Parameter("p", "1", 0.0, 3.0), Parameter("g", "1", -0.5, 1.0)),
+            (P, Parameter("g", "1", -0.5, 1.0, meaning="excess of speed at the largest voltage")),
             1,
             power_of_reference,
             (0.0, 0.0),
@@ -48,13 +51,19 @@ EFFECT = Effect(
         SpeedForm(
             "drift in time",
             "ω = ω_c (1 − k t)",
-            (Parameter("k", "1/min", 0.0, 1.0),),
+            (Parameter("k", "1/min", 0.0, 1.0, meaning="share of the speed lost per minute", negligible=0.01),),
             1,
             drift,
             (0.0,),
+            excited_by="time",
         ),
     ),
-    source="physics.md F4",
+    source=(
+        "Bitcraze, thrust against battery voltage of the Crazyflie; Quan, Introduction to Multicopter "
+        "Design and Control, ch. 6; catalogue F4"
+    ),
+    sign="positive p and k make the rotors slower as the voltage falls or time passes",
+    validity=("speed controllers without feedback of the speed; the exponent is constant over the battery's range"),
     confusers=("throttle_curve", "command_saturation"),
     separating_manoeuvre="record voltage and current, rest the battery and repeat the same hover",
 )

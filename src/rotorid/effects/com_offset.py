@@ -22,10 +22,10 @@ def with_lever_arm(motion, vehicle, values):
 
 
 def forms(vehicle):
-    plane = (Parameter("r_x", "m", -0.3, 0.3), Parameter("r_y", "m", -0.3, 0.3))
+    plane = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xy")
     text = "M = −r_c × F_thrust"
     return (
-        Form("moment", text, plane, moment_only, ("rotor_speed", "angular_velocity")),
+        Form("moment", text, plane, moment_only, ("rotor_speed", "angular_velocity"), excited_by=("rotor_speed",)),
         Form(
             "moment and accelerometer",
             text + ", a_m = a + dΩ × (−r_c) + Ω × (Ω × (−r_c))",
@@ -41,7 +41,16 @@ EFFECT = Effect(
     name="an offset of the centre of mass",
     sentence="a roll or pitch moment proportional to thrust",
     forms=forms,
-    source="physics.md F15",
+    source="rigid-body mechanics; Titterton and Weston, ch. 4 (lever arm); catalogue F15",
+    sign=(
+        "r is where the true centre of mass lies from the believed one; positive r_x (forward) gives a "
+        "nose-down moment in hover"
+    ),
+    validity=(
+        "offsets in the rotor plane; a vertical offset needs side forces and is left out, as is the "
+        "change of inertia (m r², below 1 % for r under 5 mm)"
+    ),
+    excited_by=("rotor_speed", "angular_velocity", "angular_acceleration"),
     confusers=("unequal_rotors", "thrust_tilt"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets with rotor speeds recorded",
 )

@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
 
 
@@ -47,6 +48,8 @@ class Motion:
     """Velocity over ground, (n, 3), m/s, body axes."""
     wind: np.ndarray | None = None
     """Velocity of the air over ground, (3,) or (n, 3), m/s, world axes; None for still air."""
+    position: np.ndarray | None = None
+    """Position of the body origin, (n, 3), m, world axes."""
     height: np.ndarray | None = None
     """Height of the centre of mass above ground, (n,), m."""
     voltage: np.ndarray | None = None
@@ -145,6 +148,9 @@ class Form:
     """Parameters without which the form is another effect: each must differ from zero by two standard errors."""
     memory: bool = False
     """Whether it needs the past (a pendulum of its own): one instant does not give its wrench."""
+    excited_by: tuple[str, ...] = ()
+    """Fields of `Motion` without which nothing is added: the contribution is zero where all of them are zero
+    (`height`: far from the ground). `always` for a form that is there in any flight. Empty takes the effect's."""
 
     @property
     def linear(self) -> tuple[int, ...]:
@@ -192,11 +198,32 @@ class SpeedForm:
     apply: Callable[[SpeedPath, np.ndarray], np.ndarray]
     neutral: tuple[float, ...]
     requires: tuple[str, ...] = ()
+    excited_by: Literal["command", "change", "voltage", "limit", "time"] = "command"
+    """What it takes to show: any command, a command that changes, a voltage below the largest, a command beyond
+    the limit, or time since the start of the run."""
+
+
+@dataclass(frozen=True)
+class SetForm:
+    """One way in which a recording set is not what it says; `apply(recordings, values)` gives the faulty set.
+
+    For faults of sensors, logging and of the set's own description, which are no wrench. `neutral` are the
+    parameter values that change nothing, `example` those of a plain fault.
+    """
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    apply: Callable[[RecordingSet, np.ndarray], RecordingSet]
+    neutral: tuple[float, ...]
+    example: tuple[float, ...]
+    columns: tuple[str, ...]
+    """Columns that it spoils (or, for the set's description, that show it)."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One id of the catalogue."""
+    """One id of the catalogue: adding an effect is adding one file with one of these, named EFFECT."""
 
     id: str
     name: str
@@ -206,17 +233,49 @@ class Effect:
     forms: FormsFor
     """The forms for a vehicle (their parameters may depend on its number of rotors)."""
     source: str
+    sign: str = ""
+    """What a positive parameter does, in the contract's axes."""
+    validity: str = ""
+    """Where the equations hold, and what they leave out."""
+    excited_by: tuple[str, ...] = ()
+    """As `Form.excited_by`, for the forms that state none of their own."""
     confusers: tuple[str, ...] = ()
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
     speed_forms: tuple[SpeedForm, ...] = ()
     """Forms that act between command and rotor speed."""
+    set_forms: Callable[[Vehicle], tuple[SetForm, ...]] = lambda vehicle: ()
+    """Forms that spoil a recorded set."""
+    form_named: Callable[[str], Form | None] = lambda name: None
+    """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
 
+    def excitation(self, form: Form) -> tuple[str, ...]:
+        """What excites one of the effect's forms."""
+        return form.excited_by or self.excited_by
+
+
+_RATES = "angular_velocity_*_rad_s, or quaternion_*"
+COLUMNS_OF = {
+    "rotor_speed": "rotor_speed_*_rad_s, or rotor_command_*_rad_s, or throttle_*",
+    "rotor_acceleration": "rotor_speed_*_rad_s, or rotor_command_*_rad_s, or throttle_*",
+    "angular_velocity": _RATES,
+    "angular_acceleration": _RATES,
+    "specific_force": "specific_force_*_m_s2, or velocity_*_m_s (or position_*_m) and quaternion_*",
+    "accelerometer": "specific_force_*_m_s2",
+    "gyroscope": "angular_velocity_*_rad_s and quaternion_*",
+    "rotation": "quaternion_*",
+    "velocity": "velocity_*_m_s (or position_*_m) and quaternion_*",
+    "position": "position_*_m",
+    "height": "height_m, or position_z_m where vehicle.yaml states ground_z_m",
+    "voltage": "battery_voltage_v",
+}
+"""Columns of a run that give a field of `Motion`."""
 
 LACK = {
     "velocity": "no velocity or position recorded",
     "rotation": "no attitude recorded",
+    "position": "no position recorded",
     "height": "no height above ground",
     "voltage": "no battery voltage",
     "angular_velocity": "no body rates or attitude recorded",
@@ -242,17 +301,6 @@ def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | N
     return None
 
 
-def rotor_radius_m(vehicle: Vehicle) -> float:
-    """Rotor radius, m; where none is stated, 0.45 of the smallest distance between two hubs."""
-    if vehicle.rotor_radius_m is not None:
-        return vehicle.rotor_radius_m
-    hubs = vehicle.rotor_positions_m()
-    if len(hubs) < 2:
-        return 0.1
-    apart = np.linalg.norm(hubs[:, None] - hubs[None], axis=2)
-    return 0.45 * float(apart[apart > 0].min())
-
-
 def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
     """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
     # Products of (n, k) by (k,) are many times faster here than sums and cross products over short axes.
@@ -263,3 +311,15 @@ def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
         force=np.stack([fx @ every, fy @ every, fz @ every], axis=1),
         moment=np.stack([fz @ y - fy @ z, fx @ z - fz @ x, fy @ x - fx @ y], axis=1),
     )
+
+
+def rotor_thrusts(motion: Motion, vehicle: Vehicle) -> np.ndarray:
+    """Believed thrust of each rotor, C_F ω², shape (n, k), N."""
+    return vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
+
+
+def lift_at_hubs(extra_n: np.ndarray, vehicle: Vehicle) -> Contribution:
+    """Force and moment of further thrust (n, k), N, along each rotor's axis (body -z)."""
+    forces = np.zeros((*extra_n.shape, 3))
+    forces[:, :, 2] = -extra_n
+    return at_hubs(forces, vehicle.rotor_positions_m())

@@ -3,16 +3,35 @@
 import numpy as np
 
 from rotorid.effects.contract import Effect, Parameter, SpeedForm
+from rotorid.effects.recorded import late_sensors
+
+
+def _later(speed, steps):
+    """Speeds (n, k) by whole steps later (earlier if negative); the ends are held."""
+    steps = int(np.clip(steps, -len(speed), len(speed)))
+    out = np.empty_like(speed)
+    if steps >= 0:
+        out[:steps], out[steps:] = speed[0], speed[: len(speed) - steps]
+    else:
+        out[steps:], out[:steps] = speed[-1], speed[-steps:]
+    return out
 
 
 def shifted(path, values):
     """ω(t) = ω_c(t - T), linear between samples."""
     steps = values[0] / path.dt_s
-    index = np.arange(len(path.speed)) - steps
-    low = np.clip(np.floor(index).astype(int), 0, len(path.speed) - 1)
-    high = np.clip(low + 1, 0, len(path.speed) - 1)
-    part = np.clip(index - low, 0.0, 1.0)[:, None]
-    return (1 - part) * path.speed[low] + part * path.speed[high]
+    whole = np.floor(steps)
+    part = steps - whole
+    out = _later(path.speed, whole)
+    if part > 0.0:
+        out *= 1.0 - part
+        out += part * _later(path.speed, whole + 1)
+    return out
+
+
+def set_forms(vehicle):
+    parameters = (Parameter("T", "s", -0.5, 0.5, meaning="time behind", negligible=0.001),)
+    return late_sensors(vehicle, "written at t: the value of t − T", parameters, (0.03,), lambda t, values: values[0])
 
 
 EFFECT = Effect(
@@ -20,17 +39,32 @@ EFFECT = Effect(
     name="a delay",
     sentence="one recording follows another late, without being smoothed",
     forms=lambda vehicle: (),
+    set_forms=set_forms,
     speed_forms=(
         SpeedForm(
             "of the command",
             "ω(t) = ω_c(t − T)",
-            (Parameter("T", "s", -0.05, 0.3, nonlinear=True, starts=(0.01, 0.03, 0.1)),),
+            (
+                Parameter(
+                    "T",
+                    "s",
+                    -0.05,
+                    0.3,
+                    nonlinear=True,
+                    starts=(0.01, 0.03, 0.1),
+                    meaning="time behind",
+                    negligible=0.001,
+                ),
+            ),
             3,
             shifted,
             (0.0,),
+            excited_by="change",
         ),
     ),
-    source="physics.md F20",
+    source="signal theory (phase linear in frequency, gain one); catalogue F20",
+    sign="positive T is late: what is written at t happened at t − T",
+    validity="a constant delay; the part below one sample is a nuisance and never reported",
     confusers=("motor_lag", "clock_skew"),
     separating_manoeuvre="excite collective and attitude up to 8 Hz",
     kind="sensor",

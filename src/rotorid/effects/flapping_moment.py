@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.scale import scale
 
 E3 = np.array([0.0, 0.0, 1.0])
 
@@ -21,18 +22,21 @@ def independent_of_speed(motion, vehicle, values):
 
 
 def forms(vehicle):
+    size = scale(vehicle)
+    k_flap = size.arm_m * size.drag_per_rotor_speed
+    k_m = size.arm_m * size.drag_per_speed
     return (
         Form(
             "at the hubs",
             "M = k_flap Σ ω_i (e3 × v_i)",
-            (Parameter("k_flap", "N m s2/(rad m)", 0.0),),
+            (Parameter("k_flap", "N m s2/(rad m)", 0.0, k_flap, meaning="moment per rotor speed and airspeed"),),
             hub_moment,
             ("velocity", "rotor_speed"),
         ),
         Form(
             "independent of rotor speed",
             "M = k_m (e3 × v)",
-            (Parameter("k_m", "N s", 0.0),),
+            (Parameter("k_m", "N s", 0.0, k_m, meaning="moment per airspeed"),),
             independent_of_speed,
             ("velocity",),
         ),
@@ -44,7 +48,10 @@ EFFECT = Effect(
     name="the hub moment of blade flapping",
     sentence="a pitching or rolling moment grows with airspeed",
     forms=forms,
-    source="physics.md F6; RotorPy's k_flap; Mahony et al., 2012",
+    source=("Mahony, Kumar and Corke, Multirotor aerial vehicles, IEEE RAM 2012; RotorPy's k_flap; catalogue F6"),
+    sign=("positive raises the nose in forward flight (the disc tilts back) and rolls away from sideways flight"),
+    validity=("advance ratios below about 0.1 to 0.2; the force part of flapping is rotor_drag (one class with it)"),
+    excited_by=("velocity", "angular_velocity"),
     confusers=("rotor_interference", "rotor_drag"),
     separating_manoeuvre="fly forward, backward and sideways at several speeds",
 )

@@ -3,6 +3,10 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.scale import scale
+
+MOST_WEIGHTS_AT_10_M_S = 2.0
+"""Drag at 10 m/s beyond this many weights is no airframe's (published: 0.1 to 0.5)."""
 
 
 def isotropic(motion, vehicle, values):
@@ -25,9 +29,11 @@ def per_component(motion, vehicle, values):
 
 def forms(vehicle):
     unit = "N s2/m2"
-    axes = tuple(Parameter(f"c_{a}", unit, 0.0) for a in "xyz")
+    most = MOST_WEIGHTS_AT_10_M_S * scale(vehicle).weight_n / 100.0
+    axes = tuple(Parameter(f"c_{a}", unit, 0.0, most, meaning=f"ρ C_D A / 2 along {a}") for a in "xyz")
+    c = Parameter("c", unit, 0.0, most, meaning="ρ C_D A / 2")
     return (
-        Form("isotropic", "F = −c |v| v", (Parameter("c", unit, 0.0),), isotropic, ("velocity",)),
+        Form("isotropic", "F = −c |v| v", (c,), isotropic, ("velocity",)),
         Form("per axis", "F_j = −c_j |v| v_j", axes, per_axis, ("velocity",)),
         Form("per component", "F_j = −c_j |v_j| v_j", axes, per_component, ("velocity",)),
     )
@@ -38,7 +44,16 @@ EFFECT = Effect(
     name="drag of the airframe",
     sentence="the force grows with the square of the airspeed",
     forms=forms,
-    source="physics.md F7; RotorPy's parasitic drag",
+    source=(
+        "RotorPy's parasitic drag (Folk et al., 2023); Leishman, Principles of Helicopter Aerodynamics, "
+        "ch. 5; catalogue F7"
+    ),
+    sign="positive c opposes the motion through the air",
+    validity=(
+        "force at the centre of mass, constant drag coefficient; at low speed linear rotor drag hides it "
+        "(span beyond 8 m/s)"
+    ),
+    excited_by=("velocity",),
     confusers=("rotor_drag", "steady_wind"),
     separating_manoeuvre="fly a speed sweep beyond 10 m/s in both directions",
 )

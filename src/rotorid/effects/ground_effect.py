@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter, at_hubs, rotor_radius_m
+from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
+from rotorid.effects.scale import rotor_radius_m
 
 CLOSEST_RADII = 0.3
 """Heights below this many rotor radii are held there: the closed forms diverge and no rotor gets closer."""
@@ -19,10 +20,7 @@ def hub_heights_m(motion, vehicle):
 
 
 def _along_thrust(gain, motion, vehicle):
-    thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-    forces = np.zeros((*thrust.shape, 3))
-    forces[:, :, 2] = -gain * thrust
-    return at_hubs(forces, vehicle.rotor_positions_m())
+    return lift_at_hubs(gain * rotor_thrusts(motion, vehicle), vehicle)
 
 
 def image(motion, vehicle, values):
@@ -49,14 +47,14 @@ def forms(vehicle):
         Form(
             "image rotor",
             "T/T_∞ = 1/(1 − c (R/4z)²)",
-            (Parameter("c", "1", 0.0, 40.0, nonlinear=True, starts=(1.0, 4.0, 10.0)),),
+            (Parameter("c", "1", 0.0, 40.0, True, (1.0, 4.0, 10.0), "gain of the image rotor, 1 for a single one"),),
             image,
             needs,
         ),
         Form(
             "inverse square",
             "T/T_∞ = 1 + c (R/4z)²",
-            (Parameter("c", "1", 0.0, 60.0),),
+            (Parameter("c", "1", 0.0, 60.0, meaning="gain of the image rotor, 1 for a single one"),),
             inverse_square,
             needs,
         ),
@@ -64,7 +62,7 @@ def forms(vehicle):
             "exponential",
             "T/T_∞ = 1 + a exp(−b z)",
             (
-                Parameter("a", "1", 0.0, 3.0),
+                Parameter("a", "1", 0.0, 3.0, meaning="thrust gained on the ground itself"),
                 Parameter(
                     "b",
                     "1/m",
@@ -72,6 +70,7 @@ def forms(vehicle):
                     10.0 / radius,
                     nonlinear=True,
                     starts=(0.3 / radius, 1.0 / radius),
+                    meaning="one over the height at which it has fallen to 37 %",
                 ),
             ),
             exponential,
@@ -85,7 +84,12 @@ EFFECT = Effect(
     name="ground effect",
     sentence="thrust grows within a few rotor radii of the ground",
     forms=forms,
-    source="Cheeseman and Bennett, 1955; physics.md F10",
+    source="Cheeseman and Bennett, ARC R&M 3021, 1955; catalogue F10",
+    sign="positive c and a add thrust close to the ground",
+    validity=(
+        "level flat ground, hub heights above 0.3 R (below, the height is held) and up to about 5 R; slow flight"
+    ),
+    excited_by=("height",),
     confusers=("translational_lift", "axial_inflow"),
     separating_manoeuvre="hover at a ladder of heights from half to ten rotor radii",
 )

@@ -28,29 +28,20 @@ def misalignment(motion, vehicle, values):
 
 
 def forms(vehicle):
-    needs = ("gyroscope", "rotation")
+    needs = ("gyroscope", "rotation", "angular_velocity", "angular_acceleration")
+
+    def each(symbol, unit, low, high, meaning, negligible):
+        return tuple(
+            Parameter(f"{symbol}_{a}", unit, low, high, meaning=f"{meaning} {a}", negligible=negligible) for a in "xyz"
+        )
+
+    b = each("b", "rad/s", -5.0, 5.0, "bias about", 0.001)
+    s = each("s", "1", -0.9, 2.0, "scale error about", 0.005)
+    t = each("theta", "rad", -0.5, 0.5, "turn of the sensor about", 0.003)
     return (
-        Form(
-            "bias",
-            "Ω_m = Ω + b",
-            tuple(Parameter(f"b_{a}", "rad/s", -5.0, 5.0, negligible=0.001) for a in "xyz"),
-            bias,
-            needs,
-        ),
-        Form(
-            "scale",
-            "Ω_m = (1 + s) Ω",
-            tuple(Parameter(f"s_{a}", "1", -0.9, 2.0, negligible=0.005) for a in "xyz"),
-            scale,
-            needs,
-        ),
-        Form(
-            "misalignment",
-            "Ω_m = Ω + θ × Ω",
-            tuple(Parameter(f"theta_{a}", "rad", -0.5, 0.5, negligible=0.003) for a in "xyz"),
-            misalignment,
-            needs,
-        ),
+        Form("bias", "Ω_m = Ω + b", b, bias, needs[:2], excited_by=("always",)),
+        Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs),
+        Form("misalignment", "Ω_m = Ω + θ × Ω", t, misalignment, needs),
     )
 
 
@@ -59,7 +50,13 @@ EFFECT = Effect(
     name="an error of the gyroscope",
     sentence="the gyroscope disagrees with the turning of the attitude",
     forms=forms,
-    source="physics.md F23",
+    source="Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., ch. 4; catalogue F23",
+    sign=("positive b and s make the reading larger about the axis; θ is a right-handed turn of the reading"),
+    validity=(
+        "constant over a recording and small turns; told by the attitude recorded beside it, so attitude "
+        "must not come from the same gyroscope alone"
+    ),
+    excited_by=("angular_velocity", "angular_acceleration"),
     confusers=("inertia_products",),
     separating_manoeuvre="record ten seconds at rest before take-off",
     kind="sensor",

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.scale import scale
 
 PAIRS = (("J_xy", 0, 1), ("J_xz", 0, 2), ("J_yz", 1, 2))
 
@@ -17,12 +18,12 @@ def products(motion, vehicle, values):
 
 
 def forms(vehicle):
-    bound = 1.0 if vehicle.inertia_kg_m2 is None else vehicle.inertia_kg_m2.zz
+    bound = scale(vehicle).inertia_kg_m2
     return (
         Form(
             "products",
             "M = −(E dΩ/dt + Ω × E Ω)",
-            tuple(Parameter(name, "kg m2", -bound, bound) for name, _, _ in PAIRS),
+            tuple(Parameter(name, "kg m2", -bound, bound, meaning="entry of J to be added") for name, _, _ in PAIRS),
             products,
             ("angular_velocity", "angular_acceleration"),
         ),
@@ -34,7 +35,10 @@ EFFECT = Effect(
     name="products of inertia",
     sentence="a moment about one axis follows the angular acceleration about another",
     forms=forms,
-    source="physics.md F18; Euler's equations with a full inertia matrix",
+    source=("Euler's equations with a full inertia matrix (Goldstein, Classical Mechanics, ch. 5); catalogue F18"),
+    sign="entries of J as the recording contract has them: J_xz = −∫ x z dm",
+    validity="rigid body; linear in the products, the diagonal as believed",
+    excited_by=("angular_velocity", "angular_acceleration"),
     confusers=("gyro_error", "rotor_gyroscopic"),
     separating_manoeuvre="excite roll, pitch and yaw one after the other by doublets",
 )

@@ -21,7 +21,9 @@ def _lag(command, up, down):
 
 
 def lagged(command, tau_up_s, tau_down_s, dt_s):
-    """dω/dt = (ω_c - ω)/τ, exact over a sample, shape (n, k)."""
+    """dω/dt = (ω_c - ω)/τ, exact over a sample, shape (n, k); no lag at all for time constants of zero."""
+    if tau_up_s <= 0.0 and tau_down_s <= 0.0:
+        return command
     up = 1.0 - np.exp(-dt_s / max(tau_up_s, 1e-5))
     down = 1.0 - np.exp(-dt_s / max(tau_down_s, 1e-5))
     return _lag(np.ascontiguousarray(command), up, down)
@@ -50,7 +52,7 @@ EFFECT = Effect(
     sentence="rotor speed follows its command late and smoothed",
     forms=lambda vehicle: (),
     speed_forms=(
-        SpeedForm("one constant", "dω/dt = (ω_c − ω)/τ", (_tau("tau"),), 4, one_constant, (0.0,)),
+        SpeedForm("one constant", "dω/dt = (ω_c − ω)/τ", (_tau("tau"),), 4, one_constant, (0.0,), excited_by="change"),
         SpeedForm(
             "up and down",
             "dω/dt = (ω_c − ω)/τ_up or τ_down",
@@ -58,10 +60,16 @@ EFFECT = Effect(
             4,
             up_and_down,
             (0.0, 0.0),
+            excited_by="change",
         ),
-        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), 4, on_thrust, (0.0,)),
+        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), 4, on_thrust, (0.0,), excited_by="change"),
     ),
-    source="physics.md F1; Quan, Introduction to Multicopter Design and Control, ch. 6",
+    source="Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F1",
+    sign="positive τ follows later; τ_up for speeds that grow, τ_down for speeds that fall",
+    validity=(
+        "first order, the same for all rotors, amplitudes below the speed controllers' rate limits; "
+        "below about 2 Hz it equals a delay"
+    ),
     confusers=("delay", "throttle_curve"),
     separating_manoeuvre="excite collective and attitude up to 8 Hz, or record rotor speeds",
 )

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.scale import scale
 
 
 def slung(motion, vehicle, values):
@@ -47,44 +48,35 @@ def rigid_with_inertia(motion, vehicle, values):
 
 
 def forms(vehicle):
-    mass = vehicle.mass_kg or 1.0
-    bound = 1.0 if vehicle.inertia_kg_m2 is None else vehicle.inertia_kg_m2.zz
+    size = scale(vehicle)
+    mass, bound = size.mass_kg, size.inertia_kg_m2
+    m_p = Parameter("m_p", "kg", 0.0, 2 * mass, meaning="mass of the payload")
+    places = (
+        Parameter("m_p x", "kg m", -mass, mass, meaning="its mass times its place forward"),
+        Parameter("m_p y", "kg m", -mass, mass, meaning="its mass times its place to the right"),
+    )
+    products = tuple(
+        Parameter(name, "kg m2", -bound, bound, meaning="product of inertia that it adds")
+        for name in ("J_xy", "J_xz", "J_yz")
+    )
     return (
         Form(
             "rigid with its products of inertia",
             "F = −m_p a, M = −m_p r × a − (E dΩ/dt + Ω × E Ω)",
-            (
-                Parameter("m_p", "kg", 0.0, 2 * mass),
-                Parameter("m_p x", "kg m"),
-                Parameter("m_p y", "kg m"),
-                *(Parameter(name, "kg m2", -bound, bound) for name in ("J_xy", "J_xz", "J_yz")),
-            ),
+            (m_p, *places, *products),
             rigid_with_inertia,
             ("specific_force", "angular_velocity", "angular_acceleration"),
             must_show=(0,),
         ),
-        Form(
-            "rigid",
-            "F = −m_p a, M = −m_p r × a",
-            (
-                Parameter("m_p", "kg", 0.0, 2 * mass),
-                Parameter("m_p x", "kg m"),
-                Parameter("m_p y", "kg m"),
-            ),
-            rigid,
-            ("specific_force",),
-            must_show=(0,),
-        ),
+        Form("rigid", "F = −m_p a, M = −m_p r × a", (m_p, *places), rigid, ("specific_force",), must_show=(0,)),
         Form(
             "slung",
             "F = m_p g θ, θ'' + 2ζωθ' + ω²θ = −a_h/L",
-            (
-                Parameter("m_p", "kg", 0.0, 2 * mass),
-                Parameter("L", "m", 0.15, 6.0, nonlinear=True, starts=(0.3, 0.6, 1.2, 2.4)),
-            ),
+            (m_p, Parameter("L", "m", 0.15, 6.0, True, (0.3, 0.6, 1.2, 2.4), "length of the cable")),
             slung,
             ("specific_force", "rotation"),
             memory=True,
+            excited_by=("always",),
         ),
     )
 
@@ -94,7 +86,13 @@ EFFECT = Effect(
     name="a payload",
     sentence="the vehicle is heavier than believed, off its centre, or carries a pendulum",
     forms=forms,
-    source="contract; physics.md (payload)",
+    source=("rigid-body mechanics; Sreenath, Lee and Kumar, CDC 2013 (suspended load); recording contract"),
+    sign="positive m_p pulls down; (x, y) is where it hangs from the believed centre of mass",
+    validity=(
+        "rigid: a point mass in the rotor plane, its own inertia left out. Slung: small angles (below "
+        "about 0.3 rad), cable taut, hung at the centre of mass"
+    ),
+    excited_by=("specific_force", "angular_velocity", "angular_acceleration"),
     confusers=("com_offset",),
     separating_manoeuvre="weigh the vehicle; stop sharply from forward flight and hover",
 )

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.scale import scale
 
 
 def linear(motion, vehicle, values):
@@ -23,22 +24,14 @@ def isotropic(motion, vehicle, values):
 
 def forms(vehicle):
     needs = ("angular_velocity",)
+    most = scale(vehicle).damping
+    each = tuple(Parameter(f"c_{a}", "N m s/rad", 0.0, most, meaning=f"damping about {a}") for a in "xyz")
+    square = tuple(Parameter(f"c_{a}", "N m s2/rad2", 0.0, most, meaning=f"damping about {a}") for a in "xyz")
+    one = Parameter("c", "N m s/rad", 0.0, most, meaning="damping about every axis")
     return (
-        Form("one constant", "M = −c Ω", (Parameter("c", "N m s/rad", 0.0),), isotropic, needs),
-        Form(
-            "linear",
-            "M_j = −c_j Ω_j",
-            tuple(Parameter(f"c_{a}", "N m s/rad", 0.0) for a in "xyz"),
-            linear,
-            needs,
-        ),
-        Form(
-            "quadratic",
-            "M_j = −c_j |Ω_j| Ω_j",
-            tuple(Parameter(f"c_{a}", "N m s2/rad2", 0.0) for a in "xyz"),
-            quadratic,
-            needs,
-        ),
+        Form("one constant", "M = −c Ω", (one,), isotropic, needs),
+        Form("linear", "M_j = −c_j Ω_j", each, linear, needs),
+        Form("quadratic", "M_j = −c_j |Ω_j| Ω_j", square, quadratic, needs),
     )
 
 
@@ -47,7 +40,13 @@ EFFECT = Effect(
     name="rotational damping",
     sentence="a moment opposes the body rates",
     forms=forms,
-    source="contract and physics.md (M = −c Ω)",
+    source=(
+        "Quan, Introduction to Multicopter Design and Control, ch. 6 (damping moment); the recording "
+        "contract (M = −c Ω)"
+    ),
+    sign="positive c opposes the turning",
+    validity="what axial inflow at the hubs does not explain; rates below about 10 rad/s for the linear forms",
+    excited_by=("angular_velocity",),
     confusers=("axial_inflow", "delay", "gyro_error"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets of several lengths",
 )

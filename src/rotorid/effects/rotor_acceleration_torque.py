@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.scale import scale
 
 
 def reaction(motion, vehicle, values):
@@ -17,7 +18,7 @@ def forms(vehicle):
         Form(
             "reaction",
             "M_z = J_r Σ y_i dω_i/dt",
-            (Parameter("J_r", "kg m2", 0.0, meaning="inertia of one rotor"),),
+            (Parameter("J_r", "kg m2", 0.0, scale(vehicle).inertia_kg_m2 / 4, meaning="inertia of one rotor"),),
             reaction,
             ("rotor_acceleration",),
         ),
@@ -29,7 +30,10 @@ EFFECT = Effect(
     name="the reaction torque of accelerating rotors",
     sentence="a yaw moment while rotors speed up or slow down",
     forms=forms,
-    source="physics.md F13",
+    source="Bouabdallah, PhD thesis, EPFL 2007 (inertial counter torque); catalogue F13",
+    sign="positive J_r: a rotor that speeds up turns the airframe against its spin",
+    validity="rotor with motor bell as one rigid inertia; needs rotor speeds faster than about 1 Hz",
+    excited_by=("rotor_acceleration",),
     confusers=("motor_lag", "delay"),
     separating_manoeuvre="excite yaw on both sides of 1 Hz",
 )

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+from rotorid.effects.scale import scale
 
 IN_PLANE = np.array([1.0, 1.0, 0.0])
 
@@ -40,31 +41,23 @@ def linear_in_speed(motion, vehicle, values):
 
 def forms(vehicle):
     needs = ("velocity", "rotor_speed")
-    k_d = Parameter("k_d", "N s2/(rad m)", 0.0, np.inf, meaning="in-plane drag per rotor speed and airspeed")
+    size, unit = scale(vehicle), "N s2/(rad m)"
+    most = size.drag_per_rotor_speed
+    k_d = Parameter("k_d", unit, 0.0, most, meaning="in-plane drag per rotor speed and airspeed")
+    axes = tuple(Parameter(f"k_d_{a}", unit, 0.0, most, meaning=f"{k_d.meaning} along {a}") for a in "xy")
+    d = Parameter("d", "N s/m", 0.0, size.drag_per_speed, meaning="linear drag")
     return (
         Form("at the hubs", "F_i = −k_d ω_i v_i,⊥", (k_d,), at_the_hubs, needs),
         Form("at the centre of mass", "F = −k_d Σω v_⊥", (k_d,), at_the_centre, needs),
-        Form(
-            "per axis",
-            "F = −Σω (k_d,x v_x, k_d,y v_y, 0)",
-            (Parameter("k_d_x", k_d.unit, 0.0), Parameter("k_d_y", k_d.unit, 0.0)),
-            per_axis,
-            needs,
-        ),
+        Form("per axis", "F = −Σω (k_d,x v_x, k_d,y v_y, 0)", axes, per_axis, needs),
         Form(
             "per axis, at the hubs",
             "F_i = −ω_i (k_d,x v_x,i, k_d,y v_y,i, 0)",
-            (Parameter("k_d_x", k_d.unit, 0.0), Parameter("k_d_y", k_d.unit, 0.0)),
+            axes,
             per_axis_at_the_hubs,
             needs,
         ),
-        Form(
-            "independent of rotor speed",
-            "F = −d v_⊥",
-            (Parameter("d", "N s/m", 0.0, meaning="linear drag"),),
-            linear_in_speed,
-            ("velocity",),
-        ),
+        Form("independent of rotor speed", "F = −d v_⊥", (d,), linear_in_speed, ("velocity",)),
     )
 
 
@@ -73,7 +66,13 @@ EFFECT = Effect(
     name="rotor drag",
     sentence="the sideways force grows with airspeed times rotor speed",
     forms=forms,
-    source="Faessler et al., RA-L 2018; physics.md F5 and F6",
+    source=("Faessler, Franchi and Scaramuzza, RA-L 2018; Mahony, Kumar and Corke, IEEE RAM 2012; catalogue F5 and F6"),
+    sign="positive k_d opposes the hub's motion through the air in the rotor plane",
+    validity=(
+        "linear in airspeed: advance ratios below about 0.2; holds H-force and the force part of "
+        "flapping together (one class)"
+    ),
+    excited_by=("velocity", "angular_velocity"),
     confusers=("frame_drag", "steady_wind", "thrust_tilt"),
     separating_manoeuvre="fly a speed sweep beyond 10 m/s in both directions, once light and once loaded",
 )

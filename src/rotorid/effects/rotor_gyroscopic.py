@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.scale import scale
 
 
 def spin_vector(vehicle):
@@ -22,7 +23,7 @@ def forms(vehicle):
         Form(
             "gyroscopic",
             "M = −Ω × J_r Σ s_i ω_i e3",
-            (Parameter("J_r", "kg m2", 0.0, meaning="inertia of one rotor"),),
+            (Parameter("J_r", "kg m2", 0.0, scale(vehicle).inertia_kg_m2 / 4, meaning="inertia of one rotor"),),
             gyroscopic,
             ("angular_velocity", "rotor_speed"),
         ),
@@ -34,7 +35,10 @@ EFFECT = Effect(
     name="the gyroscopic moment of the rotors",
     sentence="a moment proportional to body rate times the rotors' net spin",
     forms=forms,
-    source="physics.md F12; thesis eqs 4.12-4.19",
+    source="Bouabdallah, PhD thesis, EPFL 2007; thesis eqs 4.12 to 4.19; catalogue F12",
+    sign="positive J_r; the momentum of a rotor clockwise seen from above points along body +z (down)",
+    validity="rotor axes parallel to body z; equals zero where the rotors' speeds cancel",
+    excited_by=("angular_velocity",),
     confusers=("inertia_products",),
     separating_manoeuvre="roll and pitch quickly while yawing, so that the rotors' net spin is large",
 )

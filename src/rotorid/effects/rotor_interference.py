@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter, at_hubs, rotor_radius_m
+from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
+from rotorid.effects.scale import hover_inflow_m_s
 
 
 def _rear_weight(motion, vehicle):
@@ -15,10 +16,7 @@ def _rear_weight(motion, vehicle):
 
 
 def _loss(fraction, motion, vehicle):
-    thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-    forces = np.zeros((*thrust.shape, 3))
-    forces[:, :, 2] = fraction * thrust
-    return at_hubs(forces, vehicle.rotor_positions_m())
+    return lift_at_hubs(-fraction * rotor_thrusts(motion, vehicle), vehicle)
 
 
 def growing(motion, vehicle, values):
@@ -34,19 +32,13 @@ def saturating(motion, vehicle, values):
     return _loss(values[0] * speed / (speed + inflow) * _rear_weight(motion, vehicle), motion, vehicle)
 
 
-def hover_inflow_m_s(vehicle, density_kg_m3: float = 1.2):
-    """Momentum theory: v_h = sqrt(T / (2 ρ π R²)) of one rotor in hover, m/s."""
-    thrust = vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.rotor_count
-    return float(np.sqrt(thrust / (2 * density_kg_m3 * np.pi * rotor_radius_m(vehicle) ** 2)))
-
-
 def forms(vehicle):
     needs = ("velocity", "rotor_speed")
     return (
         Form(
             "growing with airspeed",
             "T_rear = T (1 − e v_h)",
-            (Parameter("e", "s/m", 0.0, 0.2),),
+            (Parameter("e", "s/m", 0.0, 0.2, meaning="share of thrust lost per airspeed"),),
             growing,
             needs,
             (),
@@ -55,7 +47,7 @@ def forms(vehicle):
         Form(
             "saturating",
             "T_rear = T (1 − ε v_h/(v_h + v_i))",
-            (Parameter("eps", "1", 0.0, 0.6),),
+            (Parameter("eps", "1", 0.0, 0.6, meaning="share of thrust lost in fast flight"),),
             saturating,
             needs,
             (),
@@ -69,7 +61,15 @@ EFFECT = Effect(
     name="interference between front and rear rotors",
     sentence="the rear rotors lose thrust in forward flight",
     forms=forms,
-    source="physics.md F14",
+    source=(
+        "Powers, Mellinger, Kumar et al., Influence of aerodynamics and proximity effects in quadrotor "
+        "flight, ISER 2012; catalogue F14"
+    ),
+    sign=(
+        "positive takes thrust from the rotors at the rear of the flight direction: the nose (or leading side) rises"
+    ),
+    validity="an empirical ramp from front to rear, in-plane airspeed only, rotors in one plane",
+    excited_by=("velocity",),
     confusers=("flapping_moment", "rotor_drag"),
     separating_manoeuvre="fly forward and backward at several speeds and heights of the rotor plane",
 )

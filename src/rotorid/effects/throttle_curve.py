@@ -37,7 +37,10 @@ EFFECT = Effect(
         SpeedForm(
             "affine",
             "ω = (1 + a_1) ω_c + a_0 ω_max",
-            (Parameter("a_0", "1", -0.8, 0.8), Parameter("a_1", "1", -0.8, 2.0)),
+            (
+                Parameter("a_0", "1", -0.8, 0.8, meaning="speed at no command, share of ω_max"),
+                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope"),
+            ),
             0,
             affine,
             (0.0, 0.0),
@@ -45,7 +48,10 @@ EFFECT = Effect(
         SpeedForm(
             "quadratic",
             "ω = (1 + a_1 + a_2 ω_c/ω_max) ω_c",
-            (Parameter("a_1", "1", -0.8, 2.0), Parameter("a_2", "1", -2.0, 2.0)),
+            (
+                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope at no command"),
+                Parameter("a_2", "1", -2.0, 2.0, meaning="growth of the slope with the command"),
+            ),
             0,
             quadratic,
             (0.0, 0.0),
@@ -53,7 +59,7 @@ EFFECT = Effect(
         SpeedForm(
             "dead zone",
             "ω = ω_max (u − u_0)/(1 − u_0)",
-            (Parameter("u_0", "1", -0.3, 0.5),),
+            (Parameter("u_0", "1", -0.3, 0.5, meaning="command at which the rotors start"),),
             0,
             dead_zone,
             (0.0,),
@@ -61,13 +67,18 @@ EFFECT = Effect(
         SpeedForm(
             "thrust curve of the throttle",
             "T/T_max = b u + (1 − b) u²",
-            (Parameter("b", "1", -0.3, 1.0),),
+            (Parameter("b", "1", -0.3, 1.0, meaning="linear share of thrust"),),
             0,
             root,
             (0.0,),
         ),
     ),
-    source="physics.md F2; PX4's THR_MDL_FAC",
+    source="PX4's THR_MDL_FAC; Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F2",
+    sign=(
+        "positive a_0 and a_1 turn faster than commanded; positive u_0 is a dead zone; b = 0 is a speed "
+        "proportional to the command"
+    ),
+    validity="static and the same for all rotors; at one voltage, or together with battery_sag",
     confusers=("battery_sag", "thrust_curve", "command_saturation"),
     separating_manoeuvre="step the throttle up and down over its whole range with two battery charges",
 )

@@ -2,49 +2,50 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
-
-
-def _thrust(extra, vehicle):
-    forces = np.zeros((*extra.shape, 3))
-    forces[:, :, 2] = -extra
-    return at_hubs(forces, vehicle.rotor_positions_m())
+from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs
+from rotorid.effects.scale import scale
 
 
 def linear_term(motion, vehicle, values):
     """T_i += c_1 ω_i."""
-    return _thrust(values[0] * motion.rotor_speed, vehicle)
+    return lift_at_hubs(values[0] * motion.rotor_speed, vehicle)
 
 
 def constant_term(motion, vehicle, values):
     """T_i += c_0."""
-    return _thrust(values[0] * np.ones_like(motion.rotor_speed), vehicle)
+    return lift_at_hubs(values[0] * np.ones_like(motion.rotor_speed), vehicle)
 
 
 def linear_and_constant(motion, vehicle, values):
     """T_i += c_0 + c_1 ω_i."""
-    return _thrust(values[0] + values[1] * motion.rotor_speed, vehicle)
+    return lift_at_hubs(values[0] + values[1] * motion.rotor_speed, vehicle)
 
 
 def cubic_term(motion, vehicle, values):
     """T_i += c_3 ω_i³."""
-    return _thrust(values[0] * motion.rotor_speed**3, vehicle)
+    return lift_at_hubs(values[0] * motion.rotor_speed**3, vehicle)
 
 
 def forms(vehicle):
     needs = ("rotor_speed",)
-    c0, c1 = Parameter("c_0", "N"), Parameter("c_1", "N s/rad")
+    size = scale(vehicle)
+    thrust, speed = size.thrust_n, size.hover_speed_rad_s
+    c0 = Parameter("c_0", "N", -thrust, thrust, meaning="thrust beyond the square at any speed")
+    c1 = Parameter("c_1", "N s/rad", -thrust / speed, thrust / speed, meaning="thrust beyond the square per speed")
+    c3 = Parameter("c_3", "N s3/rad3", -thrust / speed**3, thrust / speed**3, meaning="cubic thrust")
+    always = ("always",)
     return (
         Form("linear term", "T_i = C_F ω_i² + c_1 ω_i", (c1,), linear_term, needs),
-        Form("constant term", "T_i = C_F ω_i² + c_0", (c0,), constant_term, needs),
-        Form("linear and constant", "T_i = C_F ω_i² + c_1 ω_i + c_0", (c0, c1), linear_and_constant, needs),
+        Form("constant term", "T_i = C_F ω_i² + c_0", (c0,), constant_term, needs, excited_by=always),
         Form(
-            "cubic term",
-            "T_i = C_F ω_i² + c_3 ω_i³",
-            (Parameter("c_3", "N s3/rad3"),),
-            cubic_term,
+            "linear and constant",
+            "T_i = C_F ω_i² + c_1 ω_i + c_0",
+            (c0, c1),
+            linear_and_constant,
             needs,
+            excited_by=always,
         ),
+        Form("cubic term", "T_i = C_F ω_i² + c_3 ω_i³", (c3,), cubic_term, needs),
     )
 
 
@@ -53,7 +54,10 @@ EFFECT = Effect(
     name="a thrust curve that is not a pure square",
     sentence="thrust is off by an amount that depends on rotor speed alone",
     forms=forms,
-    source="physics.md F3; Bitcraze thrust fits",
+    source="Bitcraze and Förster (ETH 2015), thrust fits of the Crazyflie; Leishman, ch. 2; catalogue F3",
+    sign="positive adds thrust (along −z of the body) to every rotor",
+    validity=("within the range of rotor speeds flown; a wide range tells the terms apart, a narrow one does not"),
+    excited_by=("rotor_speed",),
     confusers=("axial_inflow", "translational_lift"),
     separating_manoeuvre="step the throttle over the widest range of rotor speeds",
 )

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs, rotor_thrusts
 
 
 def _forces(motion, vehicle, tilt_x, tilt_y):
-    thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
+    thrust = rotor_thrusts(motion, vehicle)
     forces = np.zeros((*thrust.shape, 3))
     forces[:, :, 0] = thrust * tilt_x
     forces[:, :, 1] = thrust * tilt_y
@@ -39,7 +39,7 @@ def _single(k):
 
 
 def forms(vehicle):
-    tilt = (Parameter("eps_x", "rad", -0.5, 0.5), Parameter("eps_y", "rad", -0.5, 0.5))
+    tilt = tuple(Parameter(f"eps_{a}", "rad", -0.5, 0.5, meaning=f"tilt of the thrust along {a}") for a in "xy")
     needs = ("rotor_speed",)
     singles = [
         Form(f"rotor {k + 1}", f"F_{k + 1} = T_{k + 1} (ε_x, ε_y, −1)", tilt, _single(k), needs, (), 2)
@@ -57,7 +57,10 @@ EFFECT = Effect(
     name="a tilted thrust axis",
     sentence="a sideways force proportional to thrust",
     forms=forms,
-    source="physics.md F16",
+    source="rigid-body mechanics, small angles; catalogue F16",
+    sign="positive ε_x pushes forward, positive ε_y to the right",
+    validity="angles below about 0.3 rad (loss of lift of second order left out), constant",
+    excited_by=("rotor_speed",),
     confusers=("accelerometer_error", "steady_wind", "com_offset"),
     separating_manoeuvre="record position beside the accelerometer while yawing through 360 degrees",
 )

@@ -2,14 +2,11 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
 
 
 def _thrust(motion, vehicle, weights):
-    thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-    forces = np.zeros((*thrust.shape, 3))
-    forces[:, :, 2] = -weights * thrust
-    return at_hubs(forces, vehicle.rotor_positions_m())
+    return lift_at_hubs(weights * rotor_thrusts(motion, vehicle), vehicle)
 
 
 def _torque(motion, vehicle, weights):
@@ -37,11 +34,14 @@ def torque_only(motion, vehicle, values):
 
 
 def _contrast(function):
-    """The differences between rotors alone: what all share is a wrong coefficient, not a difference."""
+    """The differences between rotors alone: what all share is a wrong coefficient, not a difference.
+
+    The last rotor's share is minus the sum of the others'; with one more parameter the common part would be free
+    although nothing shows it, and the normal equations singular.
+    """
 
     def contrast(motion, vehicle, values):
-        weights = np.asarray(values, float)
-        return function(motion, vehicle, weights - weights.mean())
+        return function(motion, vehicle, np.append(values, -np.sum(values)))
 
     return contrast
 
@@ -58,28 +58,20 @@ def _one(k, count, function):
 def forms(vehicle):
     needs = ("rotor_speed",)
     count = vehicle.rotor_count
-    symbols = tuple(Parameter(f"d_{i + 1}", "1", -0.9, 2.0) for i in range(count))
-    text = "C_F,{0} = C_F (1 + d_{0}), C_Q,{0} = C_Q (1 + d_{0})"
+    symbols = tuple(Parameter(f"d_{i + 1}", "1", -0.9, 2.0, meaning=f"excess of rotor {i + 1}") for i in range(count))
+    both_text = "C_F,{0} = C_F (1 + d_{0}), C_Q,{0} = C_Q (1 + d_{0})"
+    thrust_text, torque_text = "C_F,{0} = C_F (1 + d_{0})", "C_Q,{0} = C_Q (1 + d_{0})"
     singles = [
-        Form(f"rotor {i + 1}", text.format(i + 1), (symbols[i],), _one(i, count, both), needs, (), 2)
-        for i in range(count)
-    ] + [
-        Form(
-            f"thrust of rotor {i + 1}",
-            f"C_F,{i + 1} = C_F (1 + d_{i + 1})",
-            (symbols[i],),
-            _one(i, count, thrust_only),
-            needs,
-            (),
-            2,
-        )
+        Form(name.format(i + 1), text.format(i + 1), (symbols[i],), _one(i, count, function), needs, (), 2)
+        for name, text, function in (("rotor {}", both_text, both), ("thrust of rotor {}", thrust_text, thrust_only))
         for i in range(count)
     ]
+    free, closed = symbols[:-1], ", Σ d_i = 0"
     return (
         *singles,
-        Form("thrust and torque", text.format("i"), symbols, _contrast(both), needs, (), 2),
-        Form("thrust", "C_F,i = C_F (1 + d_i)", symbols, _contrast(thrust_only), needs, (), 2),
-        Form("torque", "C_Q,i = C_Q (1 + d_i)", symbols, _contrast(torque_only), needs, (), 2),
+        Form("thrust and torque", both_text.format("i") + closed, free, _contrast(both), needs, (), 2),
+        Form("thrust", thrust_text.format("i") + closed, free, _contrast(thrust_only), needs, (), 2),
+        Form("torque", torque_text.format("i") + closed, free, _contrast(torque_only), needs, (), 2),
     )
 
 
@@ -88,7 +80,10 @@ EFFECT = Effect(
     name="a difference between the rotors",
     sentence="one or more rotors give more or less thrust than the others",
     forms=forms,
-    source="physics.md F17",
+    source="rotor coefficients per rotor, no further assumption; catalogue F17",
+    sign="positive d_i: rotor i gives more than the coefficient believed",
+    validity="the same share over all speeds; equal shares of all rotors are a wrong coefficient (under parameters)",
+    excited_by=("rotor_speed",),
     confusers=("com_offset", "thrust_tilt"),
     separating_manoeuvre="swap two propellers and repeat the hover, or excite roll, pitch and yaw",
 )

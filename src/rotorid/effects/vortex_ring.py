@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
-from rotorid.effects.rotor_interference import hover_inflow_m_s
+from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
+from rotorid.effects.scale import hover_inflow_m_s
 
 
 def mean_loss(motion, vehicle, values):
-    """T_i = T (1 - k g(x)), x = descent speed / hover inflow, g a bump over 0.5 to 1.5 centred at 1."""
+    """T_i = T (1 - k g(x)), x = descent speed over hover inflow.
+
+    g = 1 - ((x - 1)/0.7)² where positive, fading with in-plane speed.
+    """
     x = motion.air_velocity[:, 2] / hover_inflow_m_s(vehicle)
     slow = np.linalg.norm(motion.air_velocity[:, :2], axis=1) / hover_inflow_m_s(vehicle)
     bump = np.clip(1.0 - ((x - 1.0) / 0.7) ** 2, 0.0, None) * np.exp(-(slow**2))
-    thrust = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-    forces = np.zeros((*thrust.shape, 3))
-    forces[:, :, 2] = values[0] * bump[:, None] * thrust
-    return at_hubs(forces, vehicle.rotor_positions_m())
+    return lift_at_hubs(-values[0] * bump[:, None] * rotor_thrusts(motion, vehicle), vehicle)
 
 
 def forms(vehicle):
@@ -22,7 +22,7 @@ def forms(vehicle):
         Form(
             "mean loss",
             "T_i = T (1 − k g(v_z/v_h))",
-            (Parameter("k", "1", 0.0, 0.8),),
+            (Parameter("k", "1", 0.0, 0.8, meaning="largest share of thrust lost"),),
             mean_loss,
             ("velocity", "rotor_speed"),
         ),
@@ -34,7 +34,13 @@ EFFECT = Effect(
     name="the vortex ring state",
     sentence="thrust is lost and fluctuates in a steep descent",
     forms=forms,
-    source="physics.md F11; Leishman, Principles of Helicopter Aerodynamics, ch. 2.13",
+    source="Leishman, Principles of Helicopter Aerodynamics, ch. 2.13; catalogue F11",
+    sign="positive k takes thrust in a steep descent",
+    validity=(
+        "mean loss at descents of 0.3 to 1.7 hover inflows with little forward speed; the fluctuations "
+        "are random and only their mean is modelled"
+    ),
+    excited_by=("velocity",),
     confusers=("gust", "axial_inflow"),
     separating_manoeuvre="descend vertically at 0.5, 1 and 1.5 times the hover inflow, and climb likewise",
 )

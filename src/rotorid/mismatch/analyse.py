@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
@@ -19,11 +20,13 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, residual
-from rotorid.mismatch.select import Selection
-from rotorid.mismatch.speedpath import SpeedResult, commanded_path
+from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term, residual
+from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
+from rotorid.mismatch.speedpath import SpeedResult, commanded_path, nothing_between
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import (
     WrenchModel,
+    after_residual,
     chosen,
     in_wind,
     nonlinear_intervals,
@@ -35,9 +38,14 @@ from rotorid.mismatch.wrench import (
     with_wind,
     wrench_model,
 )
-from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.recordings import RecordingSet, Vehicle, columns
 
 ABSORBED_P = 1e-6
+RUN_P = 1e-6
+RUN_SPREAD = 0.007
+"""Relative spread of the thrust coefficient between runs below which one number serves all."""
+RUN_TRUST = 0.02
+"""Relative one-sigma of a run's own thrust about the common one."""
 UNITS = {"force": "N", "moment": "N m"}
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 
@@ -46,7 +54,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     """The whole analysis of a set of kind `flight`."""
     recordings, mistakes, remarks = find_mistakes(recordings)
     prepared = prepare(recordings, cutoff_hz)
-    notes = list(remarks)
+    notes = [*remarks]
     findings = list(mistakes)
     reasons = dict(prepared.not_testable)
     measured = all(s.measured_speed for s in prepared.segments)
@@ -64,10 +72,16 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         segments = path_segments(prepared.segments, *found, cutoff)
         noisy = path_segments(prepared.noisy_segments, *found, cutoff)
         model = refined_model(prepared, segments, noisy)
+    if found is not None and not measured and [k for k, _ in found[0].fit.chain] == ["throttle_curve"]:
+        # A curve alters differences between rotors too: unequal rotors at one throttle look like one.
+        plain = refined_model(prepared, prepared.segments, prepared.noisy_segments)
+        if cost_of(plain, model.regression.filters) < cost_of(model, model.regression.filters) + curve_cost(found[0]):
+            segments, noisy, model = prepared.segments, prepared.noisy_segments, plain
+            found = (nothing_between(found[0]), *found[1:])
 
     if model.wind is not None:
         findings.append(wind_finding(model))
-        segments = in_wind(segments, model.wind)
+        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
     if found is None:
         reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
     else:
@@ -99,6 +113,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         reverse_regression(prepared, model, segments),
         size,
     )
+    told = speed_for_coefficients(values, prepared.vehicle) if only_throttle(recordings) else values
     findings = payload_or_offset(findings, values)
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
@@ -106,10 +121,11 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         nothing = Selection([], model.selection.fit)
         plain_values = wrong_values(model.regression, model.search, nothing, None, size)
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
-    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in values.items()})
+    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
+    notes += run_scale_notes(model)
     traces = make_traces(prepared, model, found, measured, plain_values, values)
     before, after, depends = dependence(prepared, model, segments)
-    share, channels, description = leftover(prepared, model, segments, before, after, depends)
+    share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}
     return Analysis(
         recordings=recordings,
@@ -118,7 +134,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         refitted=refitted,
         improved=improved,
         findings=tuple(together(findings)),
-        values=contract_values(prepared.vehicle, values),
+        values=contract_values(prepared.vehicle, told),
         not_testable={k: v for k, v in reasons.items() if k not in known},
         traces=traces,
         noise_floor=noise_floors(prepared, model, found, measured),
@@ -126,7 +142,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         regimes=regimes_by_run(segments, prepared),
         unexplained_share=share,
         unexplained_channels=channels,
-        unexplained_depends_on=tuple(depends),
+        unexplained_depends_on=depends,
         unexplained_description=description,
         force_source=segments[0].force_source,
         notes=tuple(notes),
@@ -137,6 +153,9 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
     model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
     terms = list(prepared.terms)
+    if thrust_differs(model):
+        terms = with_run_scales(terms, prepared)
+        model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
     for _ in range(2 if any(model.search.terms[k].form.nonlinear for k in model.selection.active) else 0):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
@@ -150,6 +169,49 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
         terms = [t for t in model.terms if not t.run]
     return with_gusts(prepared, model, segments, noisy, terms)
+
+
+def thrust_differs(model: WrenchModel) -> bool:
+    """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than RUN_SPREAD."""
+    if "thrust" not in model.search.terms or not all(s.measured_speed for s in model.prepared.segments):
+        return False
+    regression = model.regression
+    fit = regression.fit(model.search.always + model.selection.active)
+    spread, p = regression.between_runs(fit, "thrust")
+    runs = len(np.unique(regression.run[regression.training]))
+    return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
+
+
+def run_scale_notes(model: WrenchModel) -> list[str]:
+    """What was done about a thrust that differs between runs."""
+    terms = [t for t in model.regression.terms if t.key.startswith(RUN_SCALE)]
+    if not terms:
+        return []
+    fit = model.regression.fit(model.search.always + model.selection.active)
+    found = [fit.beta[fit.columns == model.regression.start[t.key]][0] for t in terms]
+    parts = ", ".join(f"{t.run} {100 * b:+.1f} %" for t, b in zip(terms, found, strict=True))
+    return [f"The thrust coefficient is not the same in every run; each has its own scale ({parts})."]
+
+
+def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
+    """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
+    runs = dict.fromkeys(s.run for s in prepared.segments)
+    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(RUN_TRUST,), run=r) for r in runs)]
+
+
+def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
+    """Whitened squares that a model leaves, and what its ids and parameters cost."""
+    left = 0.0
+    for part in after_residual(model):
+        for channel, taps in filters.items():
+            left += float((lfilter(taps, [1.0], part[:, channel])[len(taps) :] ** 2).sum())
+    terms = [model.search.terms[k] for k in model.selection.active]
+    return left + sum(COST_PER_EFFECT + COST_PER_PARAMETER * t.size for t in terms)
+
+
+def curve_cost(result: SpeedResult) -> float:
+    """What the forms between command and rotor speed cost."""
+    return sum(COST_PER_EFFECT + COST_PER_PARAMETER * len(form.parameters) for _, form in result.fit.chain)
 
 
 def wind_finding(model: WrenchModel) -> Finding:
@@ -233,6 +295,31 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     return out
 
 
+def only_throttle(recordings: RecordingSet) -> bool:
+    """Whether rotor speeds are known from the throttle and a believed full speed alone."""
+    count = recordings.vehicle.rotor_count
+    return all(
+        run.has(*columns.rotor_columns("throttle", count))
+        and not run.has(*columns.rotor_columns("rotor_command", count))
+        and not run.has(*columns.rotor_columns("rotor_speed", count))
+        for run in recordings.runs
+    )
+
+
+def speed_for_coefficients(values: dict, vehicle: Vehicle) -> dict:
+    """Thrust and torque coefficients off by one factor are one speed at full throttle off by its root."""
+    if not {"thrust", "torque"} <= set(values) or vehicle.rotor_speed_limits_rad_s is None:
+        return values
+    (thrust, thrust_sd), (torque, torque_sd) = values["thrust"], values["torque"]
+    if abs(thrust - torque) > 2.0 * np.hypot(thrust_sd, torque_sd) + 0.005:
+        return values
+    weight = 1.0 / np.square([thrust_sd, torque_sd])
+    change = float(weight @ [thrust, torque] / weight.sum())
+    factor = np.sqrt(1.0 + change)
+    rest = {k: v for k, v in values.items() if k not in ("thrust", "torque")}
+    return {**rest, "speed": (float(factor - 1.0), float(0.5 / factor / np.sqrt(weight.sum())))}
+
+
 def throttle_or_thrust(finding: Finding) -> Finding:
     """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
     if finding.id != "thrust_curve" or finding.status not in ("established", "ambiguous"):
@@ -251,7 +338,7 @@ def absorbed_findings(model: WrenchModel, values: dict, findings: list[Finding])
     taken = {f.id for f in findings}
     out: dict[str, Finding] = {}
     for term in model.regression.terms:
-        if term.kind != "effect" or term.effect in taken or term.effect in out:
+        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
             continue
         fit = model.regression.fit([*held, *model.selection.active, term.key])
         p = model.regression.wald(fit, model.regression.columns([term.key]), search.blocks)
@@ -285,6 +372,8 @@ def believed_value(vehicle: Vehicle, key: str) -> float:
         return float(vehicle.thrust_coefficients_n_s2().mean())
     if key == "torque":
         return float(vehicle.torque_coefficients_n_m_s2().mean())
+    if key == "speed":
+        return vehicle.rotor_speed_limits_rad_s[1]
     if key == "arm":
         return 1.0
     return getattr(vehicle.inertia_kg_m2, key[-2:])
@@ -304,6 +393,9 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
     if inertia:
         old = vehicle.inertia_kg_m2
         change["inertia_kg_m2"] = old.model_copy(update={k: getattr(old, k) * f for k, f in inertia.items()})
+    if "speed" in relative:
+        low, high = vehicle.rotor_speed_limits_rad_s
+        change["rotor_speed_limits_rad_s"] = (low, high * (1 + relative["speed"]))
     if "arm" in relative:
         f = 1 + relative["arm"]
         change["rotors"] = tuple(r.model_copy(update={"x_m": r.x_m * f, "y_m": r.y_m * f}) for r in vehicle.rotors)
@@ -326,6 +418,7 @@ def make_traces(
     loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
     plain = regression.fit(offsets_of(model) + list(plain_values), loose=loose)
     full = regression.fit(offsets_of(model) + list(values) + model.selection.active, loose=loose)
+    named = np.where(model.unnamed(full.columns), 0.0, full.beta)
     out = []
     for r, segment in zip(model.rows, prepared.segments, strict=True):
         before = r.y
@@ -336,7 +429,7 @@ def make_traces(
                 if group in groups:
                     before[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
         refitted = r.y - r.x[:, :, plain.columns] @ plain.beta
-        after = r.y - r.x[:, :, full.columns] @ full.beta
+        after = r.y - r.x[:, :, full.columns] @ named
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
                 unit = UNITS[CHANNELS[c].split("_")[0]]

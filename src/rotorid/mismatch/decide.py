@@ -13,6 +13,7 @@ from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
@@ -104,6 +105,8 @@ def wrench_findings(
     findings = []
     for key in selection.active:
         term = search.terms[key]
+        if term.effect in UNKNOWNS:
+            continue  # told as unexplained
         effect = effects[term.effect]
         beta, _ = coefficients(regression, selection.fit, key)
         rest = [k for k in selection.active if k != key]
@@ -139,6 +142,8 @@ def wrench_findings(
             )
         )
     for effect_id, reason in selection.not_established.items():
+        if effect_id in UNKNOWNS:
+            continue
         effect = effects[effect_id]
         findings.append(
             Finding(id=effect_id, status="not_established", sentence=f"{effect.name} did not hold: {reason}")
@@ -189,7 +194,8 @@ def wrong_values(
             agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or not agrees or not matters:
+            pinned = abs(change) > 0.98 * regression.limit[regression.start[key]]
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or pinned or not agrees or not matters:
                 doubtful[key] = abs(change) / sd
         if not doubtful:
             break

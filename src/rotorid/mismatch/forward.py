@@ -170,7 +170,7 @@ def _states(segment: Segment) -> States:
         quaternion = Rotation.from_matrix(motion.rotation).as_quat(scalar_first=True)
         if motion.velocity is not None:
             velocity = np.einsum("nij,nj->ni", motion.rotation, motion.velocity)
-    return States(motion.angular_velocity, quaternion, velocity, segment.position)
+    return States(motion.angular_velocity, quaternion, velocity, motion.position)
 
 
 def remembers(form: Form, values: np.ndarray, motion: Motion, vehicle: Vehicle) -> bool:

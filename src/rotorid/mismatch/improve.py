@@ -29,9 +29,12 @@ class Model:
 
 
 def modelled(analysis: Analysis) -> list[Finding]:
-    """Findings that the improved model holds: the established ones, and one of each class of alternatives."""
+    """Findings that the improved model holds: the established ones, and one of each class of alternatives.
+
+    A force in windows of one run (a gust) is no property of the vehicle: it would blow in every flight simulated.
+    """
     found = with_status(analysis, "established") + one_per_class(with_status(analysis, "ambiguous"))
-    chosen = {id(f) for f in found if form_of(f) is not None}
+    chosen = {id(f) for f in found if form_of(f) is not None and not (f.windows and isinstance(form_of(f), Form))}
     return [f for f in analysis.findings if id(f) in chosen]
 
 

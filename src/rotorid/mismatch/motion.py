@@ -35,8 +35,6 @@ class Segment:
     command: np.ndarray | None = None
     """Commanded rotor speeds, (n, k), rad/s; throttle times the upper limit where only throttle is recorded."""
     measured_speed: bool = True
-    position: np.ndarray | None = None
-    """World position, (n, 3), m."""
     extra: dict[str, np.ndarray] = field(default_factory=dict)
     """Unknown columns of the run, candidates for a regime variable."""
 
@@ -201,7 +199,7 @@ def build_segments(
     position = take(c.POSITION, "position")
     height = take((c.HEIGHT,), "height")
     voltage = take((c.BATTERY_VOLTAGE,), "voltage", smooth=False)
-    needed = [a for a in (used_speed, gyro, attitude, accelerometer, velocity, position) if a is not None]
+    needed = [a for a in (used_speed, command, gyro, attitude, accelerometer, velocity, position) if a is not None]
     good = np.ones(len(grid), bool)
     for array in needed:
         good &= np.isfinite(array).all(axis=1)
@@ -275,8 +273,9 @@ def build_segments(
             gyroscope=rate if gyro is not None and kinematic_rate is not None else None,
             rotation=rotation,
             velocity=body_velocity,
+            position=core(position),
             height=above,
-            voltage=None if voltage is None else core(voltage)[:, 0],
+            voltage=None if voltage is None else held_through_gaps(core(voltage)[:, 0]),
         )
         extra = {n: np.interp(motion.time_s, t, np.nan_to_num(run.column(n))) for n in run.unknown_columns}
         segments.append(
@@ -289,11 +288,19 @@ def build_segments(
                 kinematic_angular_velocity=kinematic_rate,
                 command=core(command),
                 measured_speed=measured,
-                position=core(position),
                 extra=extra,
             )
         )
     return segments
+
+
+def held_through_gaps(values: np.ndarray) -> np.ndarray | None:
+    """A slow signal (n,) with its missing samples interpolated, held at the ends; None where nothing is there."""
+    known = np.isfinite(values)
+    if not known.any():
+        return None
+    index = np.arange(len(values))
+    return np.interp(index, index[known], values[known])
 
 
 def estimated_full_speed(vehicle: Vehicle, throttle: np.ndarray) -> float:

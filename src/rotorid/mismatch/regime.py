@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.effects.rotor_interference import hover_inflow_m_s
+from rotorid.effects.scale import hover_inflow_m_s
 from rotorid.mismatch.motion import Segment
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import upfirdn
 
 from rotorid.effects.contract import Contribution, Form, Motion
@@ -27,7 +28,11 @@ PARAMETER_NAMES = {
     "inertia_yy": "inertia_yy_kg_m2",
     "inertia_zz": "inertia_zz_kg_m2",
     "arm": "arm_scale",
+    "speed": "rotor_speed_limits_rad_s",
 }
+
+SUSTAINED_S = 3.0
+"""No vehicle keeps up an angular acceleration for longer."""
 
 
 @dataclass(frozen=True)
@@ -200,6 +205,9 @@ def value_columns(
         inertia = vehicle.inertia_kg_m2.matrix()
         rate = motion.angular_velocity
         predicted = (model["moment"] - np.cross(rate, rate @ inertia)) @ np.linalg.inv(inertia)
+        # Body rates stay bounded: a lasting predicted acceleration is the mark of something left out.
+        window = max(3, int(round(SUSTAINED_S * segment.rate_hz)))
+        predicted = predicted - uniform_filter1d(predicted, window, axis=0, mode="nearest")
         part = np.zeros((3, 3))
         part[axis, axis] = inertia[axis, axis]
         out = {"moment": -(predicted @ part + np.cross(rate, rate @ part))}
@@ -207,8 +215,11 @@ def value_columns(
 
 
 def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict[str, np.ndarray]:
-    """Column of a time offset of one second between two sensors (nuisance), as channel contributions."""
+    """Column of a nuisance as channel contributions: a time offset of one second between two sensors, or a
+    relative change of the thrust in one run."""
     motion = segment.motion
+    if key.startswith(RUN_SCALE):
+        return value_columns("thrust", segment, vehicle, groups, {})
     if key == "offset:rotors-accelerometer" and "force" in groups:
         force, _, _ = baseline_wrench(motion, vehicle)
         return {"force": np.gradient(force, segment.dt_s, axis=0)}
@@ -222,6 +233,7 @@ def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict
     return {}
 
 
+RUN_SCALE = "thrust of "
 OFFSETS = (
     "offset:rotors-accelerometer",
     "offset:rotors-gyroscope",

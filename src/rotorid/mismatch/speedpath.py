@@ -26,6 +26,9 @@ from rotorid.signal import kernels
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
+LEAST_RESPONSE = 0.25
+"""Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
+LIMIT_STAGE = 2
 MOST_SAMPLES = 40_000
 """Rotor-speed samples per fit; longer recordings are represented by stretches spread over all runs."""
 
@@ -98,6 +101,13 @@ def commanded_path(
     for _, apply, own in sorted(steps, key=lambda s: s[0]):
         path = replace(path, speed=apply(path, own))
     return path.speed
+
+
+def nothing_between(result: SpeedResult) -> SpeedResult:
+    """The result of a search that found nothing: rotors turn as commanded."""
+    fit = SpeedFit((), np.zeros(0), 0.0, result.fit.cost, np.zeros((0, 0)))
+    why = "the differences between the rotors explain as much"
+    return SpeedResult(fit, {}, {}, {}, {**result.dropped, **{k: why for k, _ in result.fit.chain}}, None)
 
 
 class SpeedProblem:
@@ -329,9 +339,16 @@ class SpeedSearch:
         inflation = fit.inflation
         gain = (base.cost - fit.cost) / inflation
         # What the fit gains and what its parameters are sure of must agree: the shift in time bends the first.
-        away = fit.values[own] - np.array(fit.of(key)[0].neutral)
+        away = fit.values[own] - self.neutral(fit.of(key)[0])
         sure = gain if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
         return float(chi2.sf(max(min(gain, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
+
+    def neutral(self, form: SpeedForm) -> np.ndarray:
+        """Parameter values that change nothing; of a limit, the outermost command."""
+        if form.stage != LIMIT_STAGE:
+            return np.array(form.neutral)
+        shares = [s.command / self.problem.full_speed for s in self.problem.segments]
+        return np.clip(form.neutral, min(float(s.min()) for s in shares), max(float(s.max()) for s in shares))
 
     def run(self) -> SpeedResult:
         """The whole search."""
@@ -352,7 +369,7 @@ class SpeedSearch:
             for score, p, key, fit in options:
                 if score <= 0:
                     break
-                if p > ENTER_P:
+                if p > ENTER_P or negligible(fit, key) or not self.responds(fit):
                     continue
                 size = self.size(fit, key)
                 if size < SMALLEST_SIZE:
@@ -382,6 +399,20 @@ class SpeedSearch:
             noise = float(np.sqrt(np.mean([np.mean(p**2) for p in parts])))
         return SpeedResult(current, p_values, alternatives, sizes, dropped, noise)
 
+    def responds(self, fit: SpeedFit) -> bool:
+        """Whether rotors still follow their commands: a flat curve would explain any difference between them."""
+        low = min(float(s.command.min()) for s in self.problem.segments)
+        high = max(float(s.command.max()) for s in self.problem.segments)
+        grid = np.linspace(low, high, 9)[:, None]
+        path = SpeedPath(grid, 0.01 * np.arange(9.0), self.problem.full_speed)
+        for key, form in fit.chain:
+            if form.stage == 0:
+                speed = form.apply(path, fit.values[fit.slice_of(key)])
+                slope = np.diff(speed, axis=0) / np.maximum(np.diff(grid, axis=0), 1e-9)
+                if (slope < LEAST_RESPONSE * (speed / np.maximum(grid, 1e-9))[1:]).any():
+                    return False
+        return True
+
     def _without(self, fit: SpeedFit, key: str) -> SpeedFit:
         where = fit.slice_of(key)
         chain = tuple((k, f) for k, f in fit.chain if k != key)
@@ -397,7 +428,8 @@ class SpeedSearch:
                 if other != key or form is fit.of(key)[0]:
                     continue
                 tried = self.problem.with_covariance(self.best_fit((*base.chain, (key, form)), base, form))
-                if self.judge(base, tried, key)[1] > self.judge(base, best, key)[1]:
+                better = self.judge(base, tried, key)[1] > self.judge(base, best, key)[1]
+                if better and self.responds(tried):
                     best = tried
             fit = best
         return fit
@@ -411,7 +443,7 @@ class SpeedSearch:
                 if fit.covariance is None:
                     fit = self.problem.with_covariance(fit)
                 p, score, _ = self.judge(base, fit, key)
-                if p > ENTER_P or score <= 0:
+                if p > ENTER_P or score <= 0 or negligible(fit, key):
                     dropped[key] = f"p = {p:.2g} beside the others"
                     fit, changed = self.problem.with_covariance(base) if base.chain else base, True
                     break
@@ -426,10 +458,19 @@ class SpeedSearch:
             if other in taken or other in found:
                 continue
             tried = self.best_fit((*base.chain, (other, form)), base, form)
+            if not self.responds(tried):
+                continue
             lost = (own - (base.cost - tried.cost)) / fit.inflation
             if lost < 9.0 and base.cost - tried.cost > 0.5 * own:
                 found.append(other)
         return tuple(found)
+
+
+def negligible(fit: SpeedFit, key: str) -> bool:
+    """Whether an id's parameters are all closer to changing nothing than their own limits."""
+    form, values = fit.of(key)
+    limits = [p.negligible for p in form.parameters]
+    return all(abs(v - n) < limit for v, n, limit in zip(values, form.neutral, limits, strict=True))
 
 
 def smoothed_acceleration(speed: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:

@@ -6,13 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
+from scipy.signal import lfilter, welch
 
 from rotorid.effects.contract import Form
 from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
-from rotorid.mismatch.regression import AGREEMENT, Regression, autoregression, build, full_fit_residuals
+from rotorid.mismatch.regression import (
+    AGREEMENT,
+    Regression,
+    autoregression,
+    build,
+    full_fit_residuals,
+)
 from rotorid.mismatch.rows import Rows, Term, residual
 from rotorid.mismatch.select import Search, Selection
 from rotorid.mismatch.speedpath import (
@@ -24,8 +30,13 @@ from rotorid.mismatch.speedpath import (
     commanded_path,
     smoothed_acceleration,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 LONGEST_BLOCKS = 400
+NOISE_BAND = (0.5, 0.85)
+"""Band, as shares of the cutoff, in which noise is told from motion."""
+MOST_NOISE = 0.3
+"""Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 
 
 @dataclass
@@ -43,6 +54,11 @@ class WrenchModel:
     wind: np.ndarray | None = None
     """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
     wind_sd: np.ndarray | None = None
+
+    def unnamed(self, columns: np.ndarray) -> np.ndarray:
+        """Mask of the columns that belong to empirical terms, which no finding may count as its own."""
+        keys = [k for k in self.selection.active if self.search.terms[k].effect in UNKNOWNS]
+        return np.isin(columns, self.regression.columns(keys))
 
 
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:
@@ -72,6 +88,8 @@ def wrench_model(
     noisy_segments = prepared.noisy_segments if noisy_segments is None else noisy_segments
     rows = assemble_rows(prepared, terms, segments, effects)
     noisy = assemble_rows(prepared, terms, noisy_segments, effects) if noisy_segments else None
+    if noisy is not None:
+        rows, noisy = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, _ = full_fit_residuals(rows, precision)
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
@@ -97,6 +115,35 @@ def wrench_model(
 
     search = Search(regression, sizes_of, known_sizes)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
+
+
+def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float):
+    """Rows (and their noisy copies) in which a column that is mostly noise in a channel says nothing there.
+
+    In a calm flight, say, the rotors' moment is noise that the residual has with the other sign: a free believed
+    value (or a scale error) would take it away and call itself wrong. How much noise there is, is measured where
+    little else is: near the cutoff.
+    """
+    band = tuple(share * cutoff_hz for share in NOISE_BAND)
+    more = np.ones(12)
+    for c in np.flatnonzero(np.isfinite(rows[0].y).all(axis=0)):
+        found = band_power([r.y[:, c] for r in rows], rate_hz, band)
+        added = band_power([b.y[:, c] - a.y[:, c] for a, b in zip(rows, noisy, strict=True)], rate_hz, band)
+        more[c] = max(1.0, found / added) if added > 0 else 1.0
+    energy = sum(np.einsum("ncq,ncq->cq", r.x, r.x) for r in rows)
+    noise = sum(np.einsum("ncq,ncq->cq", b.x - a.x, b.x - a.x) for a, b in zip(rows, noisy, strict=True))
+    seen = more[:, None] * noise <= MOST_NOISE * energy
+    return [replace(r, x=r.x * seen) for r in rows], [replace(r, x=r.x * seen) for r in noisy]
+
+
+def band_power(parts: list[np.ndarray], rate_hz: float, band: tuple[float, float]) -> float:
+    """Mean power density of stretches in a band of frequency."""
+    power = []
+    for part in parts:
+        if len(part) >= 32:
+            frequency, density = welch(part, fs=rate_hz, nperseg=min(len(part), 256))
+            power.append(density[(frequency >= band[0]) & (frequency <= band[1])].mean() * len(part))
+    return float(sum(power) / max(sum(len(p) for p in parts if len(p) >= 32), 1))
 
 
 def local_sizes(

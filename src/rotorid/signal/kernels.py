@@ -30,15 +30,21 @@ def low_pass(rate_hz: float, cutoff_hz: float) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def derivative(rate_hz: float, cutoff_hz: float) -> np.ndarray:
-    """Derivative of a signal low-passed at the cutoff, 1/s: the sampled derivative of the low-pass kernel."""
+    """Derivative of a signal low-passed at the cutoff, 1/s, shape (2 half_length + 1,).
+
+    The antisymmetric kernel whose response, divided by 2πif, comes closest to the low-pass's own (least squares over
+    all frequencies): windowing the slope of a sinc instead would read about 2 % too much in the whole band.
+    """
     half = half_length(rate_hz, cutoff_hz)
-    k = np.arange(-half, half + 1)
-    x = np.pi * 2 * cutoff_hz * k / rate_hz
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope = np.where(k == 0, 0.0, (np.cos(x) - np.sinc(x / np.pi)) / k)
-    kernel = slope * kaiser(2 * half + 1, ATTENUATION_BETA)
+    k = np.arange(1, half + 1)
+    angle = np.linspace(0.0, np.pi, 3 * half + 1)[1:]
+    flat = low_pass(rate_hz, cutoff_hz)
+    wanted = flat[half] + 2 * np.cos(np.outer(angle, k)) @ flat[half + 1 :]
+    per_slope = 2 * np.sin(np.outer(angle, k)) / angle[:, None]
+    right = np.linalg.lstsq(per_slope, wanted, rcond=None)[0]
     # A ramp of slope one must give exactly one.
-    return -kernel * rate_hz / (kernel * k).sum()
+    right /= 2 * right @ k
+    return rate_hz * np.concatenate([right[::-1], [0.0], -right])
 
 
 def apply(kernel: np.ndarray, signal: np.ndarray) -> np.ndarray:

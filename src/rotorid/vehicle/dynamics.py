@@ -26,11 +26,16 @@ ALWAYS_KNOWN = frozenset(
 )
 
 
+MOST_ROUNDS = 30
+CONVERGED = 1e-10
+"""Change of the accelerations, relative to their largest, at which a fixed point is taken as reached."""
+
+
 class Dynamics:
     """Angular acceleration and specific force of a batch of n vehicles.
 
-    Some effects depend on the accelerations that they change (added mass, products of inertia). They are
-    given those of the last evaluation: a fixed point that converges as the step shrinks.
+    Some effects depend on the accelerations that they change (added mass, products of inertia): these are solved
+    for by a fixed point that starts at the last evaluation (it converges while the added mass is below the own).
     """
 
     def __init__(self, vehicle: Vehicle, effects: Sequence[tuple[Form, Sequence[float]]], size: int):
@@ -38,6 +43,8 @@ class Dynamics:
         self.body = RigidBody.of_vehicle(vehicle)
         self.effects = [(form, np.asarray(values, float)) for form, values in effects]
         self._matrix = wrench_matrix(vehicle).T
+        implicit = {"specific_force", "angular_acceleration", "accelerometer"}
+        self.rounds = MOST_ROUNDS if any(implicit & set(form.requires) for form, _ in self.effects) else 1
         self.last_acceleration = np.zeros((size, 3))
         self.last_specific_force = np.zeros((size, 3))
 
@@ -56,30 +63,45 @@ class Dynamics:
         give.
         """
         wrench = (rotor_speed**2) @ self._matrix
-        total_moment = wrench[:, 1:4] if moment is None else wrench[:, 1:4] + moment
-        total_force = np.zeros((len(rates), 3))
-        total_force[:, 2] = -wrench[:, 0]
+        own_moment = wrench[:, 1:4] if moment is None else wrench[:, 1:4] + moment
+        own_force = np.zeros((len(rates), 3))
+        own_force[:, 2] = -wrench[:, 0]
         if force is not None:
-            total_force += force
-        if self.effects:
-            motion = Motion(
-                rotor_speed=rotor_speed,
-                angular_velocity=rates,
-                angular_acceleration=self.last_acceleration,
-                specific_force=self.last_specific_force,
-                accelerometer=self.last_specific_force,
-                gyroscope=rates,
-                **surroundings,
-            )
-            for form, values in self.effects:
-                added = form.contribution(motion, self.vehicle, values)
-                if added.force is not None:
-                    total_force = total_force + added.force
-                if added.moment is not None:
-                    total_moment = total_moment + added.moment
-        self.last_acceleration = angular_acceleration(self.body, rates, total_moment)
-        self.last_specific_force = total_force / self.body.mass_kg
+            own_force += force
+        for _ in range(self.rounds):
+            before = self.last_acceleration, self.last_specific_force
+            total_force, total_moment = self._with_effects(own_force, own_moment, rates, rotor_speed, surroundings)
+            self.last_acceleration = angular_acceleration(self.body, rates, total_moment)
+            self.last_specific_force = total_force / self.body.mass_kg
+            if self.rounds > 1 and _same(before, (self.last_acceleration, self.last_specific_force)):
+                break
         return self.last_acceleration, self.last_specific_force
+
+    def _with_effects(self, force, moment, rates, rotor_speed, surroundings) -> tuple[np.ndarray, np.ndarray]:
+        """Force and moment with what the effects add at the present accelerations."""
+        if not self.effects:
+            return force, moment
+        motion = Motion(
+            rotor_speed=rotor_speed,
+            angular_velocity=rates,
+            angular_acceleration=self.last_acceleration,
+            specific_force=self.last_specific_force,
+            accelerometer=self.last_specific_force,
+            gyroscope=rates,
+            **surroundings,
+        )
+        for form, values in self.effects:
+            added = form.contribution(motion, self.vehicle, values)
+            if added.force is not None:
+                force = force + added.force
+            if added.moment is not None:
+                moment = moment + added.moment
+        return force, moment
+
+
+def _same(before: tuple[np.ndarray, ...], after: tuple[np.ndarray, ...]) -> bool:
+    """Whether two evaluations are equal for all purposes."""
+    return all(np.abs(b - a).max() <= CONVERGED * max(1.0, np.abs(a).max()) for b, a in zip(before, after, strict=True))
 
 
 def has_memory(form: Form) -> bool:

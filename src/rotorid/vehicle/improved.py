@@ -1,14 +1,19 @@
-"""Effects switched on in a vehicle file: `effects` of `vehicle.yaml` as catalogue forms with their values."""
+"""Effects switched on in a vehicle file: `effects` of `vehicle.yaml` as catalogue forms with their values.
+
+What adds a wrench or an error of a sensor flies in `simulate_as_stated`, and so does what lies between command and
+rotor speed; `record_as_stated` writes what the sensors of such a flight read, with the faults of sensors and logging.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import Effect, Form, SpeedForm, SpeedPath
+from rotorid.effects.contract import Effect, Form, SetForm, SpeedForm, SpeedPath
 from rotorid.errors import InputError
+from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.vehicle.simulator import Commands, Controller, Motors, Trace, simulate
+from rotorid.vehicle.simulator import Commands, Controller, Motors, Noise, Trace, recording, simulate
 
 LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
 """Forms of `motor_lag` that the simulator's own motors fly."""
@@ -17,14 +22,16 @@ ActiveForm = tuple[Form, np.ndarray]
 """A form of an effect and the values of its parameters, in order."""
 ActiveSpeedForm = tuple[SpeedForm, np.ndarray]
 """The same for a form that acts between command and rotor speed."""
+ActiveSetForm = tuple[SetForm, np.ndarray]
+"""The same for a form that spoils the recorded set."""
 
 
 def active_forms(vehicle: Vehicle) -> list[ActiveForm]:
     """Forms of wrench and sensor effects among `vehicle.effects` with their values, in the order of the file.
 
     An entry is `{id, form, parameters: {symbol: value}}`; `form` may be left out where the effect has one form.
-    InputError names the entry and what was expected. Forms between command and rotor speed are passed over here:
-    `active_speed_forms` has them.
+    InputError names the entry and what was expected. Forms between command and rotor speed and forms that spoil
+    the recorded set are passed over here: `active_speed_forms` and `active_set_forms` have them.
     """
     return [found for found in _all(vehicle) if isinstance(found[0], Form)]
 
@@ -33,6 +40,11 @@ def active_speed_forms(vehicle: Vehicle) -> list[ActiveSpeedForm]:
     """Forms of `vehicle.effects` that act between command and rotor speed, in the order of the path."""
     found = [found for found in _all(vehicle) if isinstance(found[0], SpeedForm)]
     return sorted(found, key=lambda pair: pair[0].stage)
+
+
+def active_set_forms(vehicle: Vehicle) -> list[ActiveSetForm]:
+    """Forms of `vehicle.effects` that spoil the recorded set, in the order of the file."""
+    return [found for found in _all(vehicle) if isinstance(found[0], SetForm)]
 
 
 def speeds_of_commands(
@@ -58,21 +70,23 @@ def speeds_of_commands(
     return speed
 
 
-def _all(vehicle: Vehicle) -> list[ActiveForm | ActiveSpeedForm]:
+def _all(vehicle: Vehicle) -> list[ActiveForm | ActiveSpeedForm | ActiveSetForm]:
     return [_active(entry, number, vehicle) for number, entry in enumerate(vehicle.effects, 1)]
 
 
-def _forms(effect: Effect, vehicle: Vehicle) -> dict[str, Form | SpeedForm]:
-    return {form.name: form for form in (*effect.forms(vehicle), *effect.speed_forms)}
+def _forms(effect: Effect, vehicle: Vehicle, wanted: str | None) -> dict[str, Form | SpeedForm | SetForm]:
+    given = effect.form_named(wanted) if wanted else None
+    forms = (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle), *([given] if given else []))
+    return {form.name: form for form in forms}
 
 
-def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | ActiveSpeedForm:
+def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | ActiveSpeedForm | ActiveSetForm:
     where = f"vehicle {vehicle.name}: effects entry {number}"
     name = entry.get("id")
     effects = catalogue()
     if name not in effects:
         raise InputError(f"{where} has id {name!r}, expected one of {', '.join(effects)}")
-    forms = _forms(effects[name], vehicle)
+    forms = _forms(effects[name], vehicle, entry.get("form"))
     wanted = entry.get("form", next(iter(forms)) if len(forms) == 1 else None)
     if wanted not in forms:
         raise InputError(f"{where} ({name}) has form {wanted!r}, expected one of {', '.join(forms)}")
@@ -94,23 +108,27 @@ def simulate_as_stated(
     controller: Controller,
     duration_s: float,
     step_s: float = 0.001,
-    voltage_v: float | None = None,
+    voltage_v: float | np.ndarray | None = None,
+    full_voltage_v: float | None = None,
     **settings,
 ) -> Trace:
     """Fly a vehicle with every effect that its file states switched on; `settings` as for `simulate`.
 
     What lies between command and rotor speed is applied to the whole series where the commands are known
     (`Commands`). Under any other controller only a lag of the speed can be flown, since the other forms need the
-    series; InputError says so.
+    series; InputError says so. `voltage_v` is constant or a series over the steps, (steps + 1,); `full_voltage_v`
+    is the voltage at which commands are right (default the largest).
     """
     speed_forms = active_speed_forms(vehicle)
     motors = Motors(limits_rad_s=vehicle.rotor_speed_limits_rad_s)
-    if speed_forms and isinstance(controller, Commands):
-        time_s = step_s * np.arange(int(round(duration_s / step_s)) + 1)
+    steps = int(round(duration_s / step_s))
+    voltage = None if voltage_v is None else np.broadcast_to(np.asarray(voltage_v, float), (steps + 1,))
+    if isinstance(controller, Commands):
+        time_s = step_s * np.arange(steps + 1)
         held = np.searchsorted(controller.time_s, time_s + 1e-9, side="right") - 1
         command = controller.rotor_speed[np.maximum(held, 0)]
-        voltage = None if voltage_v is None else np.full(len(time_s), float(voltage_v))
-        controller = Commands(time_s, speeds_of_commands(vehicle, command, time_s, voltage))
+        speed = speeds_of_commands(vehicle, command, time_s, voltage, full_voltage_v)
+        controller = Commands(time_s, speed, np.gradient(speed, step_s, axis=0))
     else:
         for form, values in speed_forms:
             if form.name not in LAGS_OF_SPEED:
@@ -126,6 +144,26 @@ def simulate_as_stated(
         step_s,
         motors=motors,
         effects=active_forms(vehicle),
-        voltage_v=voltage_v,
+        voltage_v=None if voltage is None else float(voltage.mean()),
         **settings,
     )
+
+
+def record_as_stated(
+    trace: Trace,
+    vehicle: Vehicle,
+    name: str,
+    noise: Noise | None = None,
+    rng: np.random.Generator | None = None,
+    index: int = 0,
+    every: int = 1,
+) -> RecordingSet:
+    """What a user is handed of a simulated flight: one run, with the errors of sensors and logging.
+
+    The set's vehicle is the one believed: the file without its effects (and with what a mistake makes of it).
+    """
+    run = recording(trace, vehicle, name, noise, rng, index, active_forms(vehicle), every)
+    recordings = RecordingSet(vehicle.name, vehicle.model_copy(update={"effects": ()}), (run,))
+    for form, values in active_set_forms(vehicle):
+        recordings = form.apply(recordings, values)
+    return recordings

@@ -44,14 +44,24 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class Commands:
-    """A controller that plays commanded rotor speeds (m, k), rad/s, each held until the next time (m,), s."""
+    """A controller that plays commanded rotor speeds (m, k), rad/s, each held until the next time (m,), s.
+
+    `rotor_acceleration` (m, k), rad/s2, is what effects are told where the motors follow at once; None for zero.
+    """
 
     time_s: np.ndarray
     rotor_speed: np.ndarray
+    rotor_acceleration: np.ndarray | None = None
 
     def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
-        index = max(int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1, 0)
-        return np.broadcast_to(self.rotor_speed[index], (len(euler_rad), self.rotor_speed.shape[1]))
+        return np.broadcast_to(self.rotor_speed[self._index(time_s)], (len(euler_rad), self.rotor_speed.shape[1]))
+
+    def acceleration(self, time_s: float) -> np.ndarray | float:
+        """Rotor accelerations (k,), rad/s2, that go with the commands."""
+        return 0.0 if self.rotor_acceleration is None else self.rotor_acceleration[self._index(time_s)]
+
+    def _index(self, time_s: float) -> int:
+        return max(int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1, 0)
 
 
 @dataclass(frozen=True)
@@ -157,7 +167,7 @@ def simulate(
         raise InputError(f"duration_s {duration_s} is shorter than one step of {step_s} s")
     instant = [(form, values) for form, values in effects if not has_memory(form)]
     slow = [(form, values) for form, values in effects if has_memory(form)]
-    known = {"rotation", "velocity", "rotor_acceleration"}
+    known = {"rotation", "velocity", "position", "rotor_acceleration"}
     known |= {"height"} if vehicle.ground_z_m is not None else set()
     known |= {"voltage"} if voltage_v is not None else set()
     check_effects(effects, known)
@@ -176,7 +186,7 @@ def simulate(
 
 def _fresh(controller: Controller) -> Controller:
     """A copy of the controller as it is before the flight, so that a flight can be repeated."""
-    return copy.copy(controller)
+    return copy.deepcopy(controller)
 
 
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
@@ -226,6 +236,7 @@ class _Flight:
             elif i == 0 or self.motors.time_up_s == 0.0:
                 state[:, 13:] = command
             self.command, self.push, self.now_s = command, pushes[i], time_s
+            self.following = controller.acceleration(time_s) if isinstance(controller, Commands) else 0.0
             rounds = 3 if i == 0 and self.dynamics.effects else 1
             for _ in range(rounds):
                 self.derivative(0.0, state)
@@ -256,15 +267,18 @@ class _Flight:
         rates, rotors = state[:, 0:3], state[:, 13:]
         rotation = rotation_from_quaternion(state[:, 3:7])
         out = np.empty_like(state)
-        out[:, 13:] = self._rotor_acceleration(rotors)
+        acceleration = self._rotor_acceleration(rotors)
+        # Motors that follow at once hold their speed over a step, whatever the effects are told.
+        out[:, 13:] = acceleration if self.motors.time_up_s > 0.0 else 0.0
         around = {}
         if self.dynamics.effects:
             ground = self.vehicle.ground_z_m
             around = dict(
                 time_s=np.full(self.size, self.now_s + share * self.step_s),
-                rotor_acceleration=out[:, 13:],
+                rotor_acceleration=acceleration,
                 rotation=rotation,
                 velocity=np.einsum("nji,nj->ni", rotation, state[:, 7:10]),
+                position=state[:, 10:13],
                 wind=self.wind,
                 height=None if ground is None else ground - state[:, 12],
                 voltage=self.voltage,
@@ -280,7 +294,7 @@ class _Flight:
 
     def _rotor_acceleration(self, rotors: np.ndarray) -> np.ndarray:
         if self.motors.time_up_s == 0.0:
-            return np.zeros_like(rotors)
+            return np.zeros_like(rotors) + self.following
         down = self.motors.time_up_s if self.motors.time_down_s is None else self.motors.time_down_s
         gap = self.command - rotors
         return gap / np.where(gap > 0, self.motors.time_up_s, down)
@@ -301,6 +315,7 @@ def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage
         gyroscope=trace.angular_velocity[index],
         rotation=rotation,
         velocity=np.einsum("nji,nj->ni", rotation, trace.velocity[index]),
+        position=trace.position[index],
         wind=None if wind_m_s is None else np.asarray(wind_m_s, float),
         height=None if ground is None else ground - trace.position[index, :, 2],
         voltage=None if voltage_v is None else np.full(len(trace.time_s), float(voltage_v)),

@@ -112,10 +112,6 @@ def simulate_windows(
     what does not hang on it is simulated. `effects` are forms with their parameter values; what they add to
     sensor readings is not part of the motion and is left out. `sample` (w, m) takes windows planned before
     (then `window_s` and `step_s` are not used). InputError where an effect needs what is not there.
-
-    Angular acceleration and specific force, on which some effects
-    depend, come from the last evaluation (a fixed point that converges as the step shrinks; two rounds at the
-    start).
     """
     time_s = np.asarray(time_s, float)
     if sample is None:

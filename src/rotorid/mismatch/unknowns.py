@@ -1,0 +1,122 @@
+"""Causes outside the catalogue, described by what they depend on alone.
+
+Plain empirical terms compete with the catalogue in the search, so that a force that follows the place in the room
+is not sold as the nearest known effect. One that wins is never given a name: it is reported as unexplained,
+with what it depends on and how much of the mismatch it carries.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+
+SWING_DAMPING = 0.05
+SWING_STARTS_RAD_S = (4.0, 8.0, 16.0)
+
+
+def _to_body(motion, world):
+    return np.einsum("nji,nj->ni", motion.rotation, world)
+
+
+def place(motion, vehicle, values):
+    """F = Rᵀ (k_h (x, y), k_z z), world position: a spring or a cable to a fixed point."""
+    k_h, k_z, north, east = values
+    world = np.stack(
+        [k_h * motion.position[:, 0] + north, k_h * motion.position[:, 1] + east, k_z * motion.position[:, 2]], axis=1
+    )
+    return Contribution(force=_to_body(motion, world))
+
+
+def height_only(motion, vehicle, values):
+    """F = Rᵀ (0, 0, k_z z)."""
+    world = np.zeros((motion.size, 3))
+    world[:, 2] = values[0] * motion.position[:, 2]
+    return Contribution(force=_to_body(motion, world))
+
+
+def fixed_moment(motion, vehicle, values):
+    """M = Rᵀ (m_N, m_E, 0): a moment that keeps its direction in the world."""
+    world = np.zeros((motion.size, 3))
+    world[:, 0], world[:, 1] = values
+    return Contribution(moment=_to_body(motion, world))
+
+
+def dipole(motion, vehicle, values):
+    """M = m × Rᵀ e_N + m' × Rᵀ e_D: a body that aligns with a direction of the world, as a magnet does."""
+    north, down = motion.rotation[:, 0, :], motion.rotation[:, 2, :]
+    return Contribution(moment=np.cross(np.asarray(values[:3]), north) + np.cross(np.asarray(values[3:]), down))
+
+
+def swinging(motion, vehicle, values):
+    """q'' + 2 ζ ω q' + ω² q = -a in the rotor plane; F = k_f ω² q, M = k_m (q × e_D): a mass that swings inside."""
+    k_f, k_m, omega = values
+    dt = float(np.median(np.diff(motion.time_s))) if motion.size > 1 else 0.01
+    system = ([-1.0], [1.0, 2 * SWING_DAMPING * omega, omega**2])
+    numerator, denominator, _ = cont2discrete(system, dt, method="bilinear")
+    q = np.zeros((motion.size, 3))
+    q[:, :2] = lfilter(numerator.ravel(), denominator, motion.specific_force[:, :2], axis=0)
+    turned = np.stack([q[:, 1], -q[:, 0], np.zeros(motion.size)], axis=1)
+    return Contribution(force=k_f * omega**2 * q, moment=k_m * omega**2 * turned)
+
+
+def _place_forms(vehicle):
+    spring = (Parameter("k_h", "N/m"), Parameter("k_z", "N/m"), Parameter("f_N", "N"), Parameter("f_E", "N"))
+    return (
+        Form("height", "F = Rᵀ (0, 0, k_z z)", (Parameter("k_z", "N/m"),), height_only, ("position", "rotation")),
+        Form("place", "F = Rᵀ (f + K p)", spring, place, ("position", "rotation")),
+    )
+
+
+def _heading_forms(vehicle):
+    fixed = (Parameter("m_N", "N m"), Parameter("m_E", "N m"))
+    body = tuple(Parameter(f"m_{a}", "N m") for a in "xyz") + tuple(Parameter(f"m'_{a}", "N m") for a in "xyz")
+    return (
+        Form("fixed", "M = Rᵀ (m_N, m_E, 0)", fixed, fixed_moment, ("rotation",)),
+        Form("dipole", "M = m × Rᵀ e_N + m' × Rᵀ e_D", body, dipole, ("rotation",)),
+    )
+
+
+def _swing_forms(vehicle):
+    rate = Parameter("ω", "rad/s", 1.5, 40.0, nonlinear=True, starts=SWING_STARTS_RAD_S)
+    return (
+        Form(
+            "swing",
+            "q'' + 2ζωq' + ω²q = −a, F = k_f ω² q, M = k_m ω² q × e_D",
+            (Parameter("k_f", "kg"), Parameter("k_m", "kg m"), rate),
+            swinging,
+            ("specific_force",),
+            memory=True,
+        ),
+    )
+
+
+PLACE = Effect(
+    id="unknown_place",
+    name="a force that depends on the place in the room",
+    sentence="a force in world axes follows the position, as of a cable to a fixed point",
+    forms=_place_forms,
+    source="empirical",
+)
+HEADING = Effect(
+    id="unknown_heading",
+    name="a moment that depends on the heading",
+    sentence="a moment keeps its direction in the world while the vehicle turns",
+    forms=_heading_forms,
+    source="empirical",
+)
+SWING = Effect(
+    id="unknown_swing",
+    name="a mass that swings inside",
+    sentence="a force and a moment ring on after every acceleration",
+    forms=_swing_forms,
+    source="empirical",
+)
+UNKNOWNS = {e.id: e for e in (PLACE, HEADING, SWING)}
+DEPENDS_ON = {
+    "unknown_place": ("position",),
+    "unknown_heading": ("heading",),
+    "unknown_swing": ("specific_force", "time_s"),
+}
+"""Regime variables that each depends on, for the verdict."""

@@ -1,0 +1,75 @@
+"""The test that a residual does not depend on the inputs: right under coloured noise, and it sees what is there."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from rotorid.mismatch.dependence import _features, _wald, probes
+from rotorid.mismatch.regression import autoregression
+from rotorid.mismatch.rows import Thinner
+
+from .synthetic import coloured
+from .test_rows import one, still, thesis_vehicle
+
+RATE_HZ = 40.0
+
+
+def p_of(noise: np.ndarray, inputs: np.ndarray) -> float:
+    half = len(noise) // 2
+    taps = autoregression([noise[:half], noise[half:]])
+    return _wald([noise[:half], noise[half:]], [inputs[:half], inputs[half:]], taps, RATE_HZ)[0]
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_p_values_are_uniform_when_a_coloured_residual_is_independent_of_coloured_inputs(pole):
+    """200 recordings of a minute; whiteness alone would call each of the coloured ones a mismatch."""
+    rng = np.random.default_rng(0)
+    values = []
+    for _ in range(200):
+        inputs = np.stack([coloured(2400, 1.0, rng, pole=0.95) for _ in range(4)], axis=1)
+        values.append(p_of(coloured(2400, 1.0, rng, pole=pole), inputs))
+    values = np.array(values)
+    assert kstest(values, "uniform", alternative="greater").pvalue > 0.01
+    assert np.mean(values < 0.05) <= 0.09 and values.min() > 1e-4
+    # Nor is the test dead: half of the p-values lie below a half, about.
+    assert 0.25 < np.mean(values < 0.5) < 0.65
+
+
+def test_a_dependence_of_a_third_of_the_noise_is_seen():
+    rng = np.random.default_rng(1)
+    inputs = np.stack([coloured(2400, 1.0, rng, pole=0.95) for _ in range(4)], axis=1)
+    noise = coloured(2400, 1.0, rng, pole=0.6)
+    assert p_of(noise + 0.35 * inputs[:, 2], inputs) < 1e-5
+
+
+def test_too_few_blocks_say_nothing():
+    rng = np.random.default_rng(2)
+    assert p_of(rng.standard_normal(200), rng.standard_normal((200, 4))) == 1.0
+
+
+def test_the_inputs_are_those_the_recording_has():
+    vehicle = thesis_vehicle(rotor_radius_m=0.1)
+    prepared = SimpleNamespace(vehicle=vehicle, thinner=Thinner(100.0, 10.0))
+    velocity = np.tile([3.0, -4.0, 1.0], (400, 1))
+    found = probes(one(still(400, velocity=velocity, height=np.full(400, 0.3))), prepared)
+    by_hand = {
+        "velocity_y": -4.0,
+        "velocity_y_abs": -16.0,
+        "airspeed_squared": 25.0,
+        "north": 1.0,
+        "rotor_speed": 1000.0,
+        "thrust": 1e6,
+        "height": 1 / (1 + 9.0),
+    }
+    for name, value in by_hand.items():
+        np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
+    bare = probes(one(still(400, velocity=None, rotation=None, angular_velocity=None)), prepared)
+    assert set(bare) == {"rotor_speed", "thrust"}
+
+
+def test_products_of_inputs():
+    np.testing.assert_array_equal(_features(np.array([[2.0, 3.0]])), [[2, 3, 4, 6, 9]])

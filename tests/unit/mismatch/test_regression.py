@@ -1,0 +1,234 @@
+"""The joint regression: whitening, intervals, noisy regressors, agreement between runs, by hand and by repetition."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import kstest
+
+from rotorid.mismatch.regression import (
+    MOST_ATTENUATION,
+    Regression,
+    at_least,
+    autoregression,
+    build,
+    inverse_root,
+    limited_bias,
+    quadratic_form,
+    ridge_inverse,
+)
+from rotorid.mismatch.rows import Rows, Term
+
+from .synthetic import coloured
+
+RATE_HZ = 40.0
+
+
+def rows_of(y: np.ndarray, *columns: np.ndarray, run: str = "a") -> Rows:
+    """Rows in which only the first channel is there; columns (n,) each."""
+    size = len(y)
+    target = np.full((size, 12), np.nan)
+    target[:, 0] = y
+    x = np.zeros((size, 12, len(columns)))
+    x[:, 0] = np.stack(columns, axis=1)
+    return Rows(run, np.arange(size) / RATE_HZ, target, x)
+
+
+def terms_of(*keys: str, prior: float = np.inf) -> list[Term]:
+    return [Term(key, "effect", key, prior_sd=(prior,)) for key in keys]
+
+
+def regression(rows, keys, filters=None, noisy=None, rule=lambda run, t: True, prior=np.inf) -> Regression:
+    filters = filters if filters is not None else {0: np.array([1.0])}
+    return build(rows, terms_of(*keys, prior=prior), filters, rule, 1.0, RATE_HZ, noisy)
+
+
+# --- whitening
+
+
+def test_the_whitening_filter_of_an_autoregression_is_its_own_coefficients():
+    """e_t = 0.8 e_{t-1} + 0.6 σ w_t with σ = 2: the filter is (1, −0.8) / 1.2."""
+    noise = coloured(60_000, 2.0, np.random.default_rng(0), pole=0.8)
+    taps = autoregression([noise[:30_000], noise[30_000:]])
+    white = lfilter(taps, [1.0], noise)[12:]
+    assert white.std() == pytest.approx(1.0, abs=0.05)
+    lagged = [np.corrcoef(white[k:], white[:-k])[0, 1] for k in (1, 2, 3)]
+    # The share of white noise assumed on top leaves a little colour.
+    assert np.abs(lagged).max() < 0.06
+    assert taps[1] / taps[0] == pytest.approx(-0.8, abs=0.08)
+
+
+def test_the_floor_bounds_how_small_noise_may_be():
+    quiet = 1e-6 * np.random.default_rng(1).standard_normal(5000)
+    assert lfilter(autoregression([quiet], floor=0.1), [1.0], np.ones(50))[-1] == pytest.approx(10.0, rel=0.02)
+    assert autoregression([np.zeros(100)]).tolist() == [1.0]
+
+
+# --- algebra by hand
+
+
+def test_a_covariance_is_raised_to_the_plain_one_in_every_direction():
+    np.testing.assert_allclose(at_least(np.diag([4.0, 1.0]), np.diag([1.0, 9.0])), np.diag([4.0, 9.0]), atol=1e-9)
+    # The plain one's weak direction is (1, −1): there nothing is lost either.
+    plain = np.array([[2.0, -1.9], [-1.9, 2.0]])
+    raised = at_least(np.eye(2), plain)
+    for direction in ([1.0, 1.0], [1.0, -1.0], [0.3, 0.7]):
+        d = np.array(direction)
+        assert d @ raised @ d >= max(d @ plain @ d, 0) * (1 - 1e-9)
+
+
+def test_columns_that_are_never_excited_stay_at_zero():
+    np.testing.assert_allclose(ridge_inverse(np.diag([4.0, 0.0])), np.diag([0.25, 0.0]), rtol=1e-6)
+    np.testing.assert_allclose(inverse_root(np.array([4.0, 0.0])), [0.5, 0.0])
+
+
+def test_a_quadratic_form_by_hand():
+    # (1, 2) with variances 4 and 1e-12: 1/4 + 4e12
+    assert quadratic_form(np.array([1.0, 2e-6]), np.diag([4.0, 1e-12])) == pytest.approx(0.25 + 4.0)
+
+
+def test_the_correction_for_noise_is_held_to_a_share_of_the_energy():
+    np.testing.assert_allclose(limited_bias(np.array([[10.0]]), np.array([[1.0]])), [[1.0]])
+    held = limited_bias(np.array([[10.0]]), np.array([[8.0]]))
+    np.testing.assert_allclose(held, [[10.0 * MOST_ATTENUATION]], rtol=1e-6)
+
+
+# --- fits
+
+
+def test_a_fit_of_two_columns_by_hand():
+    """x1 = 1, x2 = ±1 in turn, orthogonal: coefficients are the means, variances 1 / n in units of the noise."""
+    rng = np.random.default_rng(2)
+    n = 4000
+    sign = np.where(np.arange(n) % 2, 1.0, -1.0)
+    y = 3.0 - 2.0 * sign + rng.standard_normal(n)
+    found = regression([rows_of(y, np.ones(n), sign)], ["one", "two"]).fit(["one", "two"])
+    np.testing.assert_allclose(found.beta, [y.mean(), (y * sign).mean()], rtol=1e-6)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), 1 / np.sqrt(n), rtol=0.25)
+    assert found.gain == pytest.approx(n * (y.mean() ** 2 + (y * sign).mean() ** 2), rel=1e-6)
+
+
+def test_a_prior_pulls_towards_the_believed_value():
+    """y = 1 once a sample, prior one-sigma 0.1: precision 100 against n = 100 halves the estimate."""
+    found = regression([rows_of(np.ones(100), np.ones(100))], ["v"], prior=0.1).fit(["v"])
+    np.testing.assert_allclose(found.beta, [0.5], rtol=1e-6)
+    loose = regression([rows_of(np.ones(100), np.ones(100))], ["v"], prior=0.1).fit(["v"], loose={"v": 10.0})
+    np.testing.assert_allclose(loose.beta, [1.0], rtol=1e-3)
+
+
+def test_gaps_are_in_neither_part():
+    def rule(run, t):
+        return None if 4.0 < t < 6.0 else t < 5.0
+
+    found = regression([rows_of(np.ones(400), np.ones(400))], ["v"], rule=rule)
+    assert (found.training.sum(), found.held_out.sum(), len(found.training)) == (4, 4, 10)
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.7, 0.95])
+def test_intervals_hold_under_coloured_noise_and_coloured_inputs(pole):
+    """200 recordings of 30 s with a slope of 1: the 95 % interval covers it in 91 to 99 % (binomial 3 sigma)."""
+    rng = np.random.default_rng(3)
+    inside = 0
+    for _ in range(200):
+        x = coloured(1200, 1.0, rng, pole=0.9)
+        noise = coloured(1200, 1.0, rng, pole=pole)
+        filters = {0: autoregression([noise])}
+        found = regression([rows_of(x + noise, x)], ["x"], filters).fit(["x"], jackknife=True)
+        inside += abs(found.beta[0] - 1.0) < 1.96 * np.sqrt(found.covariance[0, 0])
+    assert 182 <= inside <= 199
+
+
+def test_p_values_of_nothing_are_uniform_under_coloured_noise():
+    rng = np.random.default_rng(4)
+    values = []
+    for _ in range(200):
+        x = np.stack([coloured(1600, 1.0, rng, pole=0.9) for _ in range(2)])
+        noise = coloured(1600, 1.0, rng, pole=0.9)
+        found = regression([rows_of(noise, *x)], ["one", "two"], {0: autoregression([noise])})
+        fit = found.fit(["one", "two"], jackknife=True)
+        values.append(found.wald(fit, found.columns(["one", "two"]), int(found.training.sum())))
+    values = np.array(values)
+    # Never too small: an interval that is too wide in a rare draw is allowed, a false alarm is not.
+    assert np.mean(values < 0.05) <= 0.09 and values.min() > 1e-4
+    assert kstest(values, "uniform", alternative="greater").pvalue > 0.01
+
+
+def noisy_case(rng, pole: float = 0.9, size: int = 8000):
+    """A regressor of variance 1 read with noise of variance 0.25: plain least squares gives 1 / 1.25 = 0.8."""
+    x = coloured(size, 1.0, rng, pole=pole)
+    read = x + 0.5 * rng.standard_normal(size)
+    y = x + 0.3 * rng.standard_normal(size)
+    again = read + 0.5 * rng.standard_normal(size)
+    return rows_of(y, read), rows_of(y, again)
+
+
+def test_a_noisy_regressor_attenuates_and_the_correction_undoes_it():
+    rng = np.random.default_rng(5)
+    read, again = noisy_case(rng)
+    plain = regression([read], ["x"]).fit(["x"])
+    corrected = regression([read], ["x"], noisy=[again]).fit(["x"])
+    assert plain.beta[0] == pytest.approx(0.8, abs=0.02)
+    assert corrected.beta[0] == pytest.approx(1.0, abs=0.03)
+    # Half of the correction is in doubt, and stated.
+    assert np.sqrt(corrected.covariance[0, 0]) > 0.45 * (corrected.beta[0] - plain.beta[0])
+
+
+def test_the_share_of_noise_in_a_column_beside_the_others():
+    """Noise variance 0.25 of 1.25 in all (times the safety of 2); beside the noise-free signal it is all noise."""
+    rng = np.random.default_rng(6)
+    read, again = noisy_case(rng)
+    alone = regression([read], ["x"], noisy=[again])
+    assert alone.noise_share(["x"], "x", np.ones(1)) == pytest.approx(2 * 0.2, abs=0.03)
+    truth = coloured(8000, 1.0, np.random.default_rng(6), pole=0.9)
+    both = [rows_of(read.y[:, 0], truth, read.x[:, 0, 0])]
+    more = [rows_of(read.y[:, 0], truth, again.x[:, 0, 0])]
+    beside = regression(both, ["truth", "x"], noisy=more)
+    assert beside.noise_share(["truth", "x"], "x", np.ones(1)) > 1.0
+
+
+# --- what is built on a fit
+
+
+def runs_with_slopes(*slopes: float) -> Regression:
+    rng = np.random.default_rng(7)
+    rows = []
+    for k, slope in enumerate(slopes):
+        x = coloured(1200, 1.0, rng, pole=0.9)
+        rows.append(rows_of(slope * x + 0.5 * rng.standard_normal(1200), x, run=f"r{k}"))
+    return regression(rows, ["x"], {0: np.array([2.0])})
+
+
+def test_runs_that_agree_add_no_variance_and_runs_that_differ_do():
+    same = runs_with_slopes(1.0, 1.0, 1.0, 1.0)
+    spread, p = same.between_runs(same.fit(["x"]), "x")
+    assert spread[0] < 1e-3 and p > 0.01
+    differ = runs_with_slopes(0.6, 1.4, 0.8, 1.2)
+    spread, p = differ.between_runs(differ.fit(["x"]), "x")
+    # Slopes of variance 0.1333 over four runs: 0.0333 for their mean.
+    assert p < 1e-6 and spread[0] == pytest.approx(0.1333 / 4, rel=0.2)
+    single = runs_with_slopes(1.0)
+    assert single.between_runs(single.fit(["x"]), "x") == (0.0, 1.0)
+
+
+def test_what_a_term_does_beyond_the_others():
+    """x2 = x1 + z with z orthogonal: its own part takes one x1 off."""
+    one = np.tile([1.0, 1.0, -1.0, -1.0], 200)
+    z = np.tile([1.0, -1.0, 1.0, -1.0], 200)
+    found = regression([rows_of(one, one, one + z)], ["one", "two"])
+    cols, beta = found.beyond(["one"], "two", np.array([2.0]))
+    assert cols.tolist() == [0, 1]
+    np.testing.assert_allclose(beta, [-2.0, 2.0], rtol=1e-6)
+
+
+def test_the_gain_expected_on_held_out_blocks_is_what_a_right_model_gains():
+    rng = np.random.default_rng(8)
+    n = 4000
+    x = coloured(n, 1.0, rng, pole=0.9)
+    y = 0.5 * x + rng.standard_normal(n)
+    found = regression([rows_of(y, x)], ["x"], rule=lambda run, t: t < n / RATE_HZ / 2)
+    with_it, without = found.fit(["x"]), found.fit([])
+    expected = found.expected_gain(with_it, without, found.held_out)
+    gained = (without.residual_square - with_it.residual_square)[found.held_out].sum()
+    assert expected == pytest.approx(0.25 * n / 2, rel=0.15)
+    assert gained == pytest.approx(expected, rel=0.2)

@@ -1,0 +1,112 @@
+"""Wrong believed values: the fewest that explain the residual, only where they are certain and matter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotorid.mismatch.decide import SMALLEST_CHANGE, held_out_gain, main_channels, wrong_values
+from rotorid.mismatch.regression import build
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.select import Search, Selection
+
+from .synthetic import coloured
+from .test_regression import RATE_HZ
+
+TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "inertia_zz": 0.15}
+NOISE = 0.1
+
+
+def columns(size: int, rng) -> np.ndarray:
+    """Columns (n, 12, 4) as a flight gives them: thrust and mass in force_z, torque and inertia in moment_z."""
+    x = np.zeros((size, 12, 4))
+    lift = -6.4 + 0.6 * coloured(size, 1.0, rng, pole=0.9)
+    x[:, 2, 0], x[:, 2, 2] = lift, -lift
+    x[:, 5, 1] = coloured(size, 1.0, rng, pole=0.9)
+    x[:, 5, 3] = coloured(size, 1.0, rng, pole=0.9)
+    return x
+
+
+def judged(changes: dict[str, float], seed: int = 0, reverse: bool = True, size: int = 4000) -> dict:
+    """What is said of a recording in which some values are off by relative changes."""
+    rng = np.random.default_rng(seed)
+    x = columns(size, rng)
+    beta = np.array([changes.get(key, 0.0) for key in TRUST])
+    y = np.full((size, 12), np.nan)
+    for channel in (2, 5):
+        y[:, channel] = x[:, channel] @ beta + coloured(size, NOISE, rng, pole=0.0)
+    rows = Rows("a", np.arange(size) / RATE_HZ, y, x)
+    terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
+    filters = {c: np.array([1.0 / NOISE]) for c in (2, 5)}
+    made = build([rows], terms, filters, lambda run, t: True, 1.0, RATE_HZ)
+    # The other side agrees, or sees the opposite of it.
+    other = Rows("a", rows.time_s, y if reverse else -y, x)
+    back = build([other], terms, filters, lambda run, t: True, 1.0, RATE_HZ)
+
+    def size_of(key, change):
+        column = x[:, :, list(TRUST).index(key)]
+        return float(np.sqrt((column**2).mean(axis=0)).max() * abs(change) / NOISE)
+
+    search = Search(made, lambda key, b: np.full(12, size_of(key, b[0])))
+    return wrong_values(made, search, Selection([], made.fit(list(TRUST))), back, size_of)
+
+
+def test_a_wrong_torque_coefficient_is_named_with_its_interval():
+    found = judged({"torque": 0.12})
+    assert list(found) == ["torque"]
+    value, sd = found["torque"]
+    assert value == pytest.approx(0.12, abs=3 * sd) and sd < 0.01
+
+
+def test_right_values_are_left_alone():
+    """100 recordings: a value is called wrong in none of them."""
+    assert [seed for seed in range(100) if judged({}, seed, size=1000)] == []
+
+
+def test_of_mass_and_thrust_the_one_least_trusted_is_named():
+    """An accelerometer sees their ratio only: 5 % less thrust is half of its trust, 5 % more mass one of its own."""
+    found = judged({"thrust": -0.05})
+    assert list(found) == ["thrust"]
+    assert found["thrust"][0] == pytest.approx(-0.05, abs=0.005)
+
+
+def test_two_wrong_values_are_both_named():
+    found = judged({"torque": 0.1, "inertia_zz": -0.08})
+    assert sorted(found) == ["inertia_zz", "torque"]
+    assert found["inertia_zz"][0] == pytest.approx(-0.08, abs=0.01)
+
+
+def test_a_change_that_no_laboratory_could_tell_is_not_named():
+    assert SMALLEST_CHANGE > 0.01
+    assert judged({"torque": 0.01}) == {}
+
+
+def test_a_value_that_the_other_side_contradicts_is_not_named():
+    assert judged({"torque": 0.12}, reverse=False) == {}
+
+
+def test_the_held_out_gain_is_the_ratio_of_errors_with_and_without():
+    """Residual 0.5 x + noise 1, x of variance 4: without 1.414, with 1; on the samples held out alone."""
+    rng = np.random.default_rng(1)
+    size = 20_000
+    x = np.zeros((size, 12, 1))
+    x[:, 0, 0] = coloured(size, 2.0, rng, pole=0.9)
+    y = np.full((size, 12), np.nan)
+    y[:, 0] = 0.5 * x[:, 0, 0] + rng.standard_normal(size)
+    rows = Rows("a", np.arange(size) / RATE_HZ, y, x)
+    half = size / RATE_HZ / 2
+    made = build([rows], [Term("x", "effect")], {0: np.array([1.0])}, lambda run, t: t < half, 1.0, RATE_HZ)
+    held = [rows.time_s > half]
+    ratio, low, high = held_out_gain([rows], made, made.fit(["x"]), made.fit([]), 0, held)
+    assert ratio == pytest.approx(np.sqrt(0.5), abs=0.02)
+    assert low < np.sqrt(0.5) < high and high - low < 0.06
+    assert held_out_gain([rows], made, made.fit(["x"]), made.fit([]), 0, [np.zeros(size, bool)]) is None
+
+
+def test_the_channels_of_a_finding_are_those_it_is_strongest_in():
+    """In units of the noise: 2 in force_x, 1 in moment_y (half of it), 0.2 in force_z (a tenth)."""
+    x = np.zeros((100, 12, 1))
+    x[:, 0], x[:, 4], x[:, 2] = 0.2, 0.001, 0.02
+    rows = Rows("a", np.arange(100) / RATE_HZ, np.zeros((100, 12)), x)
+    noise = np.array([0.1, 0.1, 0.1, 0.001, 0.001, 0.001, *[np.nan] * 6])
+    assert main_channels([rows], np.array([0]), np.array([1.0]), noise) == [0, 4]
