@@ -18,6 +18,7 @@ include: "workflow/rules/white_box.smk"
 include: "workflow/rules/grey_box.smk"
 include: "workflow/rules/black_box.smk"
 include: "workflow/rules/mismatch.smk"
+include: "workflow/rules/proof.smk"
 include: "workflow/rules/report.smk"
 
 
