@@ -13,7 +13,8 @@ from rotorid import log
 def main(cases: list[str], sets: str, answers: str, root: str) -> None:
     """Record the cases of these names into `sets`, their answers into `answers`; `root` holds `tests`."""
     sys.path.insert(0, root)
-    from tests.concealed import build, cases as known
+    from tests.concealed import build
+    from tests.concealed import cases as known
 
     by_name = {case.name: case for case in known.all_cases()}
     Path(sets).mkdir(parents=True, exist_ok=True)

@@ -1,1 +1,1 @@
-"""The proof: verdicts on concealed recordings scored against the sealed answers, beside peers and real recordings."""
+"""The proof: verdicts on recordings with something hidden in them, scored; beside other methods and real recordings."""

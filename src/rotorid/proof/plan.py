@@ -43,9 +43,7 @@ def read_index(path: Path) -> list[Entry]:
 def choose(entries: Sequence[Entry], seeds: Mapping[str, int], patterns: Sequence[str]) -> list[Entry]:
     """Cases whose seed lies below the number for their family (0 for one not named) and whose name fits a pattern."""
     return [
-        e
-        for e in entries
-        if e.seed < seeds.get(e.family, 0) and any(fnmatch(e.case, pattern) for pattern in patterns)
+        e for e in entries if e.seed < seeds.get(e.family, 0) and any(fnmatch(e.case, pattern) for pattern in patterns)
     ]
 
 

@@ -17,6 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from rotorid.proof.spelling import translated
+from rotorid.proof.units import same_unit
+
 CLAIMED = ("established", "ambiguous")
 LOCATION_STEP_S = 0.05
 """Grid on which true and reported stretches of time are compared."""
@@ -121,27 +124,22 @@ def parameter_scores(verdict: Mapping[str, Any], answer: Mapping[str, Any]) -> l
         estimates: dict[str, list] = {}
         for p in claimed[effect["id"]]["parameters"]:
             estimates.setdefault(p["symbol"], []).append(p)
-        symbols = [p["symbol"] for p in effect["parameters"]]
-        for truth in effect["parameters"]:
+        truths = translated(effect["id"], effect["parameters"])
+        symbols = [p["symbol"] for p in truths]
+        for truth in truths:
             found = estimates.get(truth["symbol"], [])
             value = truth["value"]
             # A symbol that stands more than once (several gusts, swapped columns) has no single true value.
             numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
             if len(found) != 1 or symbols.count(truth["symbol"]) != 1 or not numeric:
                 continue
-            if comparable_unit(found[0]["unit"]) == comparable_unit(truth["unit"]):
+            if same_unit(found[0]["unit"], truth["unit"]):
                 out.append(_compared(effect["id"], truth["symbol"], value, found[0]["value"], found[0]["interval_95"]))
     for name, values in answer["wrong_parameters"].items():
         found = verdict.get("parameters", {}).get(name)
         if found is not None:
             out.append(_compared("", name, values["true"], found["refitted"], found["interval_95"]))
     return [p for p in out if p is not None]
-
-
-def comparable_unit(unit: str) -> str:
-    """Spelling of a unit that two authors agree on: no spaces, `-` and `1` the same, `²` as 2."""
-    flat = unit.replace(" ", "").replace("²", "2").replace("·", "").replace("^", "")
-    return "1" if flat in ("-", "", "1") else flat
 
 
 def _compared(effect, symbol, true, value, interval) -> dict[str, Any] | None:

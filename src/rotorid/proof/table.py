@@ -124,7 +124,13 @@ def summary(scores: Sequence[Score]) -> list[dict[str, Any]]:
             rate(moderate, lambda s: s["top_one"]),
         ),
         ("whole_single", "Single effects, moderate: whole set right", None, None, rate(moderate, _whole)),
-        ("blade_inside", "Blade-element rotors: truth inside the class", None, None, rate(_family(scores, "blade"), _in)),
+        (
+            "blade_inside",
+            "Blade-element rotors: truth inside the class",
+            None,
+            None,
+            rate(_family(scores, "blade"), _in),
+        ),
         (
             "rotorpy_named",
             "Flown by RotorPy: whole set right",
@@ -162,7 +168,13 @@ def summary(scores: Sequence[Score]) -> list[dict[str, Any]]:
             rate([s for s in (*confusable, *moderate) if not s["ambiguity_there"]], lambda s: s["ambiguity_right"]),
         ),
         ("coverage_physics", "95 % intervals that cover: effects", None, None, coverage(_fitting(scores), True)),
-        ("coverage_values", "95 % intervals that cover: believed values", None, None, coverage(_fitting(scores), False)),
+        (
+            "coverage_values",
+            "95 % intervals that cover: believed values",
+            None,
+            None,
+            coverage(_fitting(scores), False),
+        ),
         (
             "oracle_within",
             "Held-out error after within 5 % of the oracle's",
