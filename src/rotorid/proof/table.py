@@ -170,7 +170,7 @@ def summary(scores: Sequence[Score]) -> list[dict[str, Any]]:
         ("coverage_physics", "95 % intervals that cover: effects", None, None, coverage(_fitting(scores), True)),
         (
             "coverage_values",
-            "95 % intervals that cover: believed values",
+            "95 % intervals that cover: wrong values",
             None,
             None,
             coverage(_fitting(scores), False),
