@@ -43,6 +43,6 @@ def test_the_mismatch_stage_does_not_know_that_there_are_answers() -> None:
 
 
 def test_judging_and_the_mismatch_rule_never_see_case_names() -> None:
-    for name in ("judge", "mismatch"):
+    for name in ("judge", "mismatch", "ask_peers"):
         assert "cases_of" not in RULES[name]
         assert "answers" not in part(RULES[name], "input") + part(RULES[name], "params")

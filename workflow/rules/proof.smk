@@ -10,9 +10,7 @@ from rotorid.proof import plan
 CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
 BATCHES = plan.batches(plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases), CONFIG.proof.batch)
 # Recordings come from code outside the library: its hash stands beside that of the script.
-CONCEALING = [
-    str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))
-]
+CONCEALING = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))]
 PROOF_TABLES = ("summary", "cases", "effects", "confusion", "power", "parameters", "peers")
 
 if "proof" in sys.argv:
@@ -61,6 +59,22 @@ rule judge:
         "results/logs/judge/{batch}.log",
     script:
         "../scripts/judge.py"
+
+
+rule ask_peers:
+    """What other methods say of the same sets, told nothing either."""
+    message:
+        "Proof: asking other methods, {wildcards.batch}"
+    input:
+        sets="results/proof/sets/{batch}",
+    output:
+        peers=directory("results/proof/peers/{batch}"),
+    params:
+        code=code_of("ask_peers"),
+    log:
+        "results/logs/ask_peers/{batch}.log",
+    script:
+        "../scripts/ask_peers.py"
 
 
 rule score_proof:
