@@ -48,6 +48,8 @@ from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 
 SEED = 2024
 REPEATS = 10
+COMBINED_AXES = ("xy", "xz", "yz", "xyz")
+COMBINED_LOADS = (3, 4, 6)  # combinations of weights
 PLATFORMS_Z = ("al", "pla", "jr3")
 PROPELLER = "5040 three-blade"
 FIRST_DAY = datetime(2024, 3, 4, 9, 0, tzinfo=timezone(timedelta(hours=-6)))
@@ -414,8 +416,35 @@ def tensile(campaign: Campaign) -> None:
             )
 
 
+def combined(campaign: Campaign) -> None:
+    """Weights that pull along two or three axes of the aluminium bench at once, five repeats.
+
+    The thesis has none; they tell what a reconstruction is worth when loads are not along one axis at a time.
+    """
+    for axis in COMBINED_AXES:
+        for number in COMBINED_LOADS:
+            items = COMBINATIONS[number - 1]
+            for repeat in range(1, 6):
+                name = f"combined-al-{axis}-w{number}-r{repeat}"
+                rng = campaign.rng(name)
+                physics, device = _platform(campaign, "al", rng)
+                world = World(physics, campaign.line(device, name))
+                physics.process(1.0)
+                load = weight_gf(items)
+                prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, int(rng.integers(60, 120)))
+                setup = Setup(platform="al", axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
+                campaign.record(
+                    "combined",
+                    f"combined-al-{axis}",
+                    world,
+                    {name: setup},
+                    lambda recorder, prompt=prompt: procedures.static_test(recorder, prompt, 50, SteadyRule()),
+                    {"name": "static_test", "samples": 50, **vars(SteadyRule())},
+                )
+
+
 PARTS: dict[str, Callable[[Campaign], None]] = {
-    part.__name__: part for part in (calibration, static, dynamic, thrust, torque, dynamics, tensile)
+    part.__name__: part for part in (calibration, static, dynamic, thrust, torque, dynamics, tensile, combined)
 }
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from acquire.emulators.load_cell import LoadCells
-from acquire.emulators.loads import AXES, put_down
+from acquire.emulators.loads import direction_of, put_down
 from acquire.emulators.oscillator import Oscillator
 from acquire.emulators.truth import BenchTruth, CellsTruth
 from acquire.geometry import cell_response
@@ -28,12 +28,14 @@ class BenchPhysics:
         self._time_s = 0.0
 
     def place_load(self, axis: str, load_gf: float) -> None:
-        """Put a weight on (or, with 0, take all off); the direction is never quite the same twice."""
+        """Put a weight on (or, with 0, take all off); the direction is never quite the same twice. `axis` names
+        one axis, or several along which the weight pulls alike."""
         load_n = put_down(load_gf, self._rng)
         if axis != "z":
             load_n *= 1 - self._bench.pulley_loss * self._rng.random()
-        direction = AXES[axis]
-        slant = self._bench.misalignment_rad["xyz".index(axis)] * self._rng.standard_normal(3)
+        direction = direction_of(axis)
+        spread = max(self._bench.misalignment_rad["xyz".index(letter)] for letter in axis)
+        slant = spread * self._rng.standard_normal(3)
         direction = direction + np.cross(slant, direction)
         self._load_n = load_n * direction / np.linalg.norm(direction)
 

@@ -8,6 +8,14 @@ from acquire.geometry import GF_N
 
 # a load "along z" pulls upwards, as thrust does
 AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, -1.0])}
+
+
+def direction_of(axis: str) -> np.ndarray:
+    """Unit vector of a load along one axis, or along several alike (`xz`: halfway between x and z)."""
+    together = sum(AXES[letter] for letter in axis)
+    return together / np.linalg.norm(together)
+
+
 SPREAD = 1e-4
 SPREAD_GF = 0.08
 

@@ -1,4 +1,4 @@
-"""Command line for people: `rotorid check DIR`."""
+"""Command line for people: `rotorid check DIR`, `rotorid effects [ID]`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from rotorid.effects import describe
+from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.recordings import list_sets
 from rotorid.recordings.check import as_text, check_folder
@@ -43,4 +45,21 @@ def check(
     if as_json:
         typer.echo(json.dumps(results, indent=1))
     if failed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def effects(
+    effect_id: Annotated[str | None, typer.Argument(metavar="[ID]", help="One effect in full.")] = None,
+    as_markdown: Annotated[bool, typer.Option("--markdown", help="The page docs/effects.md.")] = False,
+) -> None:
+    """Print the catalogue of effects: a line each, or one with its equations, parameters, bounds and sources."""
+    if as_markdown:
+        typer.echo(describe.markdown(), nl=False)
+    elif effect_id is None:
+        typer.echo(describe.listing(), nl=False)
+    elif effect_id in catalogue():
+        typer.echo(describe.in_full(catalogue()[effect_id]), nl=False)
+    else:
+        typer.echo(f"no effect is called {effect_id!r}; `rotorid effects` lists them", err=True)
         raise typer.Exit(1)

@@ -54,6 +54,49 @@ class Report(Section):
         return self
 
 
+class FilterSettings(Section):
+    """Filters for one instrument's readings."""
+
+    low_pass_hz: float = Field(gt=0, lt=25, description="Cutoff of the thesis's first-order low-pass [Hz].")
+    zero_phase_hz: float = Field(gt=0, lt=25, description="Cutoff of the zero-phase low-pass [Hz].")
+    spike_window: int = Field(ge=3, description="Samples around one that its median is taken of [1].")
+    spike_threshold: float = Field(gt=0, description="Robust standard deviations beyond which a sample is a spike [1].")
+    steady_window: int = Field(ge=2, description="Samples that have to be steady [1].")
+    steady_tolerance: float = Field(
+        gt=0, description="Span of the low-passed signal that counts as steady [V of cells, N of the reference sensor]."
+    )
+
+
+class Filters(Section):
+    """Filters of the bench's instruments."""
+
+    bench: FilterSettings = Field(description="Load cells of the bench.")
+    jr3: FilterSettings = Field(description="Reference sensor of the bench's tests.")
+
+
+class BenchSettings(Section):
+    """The load-cell bench."""
+
+    noise_n: float = Field(ge=0, description="Believed one-sigma noise of a sample of the bench's force [N].")
+    matrix_largest_n: float = Field(
+        gt=0,
+        description="Largest load that the calibration matrix is fitted to: beyond it cells leave their range [N].",
+    )
+    reference_noise_n: float = Field(ge=0, description="Believed one-sigma noise of the reference sensor [N].")
+
+
+class StandSettings(Section):
+    """The vehicle on the six-axis sensor."""
+
+    clock_error: float = Field(gt=0, lt=0.1, description="Largest relative error of a device's clock [1].")
+    force_noise_n: float = Field(ge=0, description="Believed one-sigma noise of the sensor's force [N].")
+    moment_noise_n_m: float = Field(ge=0, description="Believed one-sigma noise of the sensor's moment [N m].")
+    thrust_noise_n: float = Field(ge=0, description="Believed one-sigma noise of the thrust tester [N].")
+    speed_noise_relative: float = Field(
+        ge=0, lt=0.2, description="One-sigma noise of the tester's rotor speed, as a share of it [1]."
+    )
+
+
 class RotorSettings(Section):
     """Thrust coefficients from stand runs."""
 
@@ -113,6 +156,7 @@ class GreyBox(Section):
     design_period_s: float = Field(gt=0, description="Period of the excitation [s].")
     design_candidates: int = Field(ge=4, description="Excitations tried by the search [1].")
     flight_s: float = Field(gt=0, description="Length of the identification flight [s].")
+    flight_step_s: float = Field(gt=0, description="Time for which that flight's motor commands are held [s].")
     motor_time_s: float = Field(ge=0, description="Time constant of the motors on that flight [s].")
     draws: int = Field(ge=1, description="Identification flights, each with its own disturbance and noise [1].")
     band_hz: tuple[float, float] = Field(
@@ -152,6 +196,10 @@ class Config(Section):
     """The whole of `config.yaml`."""
 
     recordings: Text = Field(description="Folder that holds the recording sets, one folder each [path].")
+    raw: Text = Field(description="Folder of the raw logs, with sessions.tsv [path].")
+    filter: Filters = Field(description="Filters of the bench's instruments.")
+    bench: BenchSettings = Field(description="The load-cell bench.")
+    stand: StandSettings = Field(description="The vehicle on the six-axis sensor.")
     rotor: RotorSettings = Field(description="Thrust coefficients from stand runs.")
     residuals: Residuals = Field(description="Rigid-body residuals of the NeuroBEM flights.")
     simulation: Simulation = Field(description="The simulated vehicle's readings and disturbances.")

@@ -133,8 +133,8 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     caption
         Text above the table, markdown.
     columns
-        `(key, heading)` or `(key, heading, form)`; `form` is `text`, or `fixN`, `sciN` or `percentN` with N
-        decimals.
+        `(key, heading)` or `(key, heading, form)`; `form` is `text`, `symbol` (`J_xx` set as mathematics), or
+        `fixN`, `sciN` or `percentN` with N decimals.
     label
         Identifier for references.
     """
@@ -147,7 +147,8 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
         max(3, word, *(min(len(line[place]), WIDEST) for line in cells)) for place, word in enumerate(longest_words)
     ]
     rules = [
-        ":" + "-" * width if form == "text" else "-" * width + ":" for width, form in zip(widths, forms, strict=True)
+        ":" + "-" * width if form in ("text", "symbol") else "-" * width + ":"
+        for width, form in zip(widths, forms, strict=True)
     ]
     lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}}}\n"
@@ -159,10 +160,10 @@ def _row(cells: Sequence[str]) -> str:
 
 def _formatted(value: Any, form: str) -> str:
     name, decimals = form.rstrip("0123456789"), form[len(form.rstrip("0123456789")) :]
-    if name == "text":
-        return text(value)
+    if name in ("text", "symbol"):
+        return {"text": text, "symbol": symbol}[name](value)
     if name not in ("fix", "sci", "percent") or not decimals:
-        raise ValueError(f"{form} is not a form of a number; forms are text, fixN, sciN and percentN")
+        raise ValueError(f"{form} is not a form of a number; forms are text, symbol, fixN, sciN and percentN")
     return {"fix": fix, "sci": sci, "percent": percent}[name](value, int(decimals))
 
 
@@ -194,6 +195,12 @@ def interval(ends: Sequence[float], decimals: int, form: str = "fix") -> str:
     """Both ends of an interval: `39.75 to 39.76`."""
     shown = {"fix": fix, "sci": sci}[form]
     return f"{shown(ends[0], decimals)} to {shown(ends[1], decimals)}"
+
+
+def symbol(value: str) -> str:
+    """A symbol with its index as mathematics: `J_xx` is `$J_{xx}$`."""
+    letter, _, index = value.partition("_")
+    return f"${letter}_{{{index}}}$" if index else f"${letter}$"
 
 
 def text(value: Any) -> str:

@@ -63,6 +63,7 @@ def test_the_campaign_is_whole(index):
         "torque": 2 * 20,
         "dynamics": 2 * 48,
         "tensile": 4 * 3,
+        "combined": 4 * 3 * 5,
     }
     assert {row["ended"] for row in index} == {"finished"} and {row["source"] for row in index} == {"emulator"}
     assert {row["kind"] for row in index} == set(PARTS)

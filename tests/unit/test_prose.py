@@ -77,3 +77,9 @@ def test_columns_of_long_text_get_more_room(tmp_path: Path) -> None:
     rows = [{"what": "a" * 60, "n": 1.0}, {"what": "b", "n": 22.0}]
     lines = prose.table_of(rows, "All.", [("what", "What"), ("n", "Number of them", "fix0")], "tbl:x")
     assert lines.splitlines()[1] == f"| :{'-' * 40} | {'-' * 6}: |"
+
+
+def test_symbols_are_set_as_mathematics() -> None:
+    assert [prose.symbol(name) for name in ("m", "J_xx", "w_11")] == ["$m$", "$J_{xx}$", "$w_{11}$"]
+    row = prose.table_of([{"name": "C_F"}], "Values.", [("name", "Parameter", "symbol")], "tbl:x").splitlines()[2]
+    assert row == "| $C_{F}$ |"

@@ -68,6 +68,7 @@ rule estimate_inertias:
         period_s=CONFIG.grey_box.design_period_s,
         candidates=CONFIG.grey_box.design_candidates,
         duration_s=CONFIG.grey_box.flight_s,
+        step_s=CONFIG.grey_box.flight_step_s,
         motor_time_s=CONFIG.grey_box.motor_time_s,
         moment_n_m=CONFIG.simulation.moment_n_m,
         force_n=CONFIG.simulation.force_n,

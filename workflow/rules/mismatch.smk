@@ -2,16 +2,16 @@
 
 
 def set_folder(name):
-    """Folder of a set: below `recordings`, else among the imported public ones."""
+    """Folder of a set: below `recordings`, else among those made of the campaign or of public recordings."""
     own = Path(CONFIG.recordings) / name
-    public = {s for names in PUBLIC_SETS_OF.values() for s in names}
-    if own.is_dir() or name not in public:
+    made = {s for names in PUBLIC_SETS_OF.values() for s in names} | set(CAMPAIGN_SETS)
+    if own.is_dir() or name not in made:
         return str(own)
     return public_set(name)
 
 
 def set_files(wildcards):
-    """Files of a set, each watched by content; of a public set its folder, which a rule makes."""
+    """Files of a set, each watched by content; of a public or campaign set its folder, which a rule makes."""
     folder = set_folder(wildcards.set)
     if folder == public_set(wildcards.set):
         return [folder]

@@ -16,6 +16,7 @@ from rotorid import log
 from rotorid.control.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
 from rotorid.control.pid import AttitudePid
 from rotorid.control.references import training_reference, validation_reference
+from rotorid.errors import InputError
 from rotorid.estimate.consistency import check_consistency
 from rotorid.estimate.inertial import WEIGHT_NAMES, weights_of_inertias
 from rotorid.estimate.output_error import cut_windows, fit_output_error, tied, untied
@@ -24,6 +25,7 @@ from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, Motors, Start, simulate
 
 SAMPLE_S = 0.004
+"""Time between readings."""
 AXES = ("xx", "yy", "zz")
 
 
@@ -63,6 +65,7 @@ def main(
     period_s: float,
     candidates: int,
     duration_s: float,
+    step_s: float,
     motor_time_s: float,
     moment_n_m: float,
     force_n: float,
@@ -85,8 +88,13 @@ def main(
     push = Disturbance(force_n, moment_n_m, correlation_s)
     lag, hold = Motors(motor_time_s), ExcitedHold(vehicle, multisine, tuple(limits_rad_s))
     start = Start(*(np.zeros((draws, 3)) for _ in range(4)))
-    trace = simulate(vehicle, hold, duration_s, SAMPLE_S, start, lag, disturbance=push, rng=rng)
-    rates, speeds = trace.angular_velocity[0], trace.rotor_speed[0]
+    trace = simulate(vehicle, hold, duration_s, step_s, start, lag, disturbance=push, rng=rng)
+    # Commands are held over a step, and between two readings the speeds bend by what no reading shows: with steps
+    # as long as the readings' the inertias would come out up to 0.05 % large, a quarter of that with half as long.
+    every = round(SAMPLE_S / step_s)
+    if every < 1 or abs(every * step_s / SAMPLE_S - 1) > 1e-6:
+        raise InputError(f"grey_box.flight_step_s is {step_s}, but whole steps must make up {SAMPLE_S} s")
+    rates, speeds = trace.angular_velocity[0, ::every], trace.rotor_speed[0, ::every]
     flights = {}
     for reference in (training_reference(), validation_reference()):
         flown = simulate(vehicle, AttitudePid(vehicle, reference), 10.0, SAMPLE_S, motors=Motors(0.0))
@@ -97,8 +105,8 @@ def main(
     rows, fitted = [], []
     for draw in range(draws):
         noise = np.random.default_rng([seed, draw])
-        read_speeds = trace.rotor_speed[draw] * (1 + speed_noise_relative * noise.normal(size=speeds.shape))
-        read_rates = trace.angular_velocity[draw] + rate_noise * noise.normal(size=rates.shape)
+        read_speeds = trace.rotor_speed[draw, ::every] * (1 + speed_noise_relative * noise.normal(size=speeds.shape))
+        read_rates = trace.angular_velocity[draw, ::every] + rate_noise * noise.normal(size=rates.shape)
         windows = cut_windows(read_rates, moments_of(vehicle, read_speeds), SAMPLE_S, WINDOW_S)
         guess = np.log(truth * np.array([1.2, 0.85, 1.1]))
         fit = fit_output_error(windows, tied, guess, moment_noise_n_m=readings.moments_n_m)
@@ -144,7 +152,7 @@ def main(
     Path(fits).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     shown = slice(0, int(min(period_s, 5.0) / SAMPLE_S))
     moments = moments_of(vehicle, speeds)
-    stretch = {"time_s": trace.time_s[shown]}
+    stretch = {"time_s": trace.time_s[::every][shown]}
     for k, axis in enumerate("xyz"):
         stretch[f"moment_{axis}_n_m"] = moments[shown, k]
         stretch[f"angular_velocity_{axis}_rad_s"] = rates[shown, k]

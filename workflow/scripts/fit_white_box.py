@@ -14,17 +14,19 @@ import pandas as pd
 
 from rotorid import log, thesis
 from rotorid.rotor.campaign import generated_points, thrust_points, torque_points
-from rotorid.rotor.coefficients import Points, fit_coefficient
+from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
 from rotorid.vehicle.mass_properties import compose, read_components
 
+LEAST_TORQUE_SD_N_M = 1e-6
 
-def coefficient(points: pd.DataFrame, believed: float) -> dict:
+
+def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
     """C with its intervals: speed exact, and speed as noisy as its own readings at each point scattered."""
     run = [Points("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
     plain = fit_coefficient(run, offset=False)
     # The mean of n readings: its speed is uncertain by sd / sqrt(n) as a share of the speed.
     relative = float(np.median(points["speed_sd_rad_s"] / np.sqrt(points["samples"]) / points["speed_rad_s"]))
-    noisy = fit_coefficient(run, offset=False, speed_noise_relative=relative)
+    noisy = fit_coefficient(run, offset=False, speed_noise_relative=relative, least_sd=least_sd)
     offset = fit_coefficient(run, offset=True)
     return {
         "value": plain.value,
@@ -68,8 +70,8 @@ def main(
     composed = compose(read_components(components))
     found = {
         "source": "campaign" if thrust_logs and torque_logs else "generated",
-        "c_f": coefficient(lift, thesis.WHITE_BOX["thrust_coefficient_n_s2"]),
-        "c_q": coefficient(twist, thesis.WHITE_BOX["torque_coefficient_n_m_s2"]),
+        "c_f": coefficient(lift, thesis.WHITE_BOX["thrust_coefficient_n_s2"], LEAST_FORCE_SD_N),
+        "c_q": coefficient(twist, thesis.WHITE_BOX["torque_coefficient_n_m_s2"], LEAST_TORQUE_SD_N_M),
         "mass_kg": composed.mass_kg,
         "centre_m": composed.centre_m.tolist(),
         "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(composed.inertia_kg_m2).tolist(), strict=True)),

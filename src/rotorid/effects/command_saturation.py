@@ -27,7 +27,7 @@ EFFECT = Effect(
             (Parameter("w_high", "ω_max", 0.3, 1.2, True, (0.95, 0.9, 0.8, 0.7), "highest speed"),),
             2,
             upper,
-            (1.2,),
+            (1.0,),
             excited_by="limit",
         ),
         SpeedForm(
@@ -36,7 +36,7 @@ EFFECT = Effect(
             (Parameter("w_low", "ω_max", -0.1, 0.6, True, (0.1, 0.2, 0.3), "lowest speed"),),
             2,
             lower,
-            (-0.1,),
+            (0.0,),
             excited_by="limit",
         ),
     ),

@@ -266,6 +266,7 @@ COLUMNS_OF = {
     "gyroscope": "angular_velocity_*_rad_s and quaternion_*",
     "rotation": "quaternion_*",
     "velocity": "velocity_*_m_s (or position_*_m) and quaternion_*",
+    "position": "position_*_m",
     "height": "height_m, or position_z_m where vehicle.yaml states ground_z_m",
     "voltage": "battery_voltage_v",
 }

@@ -6,14 +6,27 @@ from rotorid.effects.contract import Effect, Parameter, SpeedForm
 from rotorid.effects.recorded import late_sensors
 
 
+def _later(speed, steps):
+    """Speeds (n, k) by whole steps later (earlier if negative); the ends are held."""
+    steps = int(np.clip(steps, -len(speed), len(speed)))
+    out = np.empty_like(speed)
+    if steps >= 0:
+        out[:steps], out[steps:] = speed[0], speed[: len(speed) - steps]
+    else:
+        out[steps:], out[:steps] = speed[-1], speed[-steps:]
+    return out
+
+
 def shifted(path, values):
     """ω(t) = ω_c(t - T), linear between samples."""
     steps = values[0] / path.dt_s
-    index = np.arange(len(path.speed)) - steps
-    low = np.clip(np.floor(index).astype(int), 0, len(path.speed) - 1)
-    high = np.clip(low + 1, 0, len(path.speed) - 1)
-    part = np.clip(index - low, 0.0, 1.0)[:, None]
-    return (1 - part) * path.speed[low] + part * path.speed[high]
+    whole = np.floor(steps)
+    part = steps - whole
+    out = _later(path.speed, whole)
+    if part > 0.0:
+        out *= 1.0 - part
+        out += part * _later(path.speed, whole + 1)
+    return out
 
 
 def set_forms(vehicle):

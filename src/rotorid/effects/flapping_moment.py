@@ -29,14 +29,14 @@ def forms(vehicle):
         Form(
             "at the hubs",
             "M = k_flap Σ ω_i (e3 × v_i)",
-            (Parameter("k_flap", "N m s2/(rad m)", -k_flap, k_flap, meaning="moment per rotor speed and airspeed"),),
+            (Parameter("k_flap", "N m s2/(rad m)", 0.0, k_flap, meaning="moment per rotor speed and airspeed"),),
             hub_moment,
             ("velocity", "rotor_speed"),
         ),
         Form(
             "independent of rotor speed",
             "M = k_m (e3 × v)",
-            (Parameter("k_m", "N s", -k_m, k_m, meaning="moment per airspeed"),),
+            (Parameter("k_m", "N s", 0.0, k_m, meaning="moment per airspeed"),),
             independent_of_speed,
             ("velocity",),
         ),

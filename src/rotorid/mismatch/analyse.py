@@ -20,7 +20,7 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, residual
+from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term, residual
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path, nothing_between
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -41,6 +41,11 @@ from rotorid.mismatch.wrench import (
 from rotorid.recordings import RecordingSet, Vehicle, columns
 
 ABSORBED_P = 1e-6
+RUN_P = 1e-6
+RUN_SPREAD = 0.007
+"""Relative spread of the thrust coefficient between runs below which one number serves all."""
+RUN_TRUST = 0.02
+"""Relative one-sigma of a run's own thrust about the common one."""
 UNITS = {"force": "N", "moment": "N m"}
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 
@@ -49,7 +54,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     """The whole analysis of a set of kind `flight`."""
     recordings, mistakes, remarks = find_mistakes(recordings)
     prepared = prepare(recordings, cutoff_hz)
-    notes = list(remarks)
+    notes = [*remarks]
     findings = list(mistakes)
     reasons = dict(prepared.not_testable)
     measured = all(s.measured_speed for s in prepared.segments)
@@ -117,6 +122,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         plain_values = wrong_values(model.regression, model.search, nothing, None, size)
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
+    notes += run_scale_notes(model)
     traces = make_traces(prepared, model, found, measured, plain_values, values)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
@@ -147,6 +153,9 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
     model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
     terms = list(prepared.terms)
+    if thrust_differs(model):
+        terms = with_run_scales(terms, prepared)
+        model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
     for _ in range(2 if any(model.search.terms[k].form.nonlinear for k in model.selection.active) else 0):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
@@ -160,6 +169,34 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
         terms = [t for t in model.terms if not t.run]
     return with_gusts(prepared, model, segments, noisy, terms)
+
+
+def thrust_differs(model: WrenchModel) -> bool:
+    """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than RUN_SPREAD."""
+    if "thrust" not in model.search.terms or not all(s.measured_speed for s in model.prepared.segments):
+        return False
+    regression = model.regression
+    fit = regression.fit(model.search.always + model.selection.active)
+    spread, p = regression.between_runs(fit, "thrust")
+    runs = len(np.unique(regression.run[regression.training]))
+    return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
+
+
+def run_scale_notes(model: WrenchModel) -> list[str]:
+    """What was done about a thrust that differs between runs."""
+    terms = [t for t in model.regression.terms if t.key.startswith(RUN_SCALE)]
+    if not terms:
+        return []
+    fit = model.regression.fit(model.search.always + model.selection.active)
+    found = [fit.beta[fit.columns == model.regression.start[t.key]][0] for t in terms]
+    parts = ", ".join(f"{t.run} {100 * b:+.1f} %" for t, b in zip(terms, found, strict=True))
+    return [f"The thrust coefficient is not the same in every run; each has its own scale ({parts})."]
+
+
+def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
+    """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
+    runs = dict.fromkeys(s.run for s in prepared.segments)
+    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(RUN_TRUST,), run=r) for r in runs)]
 
 
 def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:

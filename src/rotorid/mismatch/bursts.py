@@ -13,7 +13,8 @@ ALARM = 6.0
 """Robust standard deviations of the smoothed world force that open a window."""
 EDGE = 2.5
 """A window reaches to where the smoothed force falls below this many."""
-SHORTEST_S, LONGEST_SHARE = 0.5, 0.5
+SHORTEST_S, LONGEST_SHARE = 1.0, 0.5
+"""A window is never shorter than the smoothing itself; one of a blip is as short."""
 KNOT_S = 0.6
 MOST_WINDOWS = 3
 

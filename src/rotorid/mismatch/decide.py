@@ -194,7 +194,8 @@ def wrong_values(
             agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or not agrees or not matters:
+            pinned = abs(change) > 0.98 * regression.limit[regression.start[key]]
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or pinned or not agrees or not matters:
                 doubtful[key] = abs(change) / sd
         if not doubtful:
             break

@@ -275,7 +275,7 @@ def build_segments(
             velocity=body_velocity,
             position=core(position),
             height=above,
-            voltage=None if voltage is None else core(voltage)[:, 0],
+            voltage=None if voltage is None else held_through_gaps(core(voltage)[:, 0]),
         )
         extra = {n: np.interp(motion.time_s, t, np.nan_to_num(run.column(n))) for n in run.unknown_columns}
         segments.append(
@@ -292,6 +292,15 @@ def build_segments(
             )
         )
     return segments
+
+
+def held_through_gaps(values: np.ndarray) -> np.ndarray | None:
+    """A slow signal (n,) with its missing samples interpolated, held at the ends; None where nothing is there."""
+    known = np.isfinite(values)
+    if not known.any():
+        return None
+    index = np.arange(len(values))
+    return np.interp(index, index[known], values[known])
 
 
 def estimated_full_speed(vehicle: Vehicle, throttle: np.ndarray) -> float:

@@ -37,6 +37,7 @@ GAP_S = 2.0
 """Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
+LOWEST_TO_MEAN = 1.08
 MOST_NOISE_SAMPLES = 8192
 """Samples of a column that its noise level is read from."""
 
@@ -83,7 +84,8 @@ def white_level(values: np.ndarray) -> float:
         return 0.0
     _, density = welch(values, fs=1.0, nperseg=min(256, len(values) // 2))
     smooth = np.convolve(density[2:], np.ones(9) / 9, mode="valid")
-    return float(np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
+    # The lowest of some hundred smoothed levels lies below their mean.
+    return float(LOWEST_TO_MEAN * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 
 
 def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle) -> dict[str, float]:
@@ -170,8 +172,8 @@ def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[
                 continue
             found += form_terms(effect.id, form)
         terms += found
-        if not found and effect.id not in UNKNOWNS:
-            reasons[effect.id] = why or "no column of the recording shows it"
+        if why and not found and effect.id not in UNKNOWNS:
+            reasons[effect.id] = why
     return terms, reasons
 
 

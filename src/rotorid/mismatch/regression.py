@@ -32,8 +32,13 @@ AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
 MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
+MOST_REMEMBERED = 2000
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
+VALUE_LIMITS = (0.15, 0.4)
+"""A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
+mismatch that needs a third of the arm is no wrong ruler."""
+HOLD = 1e6
 RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
 NOISE_SAFETY = 2.0
@@ -109,6 +114,8 @@ class Regression:
     bias_cross: np.ndarray
     filters: dict[int, np.ndarray]
     """Whitening filter of each channel."""
+    names: dict[str, int]
+    """Number of each run."""
 
     def columns(self, keys: Iterable[str]) -> np.ndarray:
         """Column numbers of terms, in the order given."""
@@ -119,6 +126,11 @@ class Regression:
     def __post_init__(self):
         self._total_gram = self.gram[self.training].sum(axis=0)
         self._total_cross = self.cross[self.training].sum(axis=0)
+        self.limit = np.full(len(self._total_cross), np.inf)
+        for term in self.terms:
+            if term.kind == "value":
+                self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
+        self._fits: dict[tuple[tuple[str, ...], bool], Fit] = {}
 
     def _normal(self, cols: np.ndarray, mask: np.ndarray):
         share = mask.sum() / len(mask)
@@ -139,8 +151,20 @@ class Regression:
         jackknife: bool = False,
         loose: dict[str, float] | None = None,
     ) -> Fit:
-        """Fit terms on the masked blocks (training by default); `loose` widens priors (term to one-sigma)."""
-        mask = self.training if mask is None else mask
+        """Fit terms on the masked blocks (training by default); `loose` widens priors (term to one-sigma).
+
+        Fits of the training blocks are remembered: a search asks for the same ones over and over.
+        """
+        keys = tuple(keys)
+        if mask is not None or loose:
+            return self._fit(keys, self.training if mask is None else mask, jackknife, loose)
+        if (keys, jackknife) not in self._fits:
+            if len(self._fits) > MOST_REMEMBERED:
+                self._fits.clear()
+            self._fits[keys, jackknife] = self._fit(keys, self.training, jackknife, None)
+        return self._fits[keys, jackknife]
+
+    def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
         cols = self.columns(keys)
         gram, cross, bias, bias_cross = self._normal(cols, mask)
         precision = self.precision
@@ -150,8 +174,8 @@ class Regression:
                 precision[self.columns([key])] = 1.0 / sd**2
         prior = np.diag(precision[cols])
         normal = gram - bias + prior
-        inverse = ridge_inverse(normal)
-        beta = inverse @ (cross - bias_cross)
+        beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
+        self._fit_held_out_scales(cols, beta, mask)
         count = int(mask.sum())
         every = self.gram[np.ix_(np.arange(len(mask)), cols, cols)]
         blocks = every[mask]
@@ -162,13 +186,37 @@ class Regression:
         spread = scores.T @ scores * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse
         # With the ridge, or two columns that are copies of each other would seem to be known.
-        plain = inverse @ (gram + prior + RIDGE * np.diag(np.diag(normal))) @ inverse
+        plain = inverse @ (gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))) @ inverse
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
-        shift = DOUBT_OF_CORRECTION * (beta - ridge_inverse(gram + prior) @ cross)
+        uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
+        shift = DOUBT_OF_CORRECTION * (beta - uncorrected)
         covariance = at_least(robust, plain) + np.outer(shift, shift)
         rss = self.square - 2 * self.cross[:, cols] @ beta + (every @ beta) @ beta
         gain = float(self.square[mask].sum() - rss[mask].sum())
         return Fit(cols, beta, covariance, rss, gain)
+
+    def _fit_held_out_scales(self, cols: np.ndarray, beta: np.ndarray, mask: np.ndarray) -> None:
+        """Coefficients of a run's own scale where that run is not fitted: found in the run itself, in place."""
+        for term in self.terms:
+            if term.kind != "nuisance" or not term.run:
+                continue
+            column = self.start[term.key]
+            where = np.flatnonzero(cols == column)
+            own = self.run == self.names[term.run]
+            if not len(where) or (own & mask).any():
+                continue
+            gram = self.gram[own][:, column, cols].sum(axis=0)
+            beta[where] = 0.0
+            left = self.cross[own, column].sum() - gram @ beta
+            beta[where] = left / (gram[where[0]] + self.precision[column])
+
+    def explained(self, keys: Iterable[str]) -> float:
+        """Whitened squares that terms explain on the training blocks: the gain of `fit` without the rest of it."""
+        cols = self.columns(keys)
+        gram, cross, bias, bias_cross = self._normal(cols, self.training)
+        normal = gram - bias + np.diag(self.precision[cols])
+        beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
+        return float(2 * cross @ beta - beta @ gram @ beta)
 
     def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
         """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
@@ -229,11 +277,13 @@ class Regression:
         pull = gram[np.ix_(others, own)] @ beta
         taken = -inner @ pull
         if (np.abs(taken) > most).any():
-            root = np.linalg.cholesky((inner + inner.T) / 2).T
-            # |R⁻ᵀ x + R pull|² with inner = Rᵀ R is the same square, completed.
-            back = np.linalg.inv(root).T
-            unit = np.sqrt(np.diag(inner))
-            taken = lsq_linear(back * unit, -root @ pull, bounds=(-most / unit, most / unit)).x * unit
+            # |B x + B⁻ᵀ pull|² with Bᵀ B the normal matrix is the same square, completed; in units of each column.
+            unit = np.sqrt(np.maximum(np.diag(inner), 0.0))
+            unit = np.where(unit > 0, unit, 1.0)
+            values, vectors = np.linalg.eigh(inner / np.outer(unit, unit))
+            values = np.maximum(values, RIDGE)
+            forth, back = (vectors / np.sqrt(values)).T, (vectors * np.sqrt(values)).T
+            taken = lsq_linear(forth, -back @ (unit * pull), bounds=(-most / unit, most / unit)).x * unit
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
@@ -261,6 +311,24 @@ def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
     dead = diagonal <= 1e-24
     return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+
+
+def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
+    """Solution of normal equations with |solution| within `limit` (n,): solution, inverse, and what holds it where.
+
+    The one that is furthest out is held at its limit by an overwhelming prior, until none is out.
+    """
+    held, at = np.zeros(len(right)), np.zeros(len(right))
+    for _ in range(len(right) + 1):
+        inverse = ridge_inverse(normal + np.diag(held))
+        solution = inverse @ (right + held * at)
+        out = np.where(held > 0, 0.0, np.abs(solution) / limit)
+        worst = int(np.argmax(out)) if len(out) else 0
+        if not len(out) or out[worst] <= 1.0:
+            break
+        held[worst] = HOLD * max(normal[worst, worst], 1e-300)
+        at[worst] = np.sign(solution[worst]) * limit[worst]
+    return solution, inverse, held, at
 
 
 def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
@@ -391,6 +459,7 @@ def build(
         bias_gram,
         bias_cross,
         filters,
+        names,
     )
 
 

@@ -215,8 +215,11 @@ def value_columns(
 
 
 def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict[str, np.ndarray]:
-    """Column of a time offset of one second between two sensors (nuisance), as channel contributions."""
+    """Column of a nuisance as channel contributions: a time offset of one second between two sensors, or a
+    relative change of the thrust in one run."""
     motion = segment.motion
+    if key.startswith(RUN_SCALE):
+        return value_columns("thrust", segment, vehicle, groups, {})
     if key == "offset:rotors-accelerometer" and "force" in groups:
         force, _, _ = baseline_wrench(motion, vehicle)
         return {"force": np.gradient(force, segment.dt_s, axis=0)}
@@ -230,6 +233,7 @@ def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict
     return {}
 
 
+RUN_SCALE = "thrust of "
 OFFSETS = (
     "offset:rotors-accelerometer",
     "offset:rotors-gyroscope",

@@ -34,6 +34,8 @@ SHARE_OF_LARGEST_BURST = 0.15
 BURST_SIZE = 3.0
 """A burst must be this many times larger than an effect that acts throughout."""
 MOST_EFFECTS = 10
+MOST_TRIALS = 12
+"""Exchanges looked at closely, the most promising first."""
 EXPECTED_HELD_OUT = 25.0
 """Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
 MOST_STRAIN = 4.0
@@ -150,13 +152,20 @@ class Search:
     def without(self, key: str, active: list[str]) -> Fit:
         return self.regression.fit(self.always + [k for k in active if k != key])
 
-    def candidates(self, active: list[str]) -> list[Candidate]:
-        """Every term whose id is not in the model yet, best first."""
+    def gains(self, active: list[str]) -> list[tuple[float, Term]]:
+        """Every term whose id is not in the model yet with what it would explain less what its parameters cost."""
         taken = {self.terms[k].effect for k in active}
-        base = self.regression.fit(self.always + active)
-        found = [
-            self.judge(t.key, active, base) for t in self.terms.values() if t.kind == "effect" and t.effect not in taken
+        base = self.regression.explained(self.always + active)
+        return [
+            (self.regression.explained([*self.always, *active, t.key]) - base - COST_PER_PARAMETER * t.size, t)
+            for t in self.terms.values()
+            if t.kind == "effect" and t.effect not in taken
         ]
+
+    def candidates(self, active: list[str]) -> list[Candidate]:
+        """Terms whose id is not in the model yet and that are worth their parameters, judged, best first."""
+        base = self.regression.fit(self.always + active)
+        found = [self.judge(t.key, active, base) for gain, t in self.gains(active) if gain > 0]
         return sorted(found, key=lambda c: -c.score)
 
     def best_form(self, key: str, active: list[str]) -> str:
@@ -200,24 +209,23 @@ class Search:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
         parameters = sum(self.terms[k].size for k in keys)
         unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
-        gain = self.regression.fit(self.always + keys).gain
+        gain = self.regression.explained(self.always + keys)
         return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it is worth more: the first to enter may be an imitation."""
         taken = {self.terms[k].effect for k in active} | set(dropped)
-        best, found = self.worth(active) + COST_PER_PARAMETER / 2, None
+        least = self.worth(active) + COST_PER_PARAMETER / 2
+        trials = []
         for gone in active:
             if self.terms[gone].run:
                 continue
             for other in self.terms.values():
-                if other.kind != "effect" or other.run or other.effect in taken:
-                    continue
-                trial = [other.key if k == gone else k for k in active]
-                value = self.worth(trial)
-                if value > best and self._all_physical(trial):
-                    best, found = value, trial
-        return found
+                if other.kind == "effect" and not other.run and other.effect not in taken:
+                    trial = [other.key if k == gone else k for k in active]
+                    trials.append((self.worth(trial), trial))
+        trials = sorted((t for t in trials if t[0] > least), key=lambda t: -t[0])
+        return next((trial for _, trial in trials[:MOST_TRIALS] if self._all_physical(trial)), None)
 
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
@@ -240,32 +248,30 @@ class Search:
         return None if worst is None else worst[:2]
 
     def run(self, active: list[str] | None = None) -> Selection:
-        """Grow, replace forms and prune until nothing changes."""
+        """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
         active = list(active or [])
-        trail, dropped = [], {}
+        trail: list[str] = []
+        refuted: dict[str, str] = {}
+        for _ in range(MOST_EFFECTS):
+            dropped = dict(refuted)
+            active = self._grown(active, dropped, trail)
+            found = self._refuted(active)
+            if found is None:
+                break
+            key, reason = found
+            active = [k for k in active if k != key]
+            refuted[self.terms[key].effect] = reason
+            trail.append(f"- {key}: {reason}")
+        fit, final = self._jackknifed(active, dropped, trail)
+        kept = {self.terms[k].effect for k in active}
+        return Selection(active, fit, final, trail, {e: r for e, r in dropped.items() if e not in kept})
+
+    def _grown(self, active: list[str], dropped: dict[str, str], trail: list[str]) -> list[str]:
+        """The model grown, its forms replaced and its weak terms taken out; `dropped` and `trail` are filled."""
         for _ in range(4 * MOST_EFFECTS):
-            grown = False
-            if len(active) < MOST_EFFECTS:
-                for candidate in self.candidates(active):
-                    effect = self.terms[candidate.key].effect
-                    if candidate.score <= 0:
-                        break
-                    if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
-                        continue
-                    size = self.weight(candidate.key, candidate.beta, active)
-                    if size < SMALLEST_SIZE:
-                        dropped.setdefault(effect, f"its size is {size:.2g} of the noise")
-                        continue
-                    active.append(candidate.key)
-                    trail.append(f"+ {candidate.key} (p {candidate.p_value:.1e}, size {size:.2f})")
-                    grown = True
-                    break
-            if not grown:
-                pair = self.pair(active, dropped)
-                if pair:
-                    active += pair
-                    trail.append(f"+ {' and '.join(pair)} together")
-                    grown = True
+            added = self._next(active, dropped) or self.pair(active, dropped) or []
+            active = active + added
+            trail += [f"+ {key}" for key in added]
             for key in list(active):
                 better = self.best_form(key, active)
                 if better != key:
@@ -273,39 +279,61 @@ class Search:
                     trail.append(f"  {key} → {better}")
             if (simpler := self.simpler(active)) is not None:
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
+                for key in active:
+                    if self.terms[key].effect not in {self.terms[k].effect for k in simpler}:
+                        dropped[self.terms[key].effect] = "the others explain as much in other forms"
                 active = simpler
-            if not grown and (swapped := self.swapped(active, dropped)) is not None:
-                trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(swapped)}")
-                active, grown = swapped, True
+            exchanged = None if added else self.swapped(active, dropped)
+            if exchanged is not None:
+                trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
+                for gone in set(active) - set(exchanged):
+                    dropped[self.terms[gone].effect] = "another explains more in its place"
+                active = exchanged
             while (weak := self.weak(active)) is not None:
                 key, reason = weak
-                active.remove(key)
+                active = [k for k in active if k != key]
                 dropped[self.terms[key].effect] = reason
                 trail.append(f"- {key}: {reason}")
-            if not grown:
+            if not added and exchanged is None:
                 break
-        while (failed := self.failed_held_out(active)) is not None:
-            active.remove(failed)
-            dropped[self.terms[failed].effect] = "it did not help on the held-out runs"
-            trail.append(f"- {failed}: fails on the held-out runs")
-            while (weak := self.weak(active)) is not None:
-                active.remove(weak[0])
-                dropped[self.terms[weak[0]].effect] = weak[1]
-        while (unsteady := self.unsteady(active)) is not None:
-            active.remove(unsteady)
-            dropped[self.terms[unsteady].effect] = "it differs from run to run"
-            trail.append(f"- {unsteady}: differs from run to run")
+        return active
+
+    def _next(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
+        """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
+        if len(active) >= MOST_EFFECTS:
+            return None
+        # A cause without a name is looked at only where none with a name is left to enter.
+        for candidate in sorted(self.candidates(active), key=lambda c: not c.named):
+            effect = self.terms[candidate.key].effect
+            if candidate.score <= 0:
+                continue
+            if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
+                continue
+            size = self.weight(candidate.key, candidate.beta, active)
+            if size >= SMALLEST_SIZE:
+                return [candidate.key]
+            dropped.setdefault(effect, f"its size is {size:.2g} of the noise")
+        return None
+
+    def _refuted(self, active: list[str]) -> tuple[str, str] | None:
+        """A term that the held-out runs or the runs among themselves speak against, with the reason."""
+        if (failed := self.failed_held_out(active)) is not None:
+            return failed, "it did not help on the held-out runs"
+        if (unsteady := self.unsteady(active)) is not None:
+            return unsteady, "it differs from run to run"
+        return None
+
+    def _jackknifed(self, active: list[str], dropped: dict[str, str], trail: list[str]):
+        """The final fit and p-values, after terms that hang on single blocks are taken out of `active`."""
         while True:
             fit = self.regression.fit(self.always + active, jackknife=True)
             final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
             doubtful = max(active, key=lambda k: final[k], default=None)
             if doubtful is None or final[doubtful] <= FINAL_P:
-                break
+                return fit, final
             active.remove(doubtful)
             dropped[self.terms[doubtful].effect] = f"p = {final[doubtful]:.2g} where each block has its say"
             trail.append(f"- {doubtful}: fails the jackknife")
-        kept = {self.terms[k].effect for k in active}
-        return Selection(active, fit, final, trail, {e: r for e, r in dropped.items() if e not in kept})
 
     def failed_held_out(self, active: list[str]) -> str | None:
         """The term that should help on the held-out blocks and does the most harm there instead."""
@@ -347,20 +375,19 @@ class Search:
         """Two terms that mask each other: neither enters alone, both hold together."""
         if len(active) > MOST_EFFECTS - 2:
             return None
-        base = self.regression.fit(self.always + active)
-        best = {}
-        for c in self.candidates(active):
-            effect = self.terms[c.key].effect
-            if effect not in dropped and (effect not in best or c.score > best[effect].score):
-                best[effect] = c
-        pool = sorted(best.values(), key=lambda c: -c.score)[:most]
+        base = self.regression.explained(self.always + active)
+        best: dict[str, tuple[float, Term]] = {}
+        for gain, term in self.gains(active):
+            if term.effect not in dropped and (term.effect not in best or gain > best[term.effect][0]):
+                best[term.effect] = (gain, term)
+        pool = sorted(best.values(), key=lambda c: -c[0])[:most]
         winner, top = None, 0.0
-        for i, first in enumerate(pool):
-            for second in pool[i + 1 :]:
-                keys = [first.key, second.key]
-                fit = self.regression.fit(self.always + active + keys)
-                gain = fit.gain - base.gain
-                if gain < max(first.gain, 0) + max(second.gain, 0) + 20.0 or gain <= top:
+        for i, (one_gain, one) in enumerate(pool):
+            for other_gain, other in pool[i + 1 :]:
+                keys = [one.key, other.key]
+                gain = self.regression.explained(self.always + active + keys) - base
+                gain -= COST_PER_PARAMETER * (one.size + other.size)
+                if gain < max(one_gain, 0) + max(other_gain, 0) + COST_PER_EFFECT or gain <= top:
                     continue
                 if all(self._holds(k, active + keys) for k in keys):
                     winner, top = keys, gain

@@ -14,7 +14,6 @@ from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 
 SWING_DAMPING = 0.05
 SWING_STARTS_RAD_S = (4.0, 8.0, 16.0)
-LAG_STARTS_S = (0.2, 0.6)
 
 
 def _to_body(motion, world):
@@ -62,17 +61,6 @@ def swinging(motion, vehicle, values):
     return Contribution(force=k_f * omega**2 * q, moment=k_m * omega**2 * turned)
 
 
-def towed(motion, vehicle, values):
-    """F = -k |u| u, M = r × F with u the velocity over ground after a lag: something light that trails behind."""
-    k, x, y, z, lag_s = values
-    world = np.einsum("nij,nj->ni", motion.rotation, motion.air_velocity)
-    dt = float(np.median(np.diff(motion.time_s))) if motion.size > 1 else 0.01
-    share = 1.0 - np.exp(-dt / lag_s)
-    u = lfilter([share], [1.0, share - 1.0], world, axis=0, zi=(1.0 - share) * world[:1])[0]
-    pull = -_to_body(motion, np.linalg.norm(u, axis=1, keepdims=True) * u)
-    return Contribution(force=k * pull, moment=np.cross(np.array([x, y, z]), pull))
-
-
 def _place_forms(vehicle):
     spring = (Parameter("k_h", "N/m"), Parameter("k_z", "N/m"), Parameter("f_N", "N"), Parameter("f_E", "N"))
     return (
@@ -104,21 +92,6 @@ def _swing_forms(vehicle):
     )
 
 
-def _tow_forms(vehicle):
-    lag = Parameter("lag", "s", 0.05, 2.0, nonlinear=True, starts=LAG_STARTS_S)
-    pull = (Parameter("k", "N s2/m2", 0.0), *(Parameter(f"k {a}", "N s2/m") for a in "xyz"), lag)
-    return (
-        Form(
-            "tow",
-            "F = −k |u| u, M = r × F, u the lagged velocity",
-            pull,
-            towed,
-            ("velocity", "rotation"),
-            memory=True,
-        ),
-    )
-
-
 PLACE = Effect(
     id="unknown_place",
     name="a force that depends on the place in the room",
@@ -140,18 +113,10 @@ SWING = Effect(
     forms=_swing_forms,
     source="empirical",
 )
-TOW = Effect(
-    id="unknown_tow",
-    name="something that trails behind",
-    sentence="a drag follows the velocity late and pulls at a point of its own",
-    forms=_tow_forms,
-    source="empirical",
-)
-UNKNOWNS = {e.id: e for e in (PLACE, HEADING, SWING, TOW)}
+UNKNOWNS = {e.id: e for e in (PLACE, HEADING, SWING)}
 DEPENDS_ON = {
     "unknown_place": ("position",),
     "unknown_heading": ("heading",),
     "unknown_swing": ("specific_force", "time_s"),
-    "unknown_tow": ("airspeed_m_s", "time_s"),
 }
 """Regime variables that each depends on, for the verdict."""

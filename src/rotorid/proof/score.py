@@ -157,10 +157,19 @@ def _compared(effect, symbol, true, value, interval) -> dict[str, Any] | None:
     }
 
 
+def kind_and_rest(case: str) -> tuple[str, str]:
+    """`stand`, `bench` or `flight`, and a case's name without it: only flights are not named so."""
+    first, _, rest = case.partition("/")
+    return (first, rest) if first in ("stand", "bench") else ("flight", case)
+
+
 def oracle_rms(answer: Mapping[str, Any], held_out: Sequence[str]) -> dict[str, float]:
     """Rms that the true model leaves on the held-out runs, force (N) and moment (N m) channels; runs weigh alike."""
-    runs = [answer["oracle"]["runs"][run] for run in held_out if run in answer["oracle"]["runs"]]
-    channels = [c for c in runs[0] if c.split("_")[0] in ("force", "moment")] if runs else []
+    known = answer.get("oracle", {}).get("runs", {})
+    runs = [known[run] for run in held_out if run in known]
+    channels = (
+        [c for c in runs[0] if c.split("_")[0] in ("force", "moment") and "noise_rms" in runs[0][c]] if runs else []
+    )
     return {c: math.sqrt(sum(run[c]["noise_rms"] ** 2 for run in runs) / len(runs)) for c in channels}
 
 
@@ -225,7 +234,8 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[st
     return {
         "set": answer["set"],
         "case": answer["case"],
-        "family": answer["case"].split("/")[0],
+        "kind": kind_and_rest(answer["case"])[0],
+        "family": kind_and_rest(answer["case"])[1].split("/")[0],
         "failed": failed,
         "truth": truth,
         "primary": primary,

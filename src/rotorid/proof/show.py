@@ -48,6 +48,7 @@ def number(key: str, value: float) -> str:
     """A share as percent, a ratio with two decimals, nothing as a dash."""
     if pd.isna(value):
         return "–"
+    key = key.removeprefix("stand_").removeprefix("bench_")
     if key == "better":
         return "yes" if value else "no"
     return f"{value:.2f}" if key in RATIOS else f"{100 * value:.1f} %"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.proof.intervals import bootstrap_mean, bootstrap_ratio, wilson
+from rotorid.proof.score import kind_and_rest
 
 Score = Mapping[str, Any]
 NOTHING, OTHER_VALUE, AMBIGUOUS = "nothing", "a value", "several"
@@ -20,7 +21,7 @@ ORACLE_MARGIN = 1.05
 
 def strength(score: Score) -> str:
     """`strong`, `moderate`, `weak` of a single effect; empty otherwise."""
-    parts = score["case"].split("/")
+    parts = kind_and_rest(score["case"])[1].split("/")
     return parts[2] if score["family"] == "single" else ""
 
 
@@ -85,8 +86,44 @@ def oracle_excess(scores: Sequence[Score]) -> dict[str, Any]:
     return {"value": float(np.median(ratios)), "low_95": float(low), "high_95": float(high), "cases": len(ratios)}
 
 
+GROUND_ROWS = (
+    "single_named",
+    "inside_class",
+    "mixture_whole",
+    "mixture_false",
+    "clean_alarms",
+    "wrong_physics",
+    "coverage",
+    "oracle",
+    "failed",
+)
+"""Targets that hold for stands and benches as for flights."""
+
+
 def summary(scores: Sequence[Score]) -> list[dict[str, Any]]:
-    """The table of targets: one row each with what was measured, its interval, the target and whether it holds."""
+    """The table of targets: one row each with what was measured, its interval, the target and whether it holds.
+
+    Flights first; then, where there are any, the rows that stands and benches share with them.
+    """
+    rows = rows_of([s for s in scores if s["kind"] == "flight"])
+    for kind in ("stand", "bench"):
+        own = [s for s in scores if s["kind"] == kind]
+        if own:
+            picked = [row for row in rows_of(own) if row["id"] in GROUND_ROWS]
+            rows += [
+                {**row, "id": f"{kind}_{row['id']}", "what": f"{kind.capitalize()}: {lower(row['what'])}"}
+                for row in picked
+            ]
+    return rows
+
+
+def lower(text: str) -> str:
+    """The first letter small, for a text that follows a colon."""
+    return text[:1].lower() + text[1:]
+
+
+def rows_of(scores: Sequence[Score]) -> list[dict[str, Any]]:
+    """The rows of one kind."""
     clean = [s for s in scores if _is_clean(s)]
     wrong = [s for s in scores if _is_wrong(s)]
     moderate = [s for s in scores if _is_moderate(s)]

@@ -1,9 +1,9 @@
 """Steady points of the rotor tests: 50 of thrust and 20 of torque (thesis 3.5.3), from raw logs.
 
-The reading at rest before the motor starts is taken off each test (the tare). Thrust comes from the tester
-alone. Torque comes from two instruments with their own clocks: the tester counts revolutions, the wrench
-sensor feels the moment; both are averaged over the same stretch of the host's time, with a margin larger than
-the clocks' difference.
+The reading at rest is taken off each test (the tare): before the motor starts, of a torque test also after.
+Thrust comes from the tester alone. Torque comes from two instruments with their own clocks: the tester counts
+revolutions, the wrench sensor feels the moment; both are averaged over the same stretch of the host's time, with
+a margin larger than the clocks' difference.
 """
 
 from __future__ import annotations
@@ -56,10 +56,14 @@ def torque_points(pairs: Iterable[tuple[str | Path, str | Path]]) -> pd.DataFram
         start, stop = _running(rotor, str(rotor_path))
         steady = rotor[rotor["host_time_s"].between(start + MARGIN_S, stop - MARGIN_S)]
         loaded = wrench[wrench["host_time_s"].between(start + MARGIN_S, stop - MARGIN_S)]["moment_z_n_m"]
-        rest = wrench[wrench["host_time_s"] < start - MARGIN_S]["moment_z_n_m"]
-        if len(loaded) == 0 or len(rest) == 0:
-            raise InputError(f"{wrench_path}: no samples while the rotor ran, or none before")
-        rows.append(_row(rotor_path, steady, (loaded - rest.mean()).abs()))
+        before = wrench[wrench["host_time_s"] < start - 0.1]["moment_z_n_m"]
+        after = wrench[wrench["host_time_s"] > stop + MARGIN_S]["moment_z_n_m"]
+        if len(loaded) == 0 or len(before) == 0 or len(after) == 0:
+            raise InputError(f"{wrench_path}: no samples while the rotor ran, or none at rest before or after")
+        # The run lies in the middle between both rests, so that a steady drift of the zero drops out.
+        turned = loaded - (before.mean() + after.mean()) / 2
+        # The sign of the mean, not of each sample: that would turn noise into torque.
+        rows.append(_row(rotor_path, steady, turned * np.sign(turned.mean())))
     return pd.DataFrame(rows, columns=list(COLUMNS)).sort_values("throttle", ignore_index=True)
 
 

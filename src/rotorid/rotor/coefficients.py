@@ -125,7 +125,9 @@ LEAST_FORCE_SD_N = 1e-4
 """The balance is never taken as more exact than this."""
 
 
-def fit_coefficient(runs: Sequence[Points], offset: bool, speed_noise_relative: float = 0.0) -> CoefficientFit:
+def fit_coefficient(
+    runs: Sequence[Points], offset: bool, speed_noise_relative: float = 0.0, least_sd: float = LEAST_FORCE_SD_N
+) -> CoefficientFit:
     """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
 
     Parameters
@@ -136,6 +138,8 @@ def fit_coefficient(runs: Sequence[Points], offset: bool, speed_noise_relative: 
         Whether each run has a force offset of its own.
     speed_noise_relative
         One-sigma noise of the speed reading, as a share of the speed; 0 for ordinary least squares.
+    least_sd
+        The force (or torque) is never taken as more exact than this, N (N m); where the speed's noise is considered.
 
     Raises
     ------
@@ -162,8 +166,8 @@ def fit_coefficient(runs: Sequence[Points], offset: bool, speed_noise_relative: 
         def fit_at(force_sd):
             return _both_noisy(speed, thrust, offset_columns, values, force_sd, speed_noise_relative)
 
-        ceiling = 3 * np.sqrt(variance) + 2 * LEAST_FORCE_SD_N
-        force_sd = LEAST_FORCE_SD_N
+        ceiling = 3 * np.sqrt(variance) + 2 * least_sd
+        force_sd = least_sd
         if fit_at(force_sd)[2] > freedom:
             force_sd = brentq(lambda sd: fit_at(sd)[2] - freedom, force_sd, ceiling, rtol=1e-3)
         values, covariance, _ = fit_at(force_sd)

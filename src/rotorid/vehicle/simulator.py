@@ -167,7 +167,7 @@ def simulate(
         raise InputError(f"duration_s {duration_s} is shorter than one step of {step_s} s")
     instant = [(form, values) for form, values in effects if not has_memory(form)]
     slow = [(form, values) for form, values in effects if has_memory(form)]
-    known = {"rotation", "velocity", "rotor_acceleration"}
+    known = {"rotation", "velocity", "position", "rotor_acceleration"}
     known |= {"height"} if vehicle.ground_z_m is not None else set()
     known |= {"voltage"} if voltage_v is not None else set()
     check_effects(effects, known)
@@ -186,7 +186,7 @@ def simulate(
 
 def _fresh(controller: Controller) -> Controller:
     """A copy of the controller as it is before the flight, so that a flight can be repeated."""
-    return copy.copy(controller)
+    return copy.deepcopy(controller)
 
 
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
@@ -278,6 +278,7 @@ class _Flight:
                 rotor_acceleration=acceleration,
                 rotation=rotation,
                 velocity=np.einsum("nji,nj->ni", rotation, state[:, 7:10]),
+                position=state[:, 10:13],
                 wind=self.wind,
                 height=None if ground is None else ground - state[:, 12],
                 voltage=self.voltage,
@@ -314,6 +315,7 @@ def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage
         gyroscope=trace.angular_velocity[index],
         rotation=rotation,
         velocity=np.einsum("nji,nj->ni", rotation, trace.velocity[index]),
+        position=trace.position[index],
         wind=None if wind_m_s is None else np.asarray(wind_m_s, float),
         height=None if ground is None else ground - trace.position[index, :, 2],
         voltage=None if voltage_v is None else np.full(len(trace.time_s), float(voltage_v)),

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rotorid.control.excitation import ExcitedHold, Multisine
 from rotorid.control.pid import AttitudePid, Gains, Memory, pid_step
 from rotorid.control.references import training_reference
 from rotorid.effects.catalogue import catalogue
@@ -461,3 +462,13 @@ def test_a_slung_load_swings_in_the_simulator():
     hold = Commands(np.array([0.0]), np.full((1, 4), np.sqrt(0.652 * 9.81 / (4 * CF))))
     trace = simulate(vehicle, hold, 0.5, 0.005, effects=[(slung, [0.1, 0.5])])
     assert trace.velocity[0, -1, 2] == pytest.approx(0.1 * 9.81 / 0.652 * 0.5, rel=1e-3)
+
+
+def test_a_controller_flies_the_same_twice():
+    """What a controller remembers of a flight stays in that flight, also where it holds another controller."""
+    vehicle = thesis_vehicle()
+    sine = Multisine(1.0, np.array([1.0, 2.0, 3.0]), 0.01 * np.eye(3), np.zeros((3, 3)))
+    hold = ExcitedHold(vehicle, sine, (300.0, 1900.0))
+    first, second = (simulate(vehicle, hold, 0.5, 0.002).angular_velocity for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert np.abs(first).max() > 0.1

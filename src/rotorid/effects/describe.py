@@ -1,0 +1,195 @@
+"""The catalogue in words: a list, one effect in full, and the page `docs/effects.md`."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import COLUMNS_OF, Effect, Form, Parameter, SetForm, SpeedForm
+from rotorid.recordings.vehicle import Vehicle
+
+EXAMPLE = Vehicle(
+    name="thesis",
+    kind="flight",
+    mass_kg=0.652,
+    inertia_kg_m2={"xx": 2.489e-3, "yy": 2.5743e-3, "zz": 4.6838e-3},
+    rotors=[
+        {"x_m": x, "y_m": y, "spin": spin}
+        for x, y, spin in (
+            (0.0884, 0.0884, "ccw"),
+            (0.0884, -0.0884, "cw"),
+            (-0.0884, -0.0884, "ccw"),
+            (-0.0884, 0.0884, "cw"),
+        )
+    ],
+    thrust_coefficient_n_s2=1.3877e-6,
+    torque_coefficient_n_m_s2=1.8558e-8,
+    rotor_radius_m=0.0635,
+)
+"""The thesis's quadrotor: forms depend on the number of rotors, bounds on the vehicle's size."""
+
+EXCITATION = {
+    "rotor_speed": "rotors that turn",
+    "rotor_acceleration": "rotors that speed up or slow down",
+    "angular_velocity": "turning",
+    "angular_acceleration": "angular acceleration",
+    "specific_force": "thrust",
+    "accelerometer": "thrust",
+    "velocity": "motion through the air",
+    "height": "the ground's nearness",
+    "always": "always there",
+    "command": "any command",
+    "change": "commands that change",
+    "voltage": "a voltage below the largest",
+    "limit": "commands beyond the limit",
+    "time": "time since the start",
+}
+KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistake in the set"}
+INTRODUCTION = """\
+# The catalogue of effects
+
+Written by `rotorid effects --markdown`; a test holds that this page is the catalogue. Symbols and axes as in the
+[conventions](conventions.md): body x forward, y right, z down; v velocity through the air, Ω body rates, R attitude
+(body to world), ω_i rotor speed, T_i thrust C_F ω_i², Q_i torque C_Q ω_i², r_i place of a hub, v_i = v + Ω × r_i its
+velocity. The number after "catalogue" in a source is the row of the project's list of omitted physics. Ranges are
+physical bounds for the thesis's quadrotor (0.652 kg, 0.125 m arms); they scale with the vehicle.
+
+An effect is one file of `src/rotorid/effects/`; the forms inside one id compete. Any form can be switched on in a
+vehicle file and is then simulated and recorded:
+
+```yaml
+effects:
+  - {id: rotor_drag, form: at the hubs, parameters: {k_d: 6.0e-5}}
+```
+
+How they are told from each other: [the mismatch stage](mismatch.md).
+"""
+
+
+@dataclass(frozen=True)
+class FormRow:
+    """Forms of one equation: names, equation, parameters and the columns they need."""
+
+    names: tuple[str, ...]
+    equation: str
+    parameters: tuple[Parameter, ...]
+    columns: tuple[str, ...]
+    excited_by: tuple[str, ...]
+
+
+def columns_of(form: Form | SpeedForm | SetForm) -> tuple[str, ...]:
+    """Columns of a run that a form needs (or, for a fault, spoils)."""
+    if isinstance(form, SetForm):
+        return tuple(dict.fromkeys(re.sub(r"\d+", "*", name) for name in form.columns))
+    if isinstance(form, SpeedForm):
+        needed = ["rotor_command_*_rad_s, or throttle_*"]
+        return tuple(needed + [COLUMNS_OF[name] for name in form.requires])
+    return tuple(dict.fromkeys(COLUMNS_OF[name] for name in form.requires))
+
+
+def rows(effect: Effect, vehicle: Vehicle = EXAMPLE) -> list[FormRow]:
+    """Forms of an effect, those that differ by a number or a sensor alone in one row."""
+    found: dict[tuple, FormRow] = {}
+    for form in (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle)):
+        excited = effect.excitation(form) if isinstance(form, Form) else (getattr(form, "excited_by", ""),)
+        alike = (re.sub(r"(?<=[_,])\d+", "i", form.equation), len(form.parameters), type(form), form.parameters[0].unit)
+        if alike in found and isinstance(form, SetForm | Form):
+            row = found[alike]
+            columns = tuple(dict.fromkeys((*row.columns, *columns_of(form))))
+            found[alike] = FormRow((*row.names, form.name), alike[0], row.parameters, columns, row.excited_by)
+        else:
+            found[(*alike, form.name) if isinstance(form, SpeedForm) else alike] = FormRow(
+                (form.name,), form.equation, form.parameters, columns_of(form), tuple(filter(None, excited))
+            )
+    return list(found.values())
+
+
+def number(value: float) -> str:
+    """A bound, three digits."""
+    return f"{value:.3g}"
+
+
+def parameter_text(parameter: Parameter) -> str:
+    """Symbol, range, unit and meaning."""
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    text = f"{parameter.symbol} from {number(parameter.low)} to {number(parameter.high)}{unit}: {parameter.meaning}"
+    return text + (", fitted" if parameter.nonlinear else "")
+
+
+def names_text(names: tuple[str, ...]) -> str:
+    """Names of forms, a long list by its ends."""
+    return "; ".join(names) if len(names) <= 8 else f"{'; '.join(names[:3])}; … ; {names[-1]} ({len(names)} in all)"
+
+
+def excitation_text(keys: tuple[str, ...]) -> str:
+    return " or ".join(dict.fromkeys(EXCITATION[key] for key in keys))
+
+
+def listing() -> str:
+    """A line for every effect: id, kind and how it shows."""
+    effects = catalogue().values()
+    wide = max(len(e.id) for e in effects)
+    return "".join(f"{e.id:<{wide}}  {KINDS[e.kind]:<18}  {e.sentence}\n" for e in effects)
+
+
+def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
+    """One effect as plain text."""
+    out = [f"{effect.id}: {effect.name} ({KINDS[effect.kind]})", f"  {effect.sentence}", ""]
+    for row in rows(effect, vehicle):
+        out.append(f"  form {names_text(row.names)}")
+        out.append(f"    {row.equation}")
+        out += [f"    {parameter_text(p)}" for p in row.parameters]
+        out.append(f"    columns: {'; '.join(row.columns)}")
+        if row.excited_by:
+            out.append(f"    shows with: {excitation_text(row.excited_by)}")
+        out.append("")
+    if not rows(effect, vehicle):
+        out += ["  its forms are made for windows that the data show", ""]
+    out += [
+        f"  sign: {effect.sign}",
+        f"  validity: {effect.validity}",
+        f"  source: {effect.source}",
+        f"  imitated by: {', '.join(effect.confusers) or 'nothing known'}",
+        f"  what to fly: {effect.separating_manoeuvre}",
+    ]
+    return "\n".join(out) + "\n"
+
+
+def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
+    """One effect as a section of the page."""
+    out = [f"### `{effect.id}`: {effect.name}\n", f"{KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
+    table = rows(effect, vehicle)
+    if table:
+        out.append("| form | equation | parameters | columns | shows with |\n| --- | --- | --- | --- | --- |")
+        for row in table:
+            cells = (
+                names_text(row.names),
+                row.equation,
+                "<br>".join(parameter_text(p) for p in row.parameters),
+                "<br>".join(f"`{c}`" if " " not in c else c for c in row.columns),
+                excitation_text(row.excited_by),
+            )
+            out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        out.append("")
+    else:
+        out.append(
+            "Its forms are made for windows that the data show (`F = Rᵀ f(t)`, linear between knots 0.6 s apart).\n"
+        )
+    confusers = ", ".join(f"`{c}`" for c in effect.confusers) or "nothing known"
+    out += [
+        f"- Sign: {effect.sign}.",
+        f"- Validity: {effect.validity}.",
+        f"- Imitated by: {confusers}. What tells them apart: {effect.separating_manoeuvre}.",
+        f"- Source: {effect.source}.\n",
+    ]
+    return "\n".join(out)
+
+
+def markdown() -> str:
+    """The whole page."""
+    parts = [INTRODUCTION]
+    for kind, title in (("physics", "Physics"), ("sensor", "Sensors and logging"), ("mistake", "Mistakes in the set")):
+        parts.append(f"## {title}\n")
+        parts += [section(e) for e in catalogue().values() if e.kind == kind]
+    return "\n".join(parts).rstrip() + "\n"

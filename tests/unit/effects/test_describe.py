@@ -1,0 +1,51 @@
+"""The catalogue in words: the page is in step, the command prints it."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rotorid.cli import app
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.describe import in_full, listing, markdown, rows
+
+PAGE = Path(__file__).parents[3] / "docs" / "effects.md"
+
+
+def test_the_page_is_the_catalogue():
+    assert PAGE.read_text() == markdown(), "rotorid effects --markdown > docs/effects.md"
+
+
+def test_the_list_has_a_line_for_every_effect():
+    lines = listing().splitlines()
+    assert [line.split()[0] for line in lines] == list(catalogue())
+
+
+def test_one_in_full_says_equation_range_columns_and_what_to_fly():
+    text = in_full(catalogue()["rotor_drag"])
+    # 5 1/s · 0.652 kg / (4 · 1073.3 rad/s) = 7.59e-4
+    assert "k_d from 0 to 0.000759 N s2/(rad m): in-plane drag per rotor speed and airspeed" in text
+    assert "F_i = −k_d ω_i v_i,⊥" in text
+    assert "rotor_speed_*_rad_s, or rotor_command_*_rad_s, or throttle_*" in text
+    assert "fly a speed sweep beyond 10 m/s" in text and "Faessler" in text
+
+
+def test_forms_that_differ_by_a_number_share_a_row():
+    found = rows(catalogue()["unequal_rotors"])
+    assert found[0].names == ("rotor 1", "rotor 2", "rotor 3", "rotor 4")
+    assert sum(len(r.names) for r in rows(catalogue()["sensor_dropout"])) == 27
+    assert len(rows(catalogue()["motor_lag"])) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "shown"),
+    [
+        (["effects"], 0, "translational_lift"),
+        (["effects", "delay"], 0, "positive T is late"),
+        (["effects", "--markdown"], 0, "# The catalogue of effects"),
+        (["effects", "magic"], 1, "no effect is called 'magic'"),
+    ],
+)
+def test_the_command(arguments, code, shown):
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == code and shown in result.output

@@ -1,0 +1,66 @@
+"""Two loggers of one made-up experiment, their offset known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.stand import align
+
+OFFSET_S, LAG_S = -0.083, 0.055
+
+
+def thrust_of(throttle: np.ndarray) -> np.ndarray:
+    return 30 * throttle**1.4
+
+
+def pair(seed: int, sine: bool, offset_s: float = OFFSET_S) -> align.Pair:
+    """Sine or trapezoid of four motors with a first-order lag, sag and lift; the wrench's host times are
+    `offset_s` late."""
+    rng = np.random.default_rng(seed)
+    fine = np.arange(0, 16, 0.001)
+    if sine:
+        share = np.where((fine > 1) & (fine < 15), 0.5 - 0.5 * np.cos(2 * np.pi * 0.5 * (fine - 1)), 0.0)
+    else:
+        share = np.interp(fine, [1, 4, 12, 15], [0, 1, 1, 0])
+    asked = 4 * thrust_of(0.2 * share)
+    # A lag of the speed; thrust is its square, the current its cube.
+    speed = np.zeros_like(fine)
+    for i in range(1, len(fine)):
+        speed[i] = speed[i - 1] + (np.sqrt(asked[i]) - speed[i - 1]) * 0.001 / LAG_S
+    sent = np.arange(0.0, 15.8, 0.02)
+    voltage = 16.5 - 0.02 * np.interp(sent, fine, speed**3) + rng.normal(0, 0.01, len(sent))
+    quadrotor = pd.DataFrame({"time_s": sent, "host_s": sent, "battery_voltage_v": voltage})
+    for name in align.THROTTLES:
+        quadrotor[name] = np.interp(sent, fine, 0.2 * share)
+    felt = np.arange(0.0, 15.9, 0.01)
+    lift = np.interp(felt, fine, speed**2) + rng.normal(0, 0.1, len(felt))
+    wrench = pd.DataFrame({"time_s": felt, "host_s": felt + offset_s, "force_z_n": 6.4 - lift})
+    return align.Pair(f"exp-{seed:02d}", sine, quadrotor, wrench, (1.0, 1.0))
+
+
+def test_offsets_come_back_within_their_errors() -> None:
+    pairs = [pair(i, sine=i >= 6, offset_s=OFFSET_S + 0.05 * (i % 2)) for i in range(9)]
+    aligned = align.align(pairs, thrust_of)
+    assert aligned[0].motor_delay_s == pytest.approx(LAG_S, abs=0.006)
+    for i, entry in enumerate(aligned):
+        assert entry.offset_s == pytest.approx(OFFSET_S + 0.05 * (i % 2), abs=0.008)
+        assert entry.offset_error_s < 0.006
+
+
+def test_clocks_without_skew_show_none() -> None:
+    skew, error = align.skew([pair(i, sine=True) for i in range(4)], thrust_of)
+    assert abs(skew) < 3 * error
+    assert error < 5e-4
+
+
+def test_a_torque_test_aligns_on_the_speed() -> None:
+    rng = np.random.default_rng(0)
+    time_s = np.arange(0, 10, 0.02)
+    rpm = np.interp(time_s, [2, 2.2, 8, 8.3], [0.0, 9000, 9000, 0])
+    rotor = pd.DataFrame({"host_s": time_s, "speed_rpm": rpm})
+    felt = np.arange(0, 10, 0.01)
+    lift = np.interp(felt, time_s, rpm) ** 2 * 1.5e-8 + rng.normal(0, 0.1, len(felt))
+    wrench = pd.DataFrame({"host_s": felt + 0.06, "force_z_n": -lift})
+    found = align.torque_offset(rotor, wrench)
+    assert found.delay_s == pytest.approx(0.06, abs=0.005)
+    assert found.delay_error_s < 0.005

@@ -1,0 +1,84 @@
+"""From raw logs to tidy tables: one table of samples and one of recordings for each kind of test and instrument."""
+
+import csv
+
+INDEX = f"{CONFIG.raw}/sessions.tsv"
+
+
+def index_rows():
+    """Rows of the index of recordings; none where there is no index."""
+    if not Path(INDEX).is_file():
+        return []
+    with open(INDEX, encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file, delimiter="\t"))
+
+
+# The index is read here and is no rule's input: a new row reruns only what its own kind of test feeds.
+SESSIONS = index_rows()
+
+
+def logs_of(kind, instrument):
+    """Raw logs of one kind of test and instrument, each with its metadata."""
+    rows = [row for row in SESSIONS if (row["kind"], row["instrument"]) == (kind, instrument)]
+    return [f"{CONFIG.raw}/{row[name]}" for row in rows for name in ("file", "metadata")]
+
+
+def logs_to_ingest(wildcards):
+    """Raw logs and metadata behind one pair of tables."""
+    found = logs_of(wildcards.kind, wildcards.instrument)
+    if not found:
+        raise WorkflowError(
+            f"{INDEX}: lists no {wildcards.kind} recording of a {wildcards.instrument}; make campaign records them."
+        )
+    return found
+
+
+rule ingest:
+    """Raw logs of one kind of test and instrument as tidy tables."""
+    message:
+        "Ingest: {wildcards.kind}, {wildcards.instrument}"
+    input:
+        logs=logs_to_ingest,
+    output:
+        samples="results/ingest/{kind}/{instrument}.parquet",
+        recordings="results/ingest/{kind}/{instrument}.csv",
+    params:
+        code=code_of("ingest"),
+    log:
+        "results/logs/ingest/{kind}-{instrument}.log",
+    wildcard_constraints:
+        kind="[a-z]+",
+        instrument="[a-z0-9]+",
+    script:
+        "../scripts/ingest.py"
+
+
+def ingested(kind, instrument):
+    """Samples and recordings of one kind of test and instrument."""
+    return [f"results/ingest/{kind}/{instrument}.{suffix}" for suffix in ("parquet", "csv")]
+
+
+def filter_settings(wildcards):
+    """Settings of the filters for one instrument."""
+    return getattr(CONFIG.filter, wildcards.instrument).model_dump()
+
+
+rule prepare_bench:
+    """Bench readings tared, freed of spikes, and filtered in two ways."""
+    message:
+        "Filter: {wildcards.kind}, {wildcards.instrument}"
+    input:
+        samples="results/ingest/{kind}/{instrument}.parquet",
+        recordings="results/ingest/{kind}/{instrument}.csv",
+    output:
+        prepared="results/filtered/{kind}/{instrument}.parquet",
+    params:
+        settings=filter_settings,
+        code=code_of("prepare_bench"),
+    log:
+        "results/logs/prepare_bench/{kind}-{instrument}.log",
+    wildcard_constraints:
+        kind="[a-z]+",
+        instrument="[a-z0-9]+",
+    script:
+        "../scripts/prepare_bench.py"

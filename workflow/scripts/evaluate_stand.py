@@ -1,0 +1,77 @@
+"""Steady wrenches of the 48 experiments, the weight under tilt, the rotor's characteristics.
+
+- Plateau (or whole cycles of a sine) of each experiment, the rest reading before and after taken off.
+- The believed vehicle's wrench at the same throttles, by the thrust tests' curve, beside it.
+- Mass and centre of mass from the readings at rest under all tilts.
+- C_F and C_Q beside the thesis's, and how the speed follows throttle and voltage.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid import log
+from rotorid.blackbox.experiments import stand_wrench, thrust_of_throttle
+from rotorid.io.experiments import EXPERIMENTS
+from rotorid.recordings import read_set
+from rotorid.stand import wrench
+from rotorid.stand.characteristic import PARAMETERS, law, speed_law
+
+
+def main(
+    recordings: str,
+    thrust: str,
+    torque: str,
+    parameters: str,
+    experiments: str,
+    weight: str,
+    characteristic: str,
+    curve_of_throttle: str,
+) -> None:
+    """Write the experiments (CSV), the weight (JSON), the characteristics (JSON) and speed by throttle (CSV)."""
+    stand = read_set(Path(recordings))
+    evaluated = [wrench.evaluate(run, EXPERIMENTS[int(run.name.split("-")[1])].frequency_hz) for run in stand.runs]
+    points = pd.read_csv(thrust)
+    curve = thrust_of_throttle(points)
+    forces = np.array([wrench.mean_thrust(run, entry, curve) for run, entry in zip(stand.runs, evaluated, strict=True)])
+    tilts = np.array([[entry.roll_rad, entry.pitch_rad] for entry in evaluated])
+    expected = stand_wrench(stand.vehicle, forces, tilts[:, 0], tilts[:, 1])
+    vehicle = stand.vehicle
+    believed = -np.asarray(vehicle.sensor_position_m)
+    found = wrench.fit_weight(evaluated, vehicle.mass_kg, believed, vehicle.gravity_m_s2)
+    at_rest = [
+        wrench.weights(evaluated, mass, centre, vehicle.gravity_m_s2)
+        for mass, centre in ((vehicle.mass_kg, believed), (found.mass_kg, found.centre_m))
+    ]
+    table = wrench.table(evaluated, expected, *at_rest)
+    table.to_csv(experiments, index=False, float_format="%.9g")
+    Path(weight).write_text(
+        json.dumps(wrench.weight_as_dict(found, vehicle.mass_kg, believed, table), indent=1) + "\n",
+        encoding="utf-8",
+    )
+    fits = json.loads(Path(parameters).read_text(encoding="utf-8"))
+    both = pd.concat([points, pd.read_csv(torque)], ignore_index=True)
+    speed = speed_law(both)
+    throttle = np.linspace(0.01, 0.5, 50)
+    shape = np.array([speed[name] for name in PARAMETERS])
+    pd.DataFrame({"throttle": throttle, "speed_rad_s": law(shape, throttle, np.ones(50))}).to_csv(
+        curve_of_throttle, index=False, float_format="%.9g"
+    )
+    laws = {"c_f": fits["c_f"], "c_q": fits["c_q"], "speed": speed}
+    Path(characteristic).write_text(json.dumps(laws, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            recordings=snakemake.input.recordings,
+            thrust=snakemake.input.thrust,
+            torque=snakemake.input.torque,
+            parameters=snakemake.input.parameters,
+            experiments=snakemake.output.experiments,
+            weight=snakemake.output.weight,
+            characteristic=snakemake.output.characteristic,
+            curve_of_throttle=snakemake.output.speed,
+        )

@@ -1,0 +1,31 @@
+"""Tensile tests of printed PLA.
+
+- Stress-strain curve of each specimen, modulus, strength, 0.2 % yield.
+- Mean of each infill density with its interval, beside the thesis's table 2.5.
+"""
+
+import pandas as pd
+
+from rotorid import log
+from rotorid.bench import tensile
+from rotorid.io.tables import read_sessions
+
+
+def main(samples: str, recordings: str, printed: str, specimens: str, infill: str, curves: str) -> None:
+    """Write one row a specimen (CSV), one an infill density (CSV) and the curves (Parquet)."""
+    table, stress = tensile.specimens(pd.read_parquet(samples), read_sessions(recordings))
+    table.to_csv(specimens, index=False, float_format="%.9g")
+    tensile.by_infill(table, pd.read_csv(printed)).to_csv(infill, index=False, float_format="%.9g")
+    stress.to_parquet(curves, index=False)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            samples=snakemake.input.samples,
+            recordings=snakemake.input.recordings,
+            printed=snakemake.input.printed,
+            specimens=snakemake.output.specimens,
+            infill=snakemake.output.infill,
+            curves=snakemake.output.curves,
+        )
