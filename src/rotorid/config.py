@@ -177,6 +177,21 @@ class BlackBox(Section):
     share: float = Field(gt=0, lt=1, description="Share of new samples that an interval is to cover [1].")
 
 
+class Proof(Section):
+    """The proof on concealed recordings."""
+
+    seeds: dict[str, Annotated[int, Field(ge=0)]] = Field(
+        description="Repetitions taken of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
+    )
+    cases: list[Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
+    batch: int = Field(ge=1, description="Cases that one job treats [1].")
+    peers: bool = Field(description="Whether other methods are asked about the same recordings [true, false].")
+    tables: Text = Field(
+        description="Folder whose tables the report's chapter shows: docs/proof holds those of the last full proof, "
+        "results/proof makes the proof part of the report [path]."
+    )
+
+
 class Config(Section):
     """The whole of `config.yaml`."""
 
@@ -190,6 +205,7 @@ class Config(Section):
     simulation: Simulation = Field(description="The simulated vehicle's readings and disturbances.")
     grey_box: GreyBox = Field(description="Parameters of the equations of motion from data.")
     black_box: BlackBox = Field(description="The stand's wrench without knowledge of the vehicle.")
+    proof: Proof = Field(description="The proof on concealed recordings.")
     report: Report = Field(description="The report.")
 
 

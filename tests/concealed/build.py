@@ -36,6 +36,18 @@ def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> 
     return path
 
 
+def write_index() -> Path:
+    """Write the list of all cases, which the proof's rules read without importing any of this."""
+    path = Path(__file__).with_name("cases.tsv")
+    path.write_text(index_text(), encoding="utf-8")
+    return path
+
+
+def index_text() -> str:
+    """The list of all cases: `case`, `set`."""
+    return "case\tset\n" + "".join(f"{c.name}\t{c.set_name}\n" for c in cases.all_cases())
+
+
 def _one(job):
     case, out, answers, signals = job
     start = time.monotonic()
@@ -49,16 +61,22 @@ def _one(job):
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", default="*", help="shell patterns on case names, comma-separated")
-    parser.add_argument("--out", type=Path, required=True, help="folder for recording sets")
-    parser.add_argument("--answers", type=Path, required=True, help="another folder, for the truth")
+    parser.add_argument("--out", type=Path, help="folder for recording sets")
+    parser.add_argument("--answers", type=Path, help="another folder, for the truth")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--signals", action="store_true", help="keep the noise-free tables beside the answers")
     parser.add_argument("--list", action="store_true", help="only list the cases")
+    parser.add_argument("--write-index", action="store_true", help="only write cases.tsv, after a change of the cases")
     args = parser.parse_args(argv)
+    if args.write_index:
+        print(f"written: {write_index().name}")
+        return 0
     chosen = cases.matching(args.cases)
     if args.list:
         print("\n".join(f"{c.set_name}  {c.name}" for c in chosen))
         return 0
+    if args.out is None or args.answers is None:
+        parser.error("--out and --answers are needed")
     if args.answers.resolve().is_relative_to(args.out.resolve()):
         parser.error("--answers must lie outside --out")
     todo = [

@@ -18,6 +18,8 @@ PARTS = (
     "notebooks",
     "raw",
     "tests/configs",
+    "tests/concealed",
+    "docs/proof",
 )
 
 

@@ -30,6 +30,12 @@ def deliver(
     return write_files(analyse(recordings), verdict_path, page_path, improved_path, progress)
 
 
+def judge(recordings: RecordingSet) -> Verdict:
+    """The verdict alone, without page and improved vehicle: what `verdict.json` would say."""
+    analysis = analyse(recordings)
+    return make_verdict(analysis, locate(analysis), forward_channels(analysis).channels)
+
+
 def write_files(
     analysis: Analysis,
     verdict_path: Path,

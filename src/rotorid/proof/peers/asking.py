@@ -1,0 +1,42 @@
+"""Every peer asked about every set of a folder."""
+
+from __future__ import annotations
+
+import json
+import traceback
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+from rotorid.proof.peers import boosting, refit_only, sample_split, sindy, stepwise
+from rotorid.proof.peers.problem import as_verdict, problem_of
+from rotorid.recordings import read_set
+
+PEERS = {
+    "refit_only": refit_only.ask,
+    "stepwise_pse": stepwise.ask,
+    "boosting": boosting.ask,
+    "sample_split": sample_split.ask,
+}
+if find_spec("pysindy"):  # a development dependency: where it is missing this peer is left out
+    PEERS["pysindy"] = sindy.ask
+
+
+def ask_folder(sets: Path, out: Path, progress: Callable[[str], None]) -> None:
+    """Write `out/<set>.json`: peer to its verdict, or to the reason why it stopped."""
+    out.mkdir(parents=True, exist_ok=True)
+    for folder in sorted(path for path in sets.iterdir() if path.is_dir()):
+        said = {}
+        try:
+            problem, stopped = problem_of(read_set(folder)), ""
+        except Exception as error:  # a set that no peer can read is a result
+            traceback.print_exc()
+            problem, stopped = None, f"{type(error).__name__}: {error}"
+        for name, ask in PEERS.items():
+            try:
+                said[name] = {"failed": stopped} if problem is None else as_verdict(folder.name, problem, ask(problem))
+            except Exception as error:  # a peer that stops is a result
+                traceback.print_exc()
+                said[name] = {"failed": f"{type(error).__name__}: {error}"}
+        (out / f"{folder.name}.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+        progress(f"{folder.name}: {len(said)} peers asked")

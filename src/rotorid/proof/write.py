@@ -1,0 +1,108 @@
+"""The proof's tables as files, from folders of verdicts and of answers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from rotorid.proof import table
+from rotorid.proof.score import score_case
+
+OURS = "rotorid"
+COLUMNS = {
+    "confusion": ["truth", "claimed", "share", "cases"],
+    "power": ["effect", "size_over_noise", "detected", "low_95", "high_95", "cases"],
+    "parameters": ["case", "effect", "symbol", "true", "estimate", "relative_error", "covered"],
+    "effects": ["effect", "strong", "moderate", "weak", "instead"],
+}
+"""Headings of tables that may have no row."""
+SIGNIFICANT = "%.6g"
+
+
+def read_json(path: Path) -> Any:
+    """A JSON file."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def write_tables(
+    verdicts: Sequence[Path], answers: Sequence[Path], peers: Sequence[Path], out: Path
+) -> list[dict[str, Any]]:
+    """Score everything and write summary, cases, effects, confusion, power, parameters, peers (CSV) and state (JSON).
+
+    Returns the scores of our verdicts, one a case.
+    """
+    truth = {path.stem: read_json(path) for folder in answers for path in sorted(folder.glob("set-*.json"))}
+    said = {path.stem: read_json(path) for folder in verdicts for path in sorted(folder.glob("set-*.json"))}
+    seconds: dict[str, Any] = {}
+    for folder in verdicts:
+        seconds |= read_json(folder / "seconds.json")
+    scores = [score_case(said[name], answer) for name, answer in truth.items()]
+    for s in scores:
+        s["seconds"], s["flown_s"] = seconds[s["set"]]["seconds"], seconds[s["set"]]["flown_s"]
+    by_method = {OURS: scores, **peer_scores(peers, truth)}
+    rows = table.peer_rows(by_method)
+    summary = table.summary(scores)
+    summary.append(better_row(rows))
+    tables = {
+        "summary": summary,
+        "cases": table.case_rows(scores),
+        "effects": table.by_effect(scores),
+        "confusion": table.confusion(scores),
+        "power": table.power(scores),
+        "parameters": table.parameter_rows(scores),
+        "peers": rows,
+    }
+    out.mkdir(parents=True, exist_ok=True)
+    for name, found in tables.items():
+        frame = pd.DataFrame(found) if found else pd.DataFrame(columns=COLUMNS[name])
+        frame.to_csv(out / f"{name}.csv", index=False, float_format=SIGNIFICANT)
+    (out / "state.json").write_text(json.dumps(state(scores, summary), indent=1) + "\n", encoding="utf-8")
+    return scores
+
+
+def peer_scores(folders: Sequence[Path], truth: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
+    """Scores of each peer on the sets that it saw."""
+    out: dict[str, list[dict[str, Any]]] = {}
+    for folder in folders:
+        for path in sorted(folder.glob("set-*.json")):
+            if path.stem in truth:
+                for method, verdict in read_json(path).items():
+                    out.setdefault(method, []).append(score_case(verdict, truth[path.stem]))
+    return out
+
+
+def better_row(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The table's last line: whether we beat every peer."""
+    better = table.better_than_all(rows, OURS)
+    return {
+        "id": "better",
+        "what": "Better than every peer in the same table (1 = yes)",
+        "at_least": 1.0,
+        "at_most": None,
+        "value": None if better is None else float(better),
+        "cases": rows[0]["cases"],
+        "holds": better,
+    }
+
+
+def state(scores: Sequence[Mapping[str, Any]], summary: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Numbers that the chapter's prose needs."""
+    asked = [row for row in summary if row["holds"] is not None]
+    timed = [s for s in scores if s["flown_s"]]
+    per_minute = [60 * s["seconds"] / s["flown_s"] for s in timed]
+    return {
+        "cases": len(scores),
+        "families": {f: sum(s["family"] == f for s in scores) for f in sorted({s["family"] for s in scores})},
+        "targets": len(asked),
+        "met": sum(bool(row["holds"]) for row in asked),
+        "missed": [row["what"] for row in asked if not row["holds"]],
+        "stopped": [s["case"] for s in scores if s["failed"]],
+        "seconds_median": float(np.median([s["seconds"] for s in timed])) if timed else None,
+        "seconds_slowest": float(max(s["seconds"] for s in timed)) if timed else None,
+        "seconds_per_minute_flown": float(np.median(per_minute)) if timed else None,
+    }

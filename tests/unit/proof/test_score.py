@@ -1,0 +1,214 @@
+"""Scores of verdicts and answers written by hand."""
+
+import copy
+import math
+
+import pytest
+
+from rotorid.proof import table
+from rotorid.proof.intervals import bootstrap_mean, wilson
+from rotorid.proof.score import f1_of_times, score_case
+from rotorid.proof.spelling import translated
+from rotorid.proof.units import same_unit
+
+
+def effect(id, status="established", alternatives=(), parameters=(), p=1e-9):
+    return {
+        "id": id,
+        "status": status,
+        "alternatives": list(alternatives),
+        "parameters": [
+            {"symbol": s, "value": v, "unit": u, "interval_95": [low, high]} for s, v, u, low, high in parameters
+        ],
+        "p_value": p,
+        "held_out_gain": None,
+    }
+
+
+def verdict(*effects, word="explained", values=None, locations=(), after=1.0):
+    errors = {"before": 3.0, "refitted": 2.0, "after": after}
+    return {
+        "set": "set-x",
+        "runs": {"training": ["a"], "held_out": ["b"]},
+        "verdict": word,
+        "effects": list(effects),
+        "parameters": values or {},
+        "locations": list(locations),
+        "channels": {"force_x": {"rmse": {"training": errors, "held_out": errors}}},
+    }
+
+
+def hidden(id, equivalent=(), parameters=(), form=""):
+    return {
+        "id": id,
+        "form": form,
+        "parameters": [{"symbol": s, "value": v, "unit": u} for s, v, u in parameters],
+        "size_over_noise": 1.5,
+        "equivalent": list(equivalent),
+    }
+
+
+def answer(
+    *effects, case="single/rotor_drag/moderate/0", wrong=None, outside=(), locations=(), verdicts=("explained",)
+):
+    return {
+        "set": "set-x",
+        "case": case,
+        "expected": sorted([e["id"] for e in effects] + list(wrong or {})),
+        "effects": list(effects),
+        "wrong_parameters": wrong or {},
+        "outside_catalogue": list(outside),
+        "locations": list(locations),
+        "verdict": list(verdicts),
+        "oracle": {"runs": {"b": {"force_x": {"noise_rms": 0.8}, "kinematic_force_x": {"noise_rms": 9.0}}}},
+    }
+
+
+def test_the_right_effect_alone_scores_in_full() -> None:
+    s = score_case(verdict(effect("rotor_drag")), answer(hidden("rotor_drag")))
+    assert s["named"] and s["top_one"] and s["inside"] and s["whole_set"] and s["ambiguity_right"]
+    assert s["false_count"] == 0
+    # 1.0 N left, 0.8 N of noise
+    assert s["held_out_after"] == pytest.approx(1.25)
+    assert s["held_out_before"] == pytest.approx(3.75)
+
+
+def test_a_wrong_name_is_false_and_misses() -> None:
+    s = score_case(verdict(effect("frame_drag")), answer(hidden("rotor_drag")))
+    assert not s["named"] and not s["inside"] and not s["whole_set"]
+    assert (s["false_names"], s["missed"]) == (["frame_drag"], ["rotor_drag"])
+
+
+def test_a_class_wider_than_the_data_demand_is_inside_but_not_named() -> None:
+    both = effect("rotor_drag", "ambiguous", ["rotor_drag", "frame_drag"])
+    s = score_case(verdict(both), answer(hidden("rotor_drag")))
+    assert s["inside"] and not s["named"] and not s["ambiguity_right"] and s["false_count"] == 0
+    s = score_case(verdict(both), answer(hidden("rotor_drag", equivalent=["frame_drag"])))
+    assert s["inside"] and s["named"] and s["ambiguity_right"] and not s["separable"]
+
+
+def test_naming_one_of_two_that_cannot_be_told_apart_states_too_much() -> None:
+    s = score_case(verdict(effect("rotor_drag")), answer(hidden("rotor_drag", equivalent=["frame_drag"])))
+    assert s["named"] and not s["ambiguity_right"]
+
+
+def test_one_class_reported_by_each_of_its_members_is_one_claim() -> None:
+    twins = [effect(i, "ambiguous", ["delay", "motor_lag"]) for i in ("delay", "motor_lag")]
+    s = score_case(verdict(*twins), answer(hidden("delay", equivalent=["motor_lag"])))
+    assert s["claim_count"] == 1
+
+
+def test_clean_and_alarmed() -> None:
+    clean = answer(case="clean/000", verdicts=["no_mismatch"])
+    assert not score_case(verdict(word="no_mismatch"), clean)["false_alarm"]
+    assert score_case(verdict(word="unexplained"), clean)["false_alarm"]
+    assert score_case(verdict(effect("gust")), clean)["false_alarm"]
+    assert score_case(verdict(values={"mass_kg": {}}, word="explained"), clean)["false_alarm"]
+
+
+def test_wrong_values_are_scored_apart_from_physics() -> None:
+    truth = answer(case="wrong/mass_kg/0", wrong={"mass_kg": {"believed": 0.66, "true": 0.65}})
+    found = {"mass_kg": {"believed": 0.66, "refitted": 0.651, "interval_95": [0.648, 0.654]}}
+    s = score_case(verdict(values=found), truth)
+    assert s["values_right"] and s["claim_count"] == 0 and s["truth"] == []
+    assert s["parameters"][0]["covered"] and s["parameters"][0]["relative_error"] == pytest.approx(1 / 650)
+    assert not score_case(verdict(values={"inertia_xx_kg_m2": found["mass_kg"]}), truth)["values_right"]
+
+
+def test_a_stage_that_stopped_is_right_in_nothing() -> None:
+    s = score_case({"failed": "ValueError: x"}, answer(hidden("rotor_drag")))
+    assert s["failed"] and not s["named"] and not s["inside"] and not s["whole_set"]
+
+
+def test_a_cause_outside_the_catalogue_may_only_get_an_acceptable_name() -> None:
+    cause = [{"id": "banner", "acceptable": ["frame_drag"]}]
+    truth = answer(case="outside/banner/0", outside=cause, verdicts=["unexplained", "partly_explained"])
+    assert score_case(verdict(effect("frame_drag"), word="partly_explained"), truth)["false_count"] == 0
+    s = score_case(verdict(effect("gust"), word="explained"), truth)
+    assert s["false_count"] == 1 and not s["word_right"]
+
+
+def test_parameters_are_compared_in_one_spelling() -> None:
+    truth = answer(hidden("rotor_drag", parameters=[("k_d", 2.0, "N/(rad/s m/s)")]))
+    found = effect("rotor_drag", parameters=[("k_d", 2.1, "N s2/(rad m)", 1.9, 2.05)])
+    (only,) = score_case(verdict(found), truth)["parameters"]
+    assert only["covered"] is True and only["relative_error"] == pytest.approx(0.05)
+    blade = copy.deepcopy(truth)
+    blade["effects"][0]["form"] = "blade"
+    assert score_case(verdict(found), blade)["parameters"] == []
+
+
+def test_units() -> None:
+    assert same_unit("N m/(rad/s m/s)", "N m s2/(rad m)")
+    assert same_unit("N/(m/s)^2", "N s2/m2")
+    assert same_unit("-", "1") and same_unit("N m s", "N m s/rad")
+    assert not same_unit("N s/m", "N s2/m2")
+
+
+def test_answers_in_the_catalogues_symbols() -> None:
+    lag = [{"symbol": "tau_up", "value": 0.04, "unit": "s"}, {"symbol": "tau_down", "value": 0.04, "unit": "s"}]
+    assert translated("motor_lag", lag)[-1] == {"symbol": "tau", "value": 0.04, "unit": "s"}
+    areas = [{"symbol": f"CdA_{a}", "value": 0.02, "unit": "m2"} for a in "xyz"]
+    # half of 1.225 kg/m3 times 0.02 m2
+    assert translated("frame_drag", areas)[-1] == {"symbol": "c", "value": 0.01225, "unit": "N s2/m2"}
+
+
+def test_overlap_of_times() -> None:
+    # 3 s true, 2 s of them found, 1 s beyond: precision and recall two thirds
+    found = f1_of_times([("a", 12.0, 15.0)], [("a", 13.0, 16.0)])
+    assert found["f1"] == pytest.approx(2 / 3)
+    assert f1_of_times([("a", 12.0, 15.0)], [("b", 12.0, 15.0)])["f1"] == 0
+    # two channels with one stretch count once
+    assert f1_of_times([("a", 0.0, 1.0)], [("a", 0.0, 1.0), ("a", 0.0, 1.0)])["f1"] == 1
+    assert f1_of_times([], [("a", 0.0, 1.0)]) is None
+
+
+def test_wilsons_interval_by_hand() -> None:
+    # 9 of 10: centre (0.9 + 3.8415/20) / 1.38415, half width 1.96/1.38415 sqrt(0.009 + 3.8415/400)
+    assert wilson(9, 10) == pytest.approx((0.59585, 0.98212), abs=1e-5)
+    assert wilson(0, 220) == (0.0, pytest.approx(0.01716, abs=1e-5))
+    assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_bootstrap_of_a_constant_has_no_width() -> None:
+    assert bootstrap_mean([0.7] * 5) == pytest.approx((0.7, 0.7))
+    assert all(math.isnan(x) for x in bootstrap_mean([]))
+
+
+def test_the_table_of_targets() -> None:
+    scores = [
+        score_case(verdict(effect("rotor_drag")), answer(hidden("rotor_drag"))),
+        score_case(verdict(effect("gust")), answer(hidden("rotor_drag"), case="single/rotor_drag/moderate/1")),
+        score_case(verdict(word="no_mismatch"), answer(case="clean/000", verdicts=["no_mismatch"])),
+        score_case(
+            verdict(effect("rotor_drag"), effect("com_offset"), effect("gust")),
+            answer(hidden("rotor_drag"), hidden("com_offset"), case="mixture/00/0"),
+        ),
+    ]
+    rows = {row["id"]: row for row in table.summary(scores)}
+    assert rows["single_named"]["value"] == 0.5 and rows["single_named"]["holds"] is False
+    assert rows["clean_alarms"]["value"] == 0.0 and rows["clean_alarms"]["holds"] is True
+    assert rows["mixture_whole"]["value"] == 0.0
+    assert rows["mixture_false"]["value"] == pytest.approx(1 / 3)
+    assert rows["location_f1"]["holds"] is None
+    confusion = {(r["truth"], r["claimed"]): r["share"] for r in table.confusion(scores)}
+    assert confusion == {("rotor_drag", "rotor_drag"): 0.5, ("rotor_drag", "gust"): 0.5, ("nothing", "nothing"): 1.0}
+
+
+def test_power_is_pooled_over_effects() -> None:
+    def case(id, size, found):
+        said = [effect(id)] if found else []
+        return score_case(verdict(*said), answer(hidden(id), case=f"power/{id}/{size}/0"))
+
+    scores = [case("gust", 0.1, False), case("rotor_drag", 0.1, True), case("gust", 1.0, True)]
+    found = {(r["effect"], r["size_over_noise"]): r["detected"] for r in table.power(scores)}
+    assert found[("all", 0.1)] == 0.5 and found[("all", 1.0)] == 1.0 and found[("gust", 0.1)] == 0.0
+
+
+def test_better_than_all_needs_a_better_joint_score() -> None:
+    ours = dict.fromkeys(table.PEER_COLUMNS, 0.9) | {"mixture_false": 0.0, "clean_alarms": 0.0, "wrong_physics": 0.0}
+    other = ours | {"single_named": 0.5}
+    rows = [{"method": "rotorid", **ours}, {"method": "other", **other}]
+    assert table.better_than_all(rows, "rotorid") is True
+    assert table.better_than_all(rows, "other") is False
+    assert table.better_than_all(rows[:1], "rotorid") is None

@@ -1,0 +1,163 @@
+"""The proof: concealed sets, verdicts on them, and only then the answers: `snakemake --cores 2 proof`.
+
+Answers lie in results/sealed, which the scoring rule alone opens.
+"""
+
+import sys
+
+from rotorid.proof import plan
+
+CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
+BATCHES = plan.batches(plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases), CONFIG.proof.batch)
+# Recordings come from code outside the library: its hash stands beside that of the script.
+CONCEALING = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))]
+PROOF_TABLES = ("summary", "cases", "effects", "confusion", "power", "parameters", "peers")
+
+if "proof" in sys.argv:
+    judged = [name for name in BATCHES if Path(f"results/proof/verdicts/{name}").is_dir()]
+    print(plan.announcement(BATCHES, judged, CONFIG.proof.peers), file=sys.stderr)
+
+
+def cases_of(wildcards):
+    """Names of the cases in a batch."""
+    return [entry.case for entry in BATCHES[wildcards.batch]]
+
+
+def peers_asked(wildcards):
+    """Folders with the peers' verdicts, where peers are asked."""
+    return expand("results/proof/peers/{batch}", batch=BATCHES) if CONFIG.proof.peers else []
+
+
+rule conceal:
+    """Recording sets with something hidden in them, and apart from them the answers."""
+    message:
+        "Proof: recording concealed sets, {wildcards.batch}"
+    output:
+        sets=directory("results/proof/sets/{batch}"),
+        answers=directory("results/sealed/{batch}"),
+    params:
+        cases=cases_of,
+        concealing=[CODE.of(path) for path in CONCEALING],
+        code=code_of("conceal"),
+    log:
+        "results/logs/conceal/{batch}.log",
+    script:
+        "../scripts/conceal.py"
+
+
+rule judge:
+    """Verdicts of the mismatch stage on a batch of sets, told nothing."""
+    message:
+        "Proof: judging, {wildcards.batch}"
+    input:
+        sets="results/proof/sets/{batch}",
+    output:
+        verdicts=directory("results/proof/verdicts/{batch}"),
+    params:
+        code=code_of("judge"),
+    log:
+        "results/logs/judge/{batch}.log",
+    script:
+        "../scripts/judge.py"
+
+
+rule ask_peers:
+    """What other methods say of the same sets, told nothing either."""
+    message:
+        "Proof: asking other methods, {wildcards.batch}"
+    input:
+        sets="results/proof/sets/{batch}",
+    output:
+        peers=directory("results/proof/peers/{batch}"),
+    params:
+        code=code_of("ask_peers"),
+    log:
+        "results/logs/ask_peers/{batch}.log",
+    script:
+        "../scripts/ask_peers.py"
+
+
+rule score_proof:
+    """Verdicts against answers: the only rule that opens the sealed folder."""
+    message:
+        "Proof: opening the answers"
+    input:
+        verdicts=expand("results/proof/verdicts/{batch}", batch=BATCHES),
+        answers=expand("results/sealed/{batch}", batch=BATCHES),
+        peers=peers_asked,
+    output:
+        summary="results/proof/summary.csv",
+        cases="results/proof/cases.csv",
+        effects="results/proof/effects.csv",
+        confusion="results/proof/confusion.csv",
+        power="results/proof/power.csv",
+        parameters="results/proof/parameters.csv",
+        peers="results/proof/peers.csv",
+        state="results/proof/state.json",
+    params:
+        code=code_of("score_proof"),
+    log:
+        "results/logs/score_proof.log",
+    script:
+        "../scripts/score_proof.py"
+
+
+rule draw_proof:
+    """Figures of the proof beside its tables."""
+    message:
+        "Proof: drawing"
+    input:
+        summary=rules.score_proof.output.summary,
+        confusion=rules.score_proof.output.confusion,
+        power=rules.score_proof.output.power,
+        cases=rules.score_proof.output.cases,
+    output:
+        targets="results/proof/targets.svg",
+        confusion="results/proof/confusion.svg",
+        power="results/proof/power.svg",
+        oracle="results/proof/oracle.svg",
+    params:
+        code=code_of("draw_proof"),
+    log:
+        "results/logs/draw_proof.log",
+    script:
+        "../scripts/draw_proof.py"
+
+
+rule chapter_proof:
+    """Figures and tables of the proof's chapter, from the folder that the configuration names."""
+    message:
+        "Chapter proof: figures and tables"
+    input:
+        notebook="notebooks/proof.ipynb",
+        summary=f"{CONFIG.proof.tables}/summary.csv",
+        cases=f"{CONFIG.proof.tables}/cases.csv",
+        effects=f"{CONFIG.proof.tables}/effects.csv",
+        confusion=f"{CONFIG.proof.tables}/confusion.csv",
+        power=f"{CONFIG.proof.tables}/power.csv",
+        peers=f"{CONFIG.proof.tables}/peers.csv",
+        state=f"{CONFIG.proof.tables}/state.json",
+    output:
+        targets="results/report/proof/targets.svg",
+        confusion_figure="results/report/proof/confusion.svg",
+        power_figure="results/report/proof/power.svg",
+        oracle="results/report/proof/oracle.svg",
+        rows="results/report/proof/rows.csv",
+        others="results/report/proof/others.csv",
+        methods="results/report/proof/methods.csv",
+    params:
+        code=code_of_chapter("proof"),
+    log:
+        "results/logs/chapter_proof/run.log",
+        notebook="results/logs/chapter_proof/proof.ipynb",
+    script:
+        "../scripts/run_notebook.py"
+
+
+rule proof:
+    """The whole proof: tables and figures under results/proof, and its chapter."""
+    message:
+        "The proof is in results/proof: summary.csv first"
+    input:
+        results_behind(*rules.score_proof.output, *rules.draw_proof.output),
+        rules.chapter_proof.output,

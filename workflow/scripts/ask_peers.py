@@ -1,0 +1,26 @@
+"""Other methods on concealed sets.
+
+- Gives each the residual, the columns and the training runs that our own search works on.
+- Writes what each says of each set, in the words of a verdict.
+"""
+
+import sys
+from pathlib import Path
+
+from rotorid import log
+from rotorid.proof.peers.asking import ask_folder
+
+
+def main(sets: str, peers: str) -> None:
+    """Ask every peer about every set below `sets`."""
+    ask_folder(Path(sets), Path(peers), progress=report_progress)
+
+
+def report_progress(text: str) -> None:
+    """One line for the person who waits."""
+    print(f"  {text}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(sets=snakemake.input.sets, peers=snakemake.output.peers)

@@ -1,0 +1,33 @@
+"""Figures of the proof.
+
+- Targets met and missed, confusion matrix, power against size, held-out error against the oracle's.
+"""
+
+import pandas as pd
+
+from rotorid import log
+from rotorid.plots import proof, style
+
+
+def main(
+    summary: str, confusion: str, power: str, cases: str, targets: str, matrix: str, curves: str, oracle: str
+) -> None:
+    """Draw four figures from four tables."""
+    style.save(proof.targets(pd.read_csv(summary)), targets)
+    style.save(proof.confusion(pd.read_csv(confusion)), matrix)
+    style.save(proof.power(pd.read_csv(power)), curves)
+    style.save(proof.oracle(pd.read_csv(cases)), oracle)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            summary=snakemake.input.summary,
+            confusion=snakemake.input.confusion,
+            power=snakemake.input.power,
+            cases=snakemake.input.cases,
+            targets=snakemake.output.targets,
+            matrix=snakemake.output.confusion,
+            curves=snakemake.output.power,
+            oracle=snakemake.output.oracle,
+        )

@@ -1,0 +1,25 @@
+"""Verdicts against answers.
+
+- Opens the sealed answers and scores every verdict and every peer's word on the same set.
+- Writes the table of targets and what stands behind it.
+"""
+
+from pathlib import Path
+
+from rotorid import log
+from rotorid.proof.write import write_tables
+
+
+def main(verdicts: list[str], answers: list[str], peers: list[str], out: str) -> None:
+    """Score what is in the folders and write the tables into `out`."""
+    write_tables([Path(p) for p in verdicts], [Path(p) for p in answers], [Path(p) for p in peers], Path(out))
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            verdicts=snakemake.input.verdicts,
+            answers=snakemake.input.answers,
+            peers=snakemake.input.get("peers", []),
+            out=str(Path(snakemake.output.summary).parent),
+        )
