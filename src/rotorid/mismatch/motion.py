@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -41,6 +41,22 @@ class Segment:
     @property
     def dt_s(self) -> float:
         return 1.0 / self.rate_hz
+
+    def part(self, start: int, stop: int) -> Segment:
+        """The samples from start to stop (exclusive)."""
+        cut = slice(start, stop)
+
+        def of(values):
+            return None if values is None else values[cut]
+
+        return replace(
+            self,
+            motion=self.motion.at(cut),
+            kinematic_specific_force=of(self.kinematic_specific_force),
+            kinematic_angular_velocity=of(self.kinematic_angular_velocity),
+            command=of(self.command),
+            extra={name: values[cut] for name, values in self.extra.items()},
+        )
 
 
 def own_rate_hz(time_s: np.ndarray, values: np.ndarray) -> float:

@@ -38,6 +38,8 @@ GAP_S = 2.0
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
 LOWEST_TO_MEAN = 1.08
+MOST_S, PIECE_S = 600.0, 20.0
+"""Longer recordings are represented by pieces: memory must not grow with an hour's flight."""
 MOST_NOISE_SAMPLES = 8192
 """Samples of a column that its noise level is read from."""
 
@@ -107,6 +109,19 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle) -> dict[str, float]:
         if found:
             levels[key] = float(np.median(found))
     return levels
+
+
+def representative(segments: list[Segment]) -> list[Segment]:
+    """The segments, or of a recording longer than MOST_S as many pieces of PIECE_S, spread evenly over all of it."""
+    if sum(s.motion.size * s.dt_s for s in segments) <= MOST_S:
+        return segments
+    pieces = [
+        (s, part[0], part[-1] + 1)
+        for s in segments
+        for part in np.array_split(np.arange(s.motion.size), max(1, int(s.motion.size * s.dt_s / PIECE_S)))
+    ]
+    kept = np.unique(np.linspace(0, len(pieces) - 1, int(MOST_S / PIECE_S)).round().astype(int))
+    return [pieces[k][0].part(*pieces[k][1:]) for k in kept]
 
 
 @dataclass
@@ -211,7 +226,8 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
     for run in recordings.runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng)
-    noisy = noisy if len(noisy) == len(segments) else []
+    noisy = representative(noisy) if len(noisy) == len(segments) else []
+    segments = representative(segments)
     prepared = Prepared(recordings, vehicle, split, segments, noisy, Thinner(rate_hz, cutoff), noise, [])
     terms, reasons = make_terms(vehicle, segments, prepared.groups)
     return replace(prepared, terms=terms, not_testable=reasons)
@@ -287,7 +303,6 @@ def assemble_rows(
     vehicle, groups = prepared.vehicle, prepared.groups
 
     def source(segment):
-        columns = []
         model, reverse = {}, None
         if measured_moment and "moment" in groups:
             reverse = moment_of(segment, vehicle)
@@ -297,18 +312,17 @@ def assemble_rows(
             segment = with_predictions(segment, vehicle, known, None if "accelerometer" in groups else model)
         for term in terms:
             if term.run and term.run != segment.run:
-                columns += [{}] * term.size
+                yield from [{}] * term.size
             elif term.kind == "wind":
-                columns += wind_columns(segment, vehicle, groups, effects or [])
+                yield from wind_columns(segment, vehicle, groups, effects or [])
             elif term.kind == "slope":
-                columns.append(slope_column(term, segment, vehicle, groups))
+                yield slope_column(term, segment, vehicle, groups)
             elif term.kind == "effect":
-                columns += form_columns(term.form, term.values, segment, vehicle, groups)
+                yield from form_columns(term.form, term.values, segment, vehicle, groups)
             elif term.kind == "value":
-                columns.append(value_columns(term.key, segment, vehicle, groups, model, reverse))
+                yield value_columns(term.key, segment, vehicle, groups, model, reverse)
             else:
-                columns.append(offset_columns(term.key, segment, vehicle, groups))
-        return columns
+                yield offset_columns(term.key, segment, vehicle, groups)
 
     return [assemble(s, vehicle, prepared.thinner, [source]) for s in segments or prepared.segments]
 

@@ -376,15 +376,11 @@ def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
     return float(scaled @ np.linalg.pinv(covariance / np.outer(unit, unit), rcond=1e-10, hermitian=True) @ scaled)
 
 
-def whiten(rows: Rows, filters: np.ndarray | dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened y (n, 12) and x (n, 12, K), the filters' start-up dropped; absent channels become zero."""
-    longest = max(len(f) for f in filters.values()) - 1
-    y = np.zeros_like(rows.y)
-    x = np.zeros_like(rows.x)
-    for channel, taps in filters.items():
-        y[:, channel] = lfilter(taps, [1.0], rows.y[:, channel])
-        x[:, channel] = lfilter(taps, [1.0], rows.x[:, channel], axis=0)
-    return y[longest:], x[longest:]
+def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened y (n,) and x (n, K) of one channel from sample `start` on (one at a time: all would be large)."""
+    y = lfilter(taps, [1.0], rows.y[:, channel])
+    x = lfilter(taps, [1.0], rows.x[:, channel], axis=0)
+    return y[start:], x[start:]
 
 
 def full_fit_residuals(rows: list[Rows], precision: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
@@ -426,32 +422,41 @@ def build(
         start[term.key] = at
         at += term.size
     per_block = max(2, int(round(block_s * rate_hz)))
+    longest = max(len(f) for f in filters.values()) - 1
     grams, crosses, squares, runs, training = [], [], [], [], []
     bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
     names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
     for k, r in enumerate(rows):
-        y, x = whiten(r, filters)
-        if noisy is not None:
-            y2, x2 = whiten(noisy[k], filters)
-            flat = (x2 - x).reshape(-1, at)
-            bias_gram += flat.T @ flat
-            bias_cross += flat.T @ (y2 - y).reshape(-1)
-        count = max(1, len(y) // per_block)
-        for part in np.array_split(np.arange(len(y)), count):
-            flat, target = x[part].reshape(-1, at), y[part].reshape(-1)
-            grams.append(flat.T @ flat)
-            crosses.append(flat.T @ target)
-            squares.append(float(target @ target))
-            runs.append(names[r.run])
-            middle = r.time_s[min(len(r.time_s) - 1, len(r.time_s) - len(y) + int(part.mean()))]
-            training.append(in_training(r.run, float(middle)))
+        size = len(r.y) - longest
+        parts = np.array_split(np.arange(size), max(1, size // per_block))
+        gram, cross, square = np.zeros((len(parts), at, at)), np.zeros((len(parts), at)), np.zeros(len(parts))
+        for channel, taps in filters.items():
+            y, x = whiten(r, channel, taps, longest)
+            again = None if noisy is None else whiten(noisy[k], channel, taps, longest)
+            # Many columns say nothing in a channel (a moment in a force): they are left out of the products.
+            used = np.flatnonzero(x.any(axis=0) | (False if again is None else again[1].any(axis=0)))
+            x, grid = x[:, used], np.ix_(used, used)
+            if again is not None:
+                shift = again[1][:, used] - x
+                bias_gram[grid] += shift.T @ shift
+                bias_cross[used] += shift.T @ (again[0] - y)
+            for b, part in enumerate(parts):
+                gram[b][grid] += x[part].T @ x[part]
+                cross[b, used] += x[part].T @ y[part]
+                square[b] += float(y[part] @ y[part])
+        grams.append(gram)
+        crosses.append(cross)
+        squares.append(square)
+        runs += [names[r.run]] * len(parts)
+        middles = [r.time_s[min(len(r.time_s) - 1, longest + int(part.mean()))] for part in parts]
+        training += [in_training(r.run, float(middle)) for middle in middles]
     precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     return Regression(
         terms,
         start,
-        np.array(grams),
-        np.array(crosses),
-        np.array(squares),
+        np.concatenate(grams),
+        np.concatenate(crosses),
+        np.concatenate(squares),
         np.array(runs),
         np.array([t is True for t in training]),
         np.array([t is False for t in training]),

@@ -7,7 +7,7 @@ Both sides pass the same low-pass and are then thinned, so that the equation sta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,8 @@ from rotorid.mismatch.motion import Segment
 from rotorid.recordings import Vehicle
 from rotorid.signal import kernels
 
-CHANNELS = tuple(f"{g}_{a}" for g in ("force", "moment", "accelerometer", "gyroscope") for a in "xyz")
+GROUPS = ("force", "moment", "accelerometer", "gyroscope")
+CHANNELS = tuple(f"{g}_{a}" for g in GROUPS for a in "xyz")
 PARAMETER_NAMES = {
     "thrust": "thrust_coefficient_n_s2",
     "torque": "torque_coefficient_n_m_s2",
@@ -283,7 +284,7 @@ class Thinner:
         return time_s[index]
 
 
-ColumnSource = Callable[[Segment], list[dict[str, np.ndarray]]]
+ColumnSource = Callable[[Segment], Iterable[dict[str, np.ndarray]]]
 
 
 def assemble(
@@ -299,13 +300,18 @@ def assemble(
         groups[name] = groups[name] - part
     time_s = thinner.times(segment.motion.time_s)
     y = np.full((len(time_s), 12), np.nan)
-    for index, group in enumerate(("force", "moment", "accelerometer", "gyroscope")):
+    for index, group in enumerate(GROUPS):
         if group in groups:
             y[:, 3 * index : 3 * index + 3] = thinner(groups[group])
-    blocks = [column for source in sources for column in source(segment)]
-    x = np.zeros((len(time_s), 12, len(blocks)))
-    for k, block in enumerate(blocks):
-        for index, group in enumerate(("force", "moment", "accelerometer", "gyroscope")):
-            if group in block and group in groups:
-                x[:, 3 * index : 3 * index + 3, k] = thinner(np.ascontiguousarray(block[group]))
+    # A column is thinned as soon as it is made: all of them at the native rate would not fit for long recordings.
+    thinned = [
+        {group: thinner(np.ascontiguousarray(block[group])) for group in GROUPS if group in block and group in groups}
+        for source in sources
+        for block in source(segment)
+    ]
+    x = np.zeros((len(time_s), 12, len(thinned)))
+    for k, block in enumerate(thinned):
+        for group, values in block.items():
+            index = 3 * GROUPS.index(group)
+            x[:, index : index + 3, k] = values
     return Rows(segment.run, time_s, y, x)

@@ -130,10 +130,15 @@ def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_h
         found = band_power([r.y[:, c] for r in rows], rate_hz, band)
         added = band_power([b.y[:, c] - a.y[:, c] for a, b in zip(rows, noisy, strict=True)], rate_hz, band)
         more[c] = max(1.0, found / added) if added > 0 else 1.0
-    energy = sum(np.einsum("ncq,ncq->cq", r.x, r.x) for r in rows)
-    noise = sum(np.einsum("ncq,ncq->cq", b.x - a.x, b.x - a.x) for a, b in zip(rows, noisy, strict=True))
-    seen = more[:, None] * noise <= MOST_NOISE * energy
-    return [replace(r, x=r.x * seen) for r in rows], [replace(r, x=r.x * seen) for r in noisy]
+    seen = np.zeros(rows[0].x.shape[1:], bool)
+    for c in range(12):
+        energy = sum((r.x[:, c] ** 2).sum(axis=0) for r in rows)
+        noise = sum(((b.x[:, c] - a.x[:, c]) ** 2).sum(axis=0) for a, b in zip(rows, noisy, strict=True))
+        seen[c] = more[c] * noise <= MOST_NOISE * energy
+    # In place: the columns are the largest arrays of the whole analysis.
+    for r in (*rows, *noisy):
+        np.multiply(r.x, seen, out=r.x)
+    return rows, noisy
 
 
 def band_power(parts: list[np.ndarray], rate_hz: float, band: tuple[float, float]) -> float:

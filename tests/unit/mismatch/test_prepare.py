@@ -16,6 +16,7 @@ from rotorid.mismatch.prepare import (
     make_terms,
     prepare,
     prior_of,
+    representative,
     sensor_noise,
     split_runs,
     training_rule,
@@ -121,3 +122,17 @@ def test_a_form_needs_its_rotors():
     terms, reasons = make_terms(one, [replace(segment, motion=motion)], ("force", "moment"))
     assert reasons["rotor_interference"] == "needs at least 3 rotors"
     assert not any(t.effect == "unequal_rotors" for t in terms)
+
+
+def test_a_long_recording_is_represented_by_pieces_of_all_its_runs(monkeypatch):
+    """Three runs of about 25 s are one piece each; two pieces are the first and the last, cut in every field alike."""
+    segments = prepare(recorded(1, 2, 3)).segments
+    assert representative(segments) is segments
+    monkeypatch.setattr("rotorid.mismatch.prepare.MOST_S", 40.0)
+    assert [s.run for s in representative(segments)] == ["run00", "run02"]
+    piece = segments[0].part(100, 300)
+    assert piece.motion.size == 200 and piece.motion.time_s[0] == segments[0].motion.time_s[100]
+    for whole, cut in ((segments[0].motion, piece.motion), (segments[0], piece)):
+        for name, values in vars(cut).items():
+            if isinstance(values, np.ndarray) and name != "wind":
+                np.testing.assert_array_equal(values, getattr(whole, name)[100:300])
