@@ -18,6 +18,7 @@ from rotorid.mismatch.dependence import dependence, leftover
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
+from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term, residual
@@ -126,6 +127,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     traces = make_traces(prepared, model, found, measured, plain_values, values)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
+    findings = together(findings)
+    fly = next_flight(findings, prepared, model.noise)
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}
     return Analysis(
         recordings=recordings,
@@ -133,7 +136,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         believed=prepared.vehicle,
         refitted=refitted,
         improved=improved,
-        findings=tuple(together(findings)),
+        findings=tuple(findings),
         values=contract_values(prepared.vehicle, told),
         not_testable={k: v for k, v in reasons.items() if k not in known},
         traces=traces,
@@ -144,6 +147,9 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         unexplained_channels=channels,
         unexplained_depends_on=depends,
         unexplained_description=description,
+        next_manoeuvre=fly.manoeuvre,
+        next_separates=fly.separates,
+        next_sigma=fly.sigma,
         force_source=segments[0].force_source,
         notes=tuple(notes),
     )

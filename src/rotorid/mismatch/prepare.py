@@ -74,7 +74,7 @@ def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float
     def rule(run: str, time_s: float) -> bool | None:
         if abs(time_s - border) < GAP_S / 2:
             return None
-        return time_s < border
+        return bool(time_s < border)
 
     return rule
 

@@ -266,9 +266,9 @@ class WrenchOnly(SpeedProblem):
         self.filters = [autoregression([p[:, j] for p in left]) for j in range(left[0].shape[1])]
 
 
-def candidate_forms(segments: list[Segment]) -> list[tuple[str, SpeedForm]]:
-    """Every speed form that this set can test."""
-    voltage = all(s.motion.voltage is not None for s in segments)
+def candidate_forms(segments: list[Segment], voltage: bool = True) -> list[tuple[str, SpeedForm]]:
+    """Every speed form that this set can test; `voltage` says whether a voltage is known in every run."""
+    voltage = voltage and all(s.motion.voltage is not None for s in segments)
     return [
         (effect.id, form)
         for effect in catalogue().values()

@@ -215,7 +215,7 @@ def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None =
             return np.concatenate([prepared.thinner(parts[g]) for g in groups], axis=1), None
 
         problem = WrenchOnly(segments, full_speed, full_voltage, prepared.thinner.rate_hz, residual_of, precision)
-    return SpeedSearch(problem, candidate_forms(segments)).run(), full_speed, full_voltage
+    return SpeedSearch(problem, candidate_forms(segments, full_voltage is not None)).run(), full_speed, full_voltage
 
 
 def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:
