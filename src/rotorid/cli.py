@@ -8,8 +8,6 @@ from typing import Annotated
 
 import typer
 
-from rotorid.effects import describe
-from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.recordings import list_sets
 from rotorid.recordings.check import as_text, check_folder
@@ -54,6 +52,10 @@ def effects(
     as_markdown: Annotated[bool, typer.Option("--markdown", help="The page docs/effects.md.")] = False,
 ) -> None:
     """Print the catalogue of effects: a line each, or one with its equations, parameters, bounds and sources."""
+    # The effects bring their compiler along; the other commands start without it.
+    from rotorid.effects import describe
+    from rotorid.effects.catalogue import catalogue
+
     if as_markdown:
         typer.echo(describe.markdown(), nl=False)
     elif effect_id is None:

@@ -23,30 +23,25 @@ rule calibrate_campaign:
         "../scripts/calibrate_campaign.py"
 
 
-for bench_name, bench_folder in BENCH_SETS.items():
-    bench_instrument = "jr3" if bench_name == "jr3" else "bench"
-
-    rule:
-        """Static tests of one platform as a recording set."""
-        name:
-            f"bench_recordings_{bench_name}"
-        message:
-            f"Bench: static tests on {bench_name} as a recording set"
-        input:
-            prepared=f"results/filtered/static/{bench_instrument}.parquet",
-            recordings=f"results/ingest/static/{bench_instrument}.csv",
-            calibration=rules.calibrate_campaign.output.coefficients,
-            geometry=BENCH_GEOMETRY,
-        output:
-            folder=directory(bench_folder),
-        params:
-            platform=bench_name,
-            noise_n=CONFIG.bench.reference_noise_n if bench_name == "jr3" else CONFIG.bench.noise_n,
-            code=code_of("bench_recordings"),
-        log:
-            f"results/logs/bench_recordings/{bench_name}.log",
-        script:
-            "../scripts/bench_recordings.py"
+rule bench_recordings:
+    """Static tests of each platform as a recording set."""
+    message:
+        "Bench: static tests as recording sets"
+    input:
+        bench=["results/filtered/static/bench.parquet", "results/ingest/static/bench.csv"],
+        jr3=["results/filtered/static/jr3.parquet", "results/ingest/static/jr3.csv"],
+        calibration=rules.calibrate_campaign.output.coefficients,
+        geometry=BENCH_GEOMETRY,
+    output:
+        **{platform: directory(path) for platform, path in BENCH_SETS.items()},
+    params:
+        noise_n=CONFIG.bench.noise_n,
+        reference_noise_n=CONFIG.bench.reference_noise_n,
+        code=code_of("bench_recordings"),
+    log:
+        "results/logs/bench_recordings.log",
+    script:
+        "../scripts/bench_recordings.py"
 
 
 rule reconstruct_static:

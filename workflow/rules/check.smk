@@ -7,8 +7,9 @@ def own_sets():
 
 
 def folders_to_check(wildcards):
-    """Sets in the recordings folder and the imported public ones."""
-    return [f"{CONFIG.recordings}/{name}" for name in own_sets()] + PUBLIC_SHOWN
+    """Sets in the recordings folder, the imported public ones, and those made of the campaign."""
+    made = [f"results/recordings/{name}" for name in CAMPAIGN_SETS]
+    return [f"{CONFIG.recordings}/{name}" for name in own_sets()] + PUBLIC_SHOWN + made
 
 
 rule check_recordings:

@@ -1,9 +1,10 @@
-"""Static tests of one platform as a recording set of kind bench.
+"""Static tests of each platform as a recording set of kind bench.
 
 - Reconstructed force beside the load that was put on, all axes of the platform.
 """
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,26 +18,36 @@ from rotorid.recordings import write_set
 
 
 def main(
-    prepared: str, recordings: str, platform: str, calibration: str, geometry: str, noise_n: float, folder: str
+    bench: Sequence[str],
+    jr3: Sequence[str],
+    calibration: str,
+    geometry: str,
+    noise_n: float,
+    reference_noise_n: float,
+    folders: dict[str, str],
 ) -> None:
-    """Write the set of `platform` to `folder`."""
-    sessions = read_sessions(recordings)
-    sessions = sessions[sessions["platform"] == platform].reset_index(drop=True)
+    """Write the set of each platform (`al`, `pla`, `jr3`) to its folder; tables come as (prepared, recordings)."""
     cells = json.loads(Path(calibration).read_text(encoding="utf-8"))["cells"]
     coefficients = np.array([[cell["a0_gf"], cell["a1_gf_per_10uv"]] for cell in cells])
     force_of = bench_force(coefficients, read_geometry(geometry))
-    made = bench_set(Path(folder).name, pd.read_parquet(prepared), sessions, force_of, noise_n)
-    write_set(made, Path(folder).parent)
+    tables = {
+        name: (pd.read_parquet(pair[0]), read_sessions(pair[1])) for name, pair in (("bench", bench), ("jr3", jr3))
+    }
+    for platform, folder in folders.items():
+        prepared, sessions = tables["jr3" if platform == "jr3" else "bench"]
+        mine = sessions[sessions["platform"] == platform].reset_index(drop=True)
+        noise = reference_noise_n if platform == "jr3" else noise_n
+        write_set(bench_set(Path(folder).name, prepared, mine, force_of, noise), Path(folder).parent)
 
 
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
         main(
-            prepared=snakemake.input.prepared,
-            recordings=snakemake.input.recordings,
-            platform=snakemake.params.platform,
+            bench=snakemake.input.bench,
+            jr3=snakemake.input.jr3,
             calibration=snakemake.input.calibration,
             geometry=snakemake.input.geometry,
             noise_n=snakemake.params.noise_n,
-            folder=snakemake.output.folder,
+            reference_noise_n=snakemake.params.reference_noise_n,
+            folders=dict(snakemake.output.items()),
         )

@@ -114,7 +114,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         size,
     )
     told = speed_for_coefficients(values, prepared.vehicle) if only_throttle(recordings) else values
-    findings = payload_or_offset(findings, values)
+    findings = rectified(payload_or_offset(findings, values))
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
     if model.wind is None:
@@ -276,6 +276,20 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
                 Finding(id=key, status="not_established", sentence=f"{effects[key].name} did not hold: {reason}")
             )
     return out
+
+
+def rectified(findings: list[Finding]) -> list[Finding]:
+    """An error of the accelerometer beside a vibration is what the sensor makes of the vibration."""
+    if not any(f.id == "vibration" for f in findings):
+        return findings
+    why = "an error of the accelerometer did not hold: a vibration that the sensor rectifies looks the same"
+    held = ("established", "ambiguous")
+    return [
+        Finding(id=f.id, status="not_established", sentence=why)
+        if f.id == "accelerometer_error" and f.status in held
+        else f
+        for f in findings
+    ]
 
 
 def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:

@@ -42,7 +42,7 @@ def clocks(arrivals: Mapping[str, pd.DataFrame], table: pd.DataFrame) -> Figure:
             label=label,
         )
     right.set(xlabel="experiment", ylabel="offset left by arrivals (ms)")
-    right.legend(loc="center right")
+    right.legend(loc="lower right")
     return fig
 
 

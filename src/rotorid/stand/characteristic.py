@@ -25,8 +25,9 @@ def law(values: np.ndarray, throttle: np.ndarray, voltage_share: np.ndarray) -> 
 def speed_law(points: pd.DataFrame) -> dict:
     """ω = ω_½ ((u − u₀)/(½ − u₀))ⁿ (V/V̄)ᵐ from steady points, with 95 % intervals.
 
-    `points` has the columns `throttle speed_rad_s voltage_v`. Relative residuals are least, so that slow points
-    count as much as fast ones. Raises InputError for fewer than six points at which the motor turns.
+    `points` has the columns `throttle speed_rad_s speed_sd_rad_s samples voltage_v`; each point counts by the standard
+    error of its mean speed, and the intervals are as wide as the residuals in these units ask for. Raises InputError
+    for fewer than six points at which the motor turns.
     """
     kept = points[(points["speed_rad_s"] > 0) & (points["throttle"] > 0)]
     if len(kept) < 6:
@@ -34,10 +35,11 @@ def speed_law(points: pd.DataFrame) -> dict:
     throttle, speed = kept["throttle"].to_numpy(), kept["speed_rad_s"].to_numpy()
     voltage_v = float(kept["voltage_v"].mean())
     share = kept["voltage_v"].to_numpy() / voltage_v
+    error = (kept["speed_sd_rad_s"] / np.sqrt(kept["samples"])).to_numpy()
     largest_dead = 0.9 * float(throttle.min())
     start = np.array([np.interp(0.5, throttle, speed), 0.7, 0.1 * largest_dead, 1.0])
     fit = least_squares(
-        lambda values: law(values, throttle, share) / speed - 1,
+        lambda values: (law(values, throttle, share) - speed) / error,
         start,
         bounds=([0.0, 0.1, 0.0, -5.0], [np.inf, 3.0, largest_dead, 5.0]),
         x_scale=np.array([1000.0, 1.0, 0.01, 1.0]),
@@ -45,7 +47,8 @@ def speed_law(points: pd.DataFrame) -> dict:
     freedom = len(kept) - len(PARAMETERS)
     covariance = np.linalg.inv(fit.jac.T @ fit.jac) * 2 * fit.cost / freedom
     half = student_t.ppf(0.975, freedom) * np.sqrt(np.diag(covariance))
-    out = {"mean_voltage_v": voltage_v, "residual_rms_relative": float(np.sqrt(np.mean(fit.fun**2)))}
+    relative = fit.fun * error / speed
+    out = {"mean_voltage_v": voltage_v, "residual_rms_relative": float(np.sqrt(np.mean(relative**2)))}
     for name, value, width in zip(PARAMETERS, fit.x.tolist(), half.tolist(), strict=True):
         out |= {name: value, f"{name}_interval_95": [value - width, value + width]}
     return out | {"points": len(kept)}

@@ -124,11 +124,12 @@ def test_the_law_of_speed_comes_back() -> None:
     throttle = np.linspace(0.01, 0.5, 50)
     voltage = 16.5 + rng.uniform(-0.4, 0.4, 50)
     speed = 1900 * ((throttle - 0.004) / 0.496) ** 0.67 * (voltage / voltage.mean()) ** 0.8
-    speed *= 1 + rng.normal(0, 1e-4, 50)
-    found = speed_law(pd.DataFrame({"throttle": throttle, "speed_rad_s": speed, "voltage_v": voltage}))
+    speed += rng.normal(0, 0.1, 50)  # means of 100 readings that scatter by 1 rad/s
+    points = pd.DataFrame({"throttle": throttle, "speed_rad_s": speed, "voltage_v": voltage})
+    found = speed_law(points.assign(speed_sd_rad_s=1.0, samples=100))
     for name, true in (("throttle_exponent", 0.67), ("dead_throttle", 0.004), ("voltage_exponent", 0.8)):
         low, high = found[f"{name}_interval_95"]
         assert low < true < high
         assert high - low < 0.05 * true + 0.01
     with pytest.raises(InputError, match="at least six points"):
-        speed_law(pd.DataFrame({"throttle": throttle[:5], "speed_rad_s": speed[:5], "voltage_v": voltage[:5]}))
+        speed_law(points[:5])

@@ -24,6 +24,8 @@ SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
 """Offsets from the order, in widths of the window, that tell the level beside the line."""
 ORDERS = (1, 2)
 P_LIMIT = 1e-9
+LEAST_MEDIAN = 3.0
+"""Power at the order over that beside it in half of the windows, at least."""
 LEAST_AMPLITUDE = 0.5
 """Line over the reading's own scatter beside it (one sigma a sample), at least, to matter."""
 LOWEST_HZ = 8.0
@@ -101,6 +103,8 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
         return None
     ratio, power, level, length = (np.concatenate(x) for x in (ratios, powers, levels, lengths))
     n = len(ratio)
+    if np.median(ratio) < LEAST_MEDIAN:
+        return None  # a line is there as long as the rotors turn; single fierce moments are motion
     # Each ratio is about exponential, a little heavier because the level beside is estimated from eight bins.
     p = float(gamma.sf(float(ratio.sum()) * (1 - 1 / len(SIDE_BINS)), n))
     mean = float(power.mean())
