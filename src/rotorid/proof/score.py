@@ -78,7 +78,9 @@ def equivalents(answer: Mapping[str, Any]) -> dict[str, frozenset[str]]:
     """True effect to the names that these data cannot tell from it, itself among them."""
     out = {}
     for effect in answer["effects"]:
-        names = {effect["id"], *effect["equivalent"]}
+        names = {effect["id"]}
+        for entry in effect["equivalent"]:  # names, or groups of names with the effect itself among them
+            names |= {entry} if isinstance(entry, str) else set(entry)
         out[effect["id"]] = out.get(effect["id"], frozenset()) | names
     return out
 

@@ -87,6 +87,15 @@ def test_a_class_wider_than_the_data_demand_is_inside_but_not_named() -> None:
     assert s["inside"] and s["named"] and s["ambiguity_right"] and not s["separable"]
 
 
+def test_what_cannot_be_told_apart_may_be_listed_in_groups() -> None:
+    both = effect("creep", "ambiguous", ["creep", "zero_drift"])
+    truth = answer(hidden("creep", equivalent=[["creep", "zero_drift"]]), case="bench/single/creep/strong/0")
+    s = score_case(verdict(both), truth)
+    assert s["named"] and (s["kind"], s["family"]) == ("bench", "single")
+    rows = {row["id"] for row in table.summary([s])}
+    assert "bench_single_named" in rows and "stand_single_named" not in rows
+
+
 def test_naming_one_of_two_that_cannot_be_told_apart_states_too_much() -> None:
     s = score_case(verdict(effect("rotor_drag")), answer(hidden("rotor_drag", equivalent=["frame_drag"])))
     assert s["named"] and not s["ambiguity_right"]
