@@ -140,7 +140,10 @@ def parameter_scores(verdict: Mapping[str, Any], answer: Mapping[str, Any]) -> l
     for name, values in answer["wrong_parameters"].items():
         found = verdict.get("parameters", {}).get(name)
         if found is not None:
-            out.append(_compared("", name, values["true"], found["refitted"], found["interval_95"]))
+            # As a share of what was believed: a scale of distances is believed to be one by the verdict.
+            low, high = (None if x is None else x / found["believed"] for x in found["interval_95"])
+            share = values["true"] / values["believed"]
+            out.append(_compared("", name, share, found["refitted"] / found["believed"], (low, high)))
     return [p for p in out if p is not None]
 
 

@@ -121,6 +121,10 @@ def test_wrong_values_are_scored_apart_from_physics() -> None:
     s = score_case(verdict(values=found), truth)
     assert s["values_right"] and s["claim_count"] == 0 and s["truth"] == []
     assert s["parameters"][0]["covered"] and s["parameters"][0]["relative_error"] == pytest.approx(1 / 650)
+    # distances believed 5 % too long: their scale is 1 / 1.05 of the believed one, which a verdict calls 1
+    scale = answer(case="wrong/arm_scale/0", wrong={"arm_scale": {"believed": 1.05, "true": 1.0}})
+    found_scale = {"arm_scale": {"believed": 1.0, "refitted": 0.952, "interval_95": [0.950, 0.954]}}
+    assert score_case(verdict(values=found_scale), scale)["parameters"][0]["covered"]
     assert not score_case(verdict(values={"inertia_xx_kg_m2": found["mass_kg"]}), truth)["values_right"]
 
 
