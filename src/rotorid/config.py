@@ -186,6 +186,7 @@ class Proof(Section):
     cases: list[Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
     batch: int = Field(ge=1, description="Cases that one job treats [1].")
     peers: bool = Field(description="Whether other methods are asked about the same recordings [true, false].")
+    real: bool = Field(description="Whether the public real recordings are studied [true, false].")
     tables: Text = Field(
         description="Folder whose tables the report's chapter shows: docs/proof holds those of the last full proof, "
         "results/proof makes the proof part of the report [path]."

@@ -5,13 +5,13 @@ Answers lie in results/sealed, which the scoring rule alone opens.
 
 import sys
 
-from rotorid.proof import plan
+from rotorid.proof import plan, studies as real
 
 CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
 BATCHES = plan.batches(plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases), CONFIG.proof.batch)
 # Recordings come from code outside the library: its hash stands beside that of the script.
 CONCEALING = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))]
-PROOF_TABLES = ("summary", "cases", "effects", "confusion", "power", "parameters", "peers")
+STUDIES = [study.name for study in real.STUDIES] if CONFIG.proof.real else []
 
 if "proof" in sys.argv:
     judged = [name for name in BATCHES if Path(f"results/proof/verdicts/{name}").is_dir()]
@@ -102,6 +102,45 @@ rule score_proof:
         "../scripts/score_proof.py"
 
 
+def set_of_study(wildcards):
+    """Folder of the public set that a study is about."""
+    return public_set(real.study(wildcards.study).set)
+
+
+rule study_real:
+    """The mismatch stage on one set of real recordings."""
+    message:
+        "Proof: real recordings, {wildcards.study}"
+    input:
+        recordings=set_of_study,
+    output:
+        result="results/proof/real/{study}.json",
+    params:
+        code=code_of("study_real"),
+    log:
+        "results/logs/study_real/{study}.log",
+    script:
+        "../scripts/study_real.py"
+
+
+rule tabulate_real:
+    """Real recordings in one table, published coefficients beside ours."""
+    message:
+        "Proof: table of real recordings"
+    input:
+        studies=expand("results/proof/real/{study}.json", study=STUDIES),
+        flights="results/neurobem/flights.csv",
+    output:
+        table="results/proof/real.csv",
+        coefficients="results/proof/coefficients.csv",
+    params:
+        code=code_of("tabulate_real"),
+    log:
+        "results/logs/tabulate_real.log",
+    script:
+        "../scripts/tabulate_real.py"
+
+
 rule draw_proof:
     """Figures of the proof beside its tables."""
     message:
@@ -137,6 +176,8 @@ rule chapter_proof:
         power=f"{CONFIG.proof.tables}/power.csv",
         peers=f"{CONFIG.proof.tables}/peers.csv",
         state=f"{CONFIG.proof.tables}/state.json",
+        real=f"{CONFIG.proof.tables}/real.csv",
+        coefficients=f"{CONFIG.proof.tables}/coefficients.csv",
     output:
         targets="results/report/proof/targets.svg",
         confusion_figure="results/report/proof/confusion.svg",
@@ -145,6 +186,8 @@ rule chapter_proof:
         rows="results/report/proof/rows.csv",
         others="results/report/proof/others.csv",
         methods="results/report/proof/methods.csv",
+        studies="results/report/proof/studies.csv",
+        published="results/report/proof/published.csv",
     params:
         code=code_of_chapter("proof"),
     log:
@@ -159,5 +202,9 @@ rule proof:
     message:
         "The proof is in results/proof: summary.csv first"
     input:
-        results_behind(*rules.score_proof.output, *rules.draw_proof.output),
-        rules.chapter_proof.output,
+        results_behind(
+            *rules.score_proof.output,
+            *rules.draw_proof.output,
+            *rules.tabulate_real.output,
+            *rules.chapter_proof.output,
+        ),

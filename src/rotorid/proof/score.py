@@ -78,7 +78,9 @@ def equivalents(answer: Mapping[str, Any]) -> dict[str, frozenset[str]]:
     """True effect to the names that these data cannot tell from it, itself among them."""
     out = {}
     for effect in answer["effects"]:
-        names = {effect["id"], *effect["equivalent"]}
+        names = {effect["id"]}
+        for entry in effect["equivalent"]:  # names, or groups of names with the effect itself among them
+            names |= {entry} if isinstance(entry, str) else set(entry)
         out[effect["id"]] = out.get(effect["id"], frozenset()) | names
     return out
 
@@ -138,7 +140,10 @@ def parameter_scores(verdict: Mapping[str, Any], answer: Mapping[str, Any]) -> l
     for name, values in answer["wrong_parameters"].items():
         found = verdict.get("parameters", {}).get(name)
         if found is not None:
-            out.append(_compared("", name, values["true"], found["refitted"], found["interval_95"]))
+            # As a share of what was believed: a scale of distances is believed to be one by the verdict.
+            low, high = (None if x is None else x / found["believed"] for x in found["interval_95"])
+            share = values["true"] / values["believed"]
+            out.append(_compared("", name, share, found["refitted"] / found["believed"], (low, high)))
     return [p for p in out if p is not None]
 
 

@@ -71,3 +71,42 @@ def of_methods(peers: pd.DataFrame) -> pd.DataFrame:
         out[column] = [number(column, value) for value in out[column]]
     out["method"] = [METHODS.get(name, name) for name in out["method"]]
     return out
+
+
+def of_studies(real: pd.DataFrame) -> pd.DataFrame:
+    """Real recordings, one row each: ids in words; error of the channel group that was recorded best."""
+    rows = []
+    for _, row in real.iterrows():
+        group, unit, digits = ("force", "N", 3) if pd.notna(row["force_after"]) else ("rotor_speed", "rad/s", 1)
+        stages = [row[f"{group}_{stage}"] for stage in ("before", "refitted", "after")]
+        own = row.get(f"{group}_neurobem") if group == "force" else None
+        share = row["unexplained_share"]
+        rows.append(
+            {
+                "study": row["study"],
+                "about": row["about"],
+                "found": words(row["found"]) or "nothing",
+                "values": words(row["values"]),
+                "error": " / ".join("–" if pd.isna(s) else f"{s:.{digits}f}" for s in stages) + f" {unit}",
+                "reference": "" if own is None or pd.isna(own) else f"{own:.{digits}f} {unit}",
+                "unexplained": "–" if pd.isna(share) else f"{100 * share:.0f} %",
+            }
+        )
+    return pd.DataFrame(rows, columns=["study", "about", "found", "values", "error", "reference", "unexplained"])
+
+
+def words(ids: object) -> str:
+    """Ids with underscores as words; nothing as an empty text."""
+    return "" if pd.isna(ids) else str(ids).replace("_", " ")
+
+
+def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
+    """Coefficients found beside published ones, as text."""
+    out = coefficients[["study", "effect", "symbol", "unit", "source"]].copy()
+    out["effect"] = [words(e) for e in out["effect"]]
+    out["found"] = [
+        f"{f:.3g} ({low:.3g} to {high:.3g})"
+        for f, low, high in zip(coefficients["found"], coefficients["low_95"], coefficients["high_95"], strict=True)
+    ]
+    out["published"] = [f"{p:.3g}" for p in coefficients["published"]]
+    return out

@@ -87,6 +87,15 @@ def test_a_class_wider_than_the_data_demand_is_inside_but_not_named() -> None:
     assert s["inside"] and s["named"] and s["ambiguity_right"] and not s["separable"]
 
 
+def test_what_cannot_be_told_apart_may_be_listed_in_groups() -> None:
+    both = effect("creep", "ambiguous", ["creep", "zero_drift"])
+    truth = answer(hidden("creep", equivalent=[["creep", "zero_drift"]]), case="bench/single/creep/strong/0")
+    s = score_case(verdict(both), truth)
+    assert s["named"] and (s["kind"], s["family"]) == ("bench", "single")
+    rows = {row["id"] for row in table.summary([s])}
+    assert "bench_single_named" in rows and "stand_single_named" not in rows
+
+
 def test_naming_one_of_two_that_cannot_be_told_apart_states_too_much() -> None:
     s = score_case(verdict(effect("rotor_drag")), answer(hidden("rotor_drag", equivalent=["frame_drag"])))
     assert s["named"] and not s["ambiguity_right"]
@@ -112,6 +121,10 @@ def test_wrong_values_are_scored_apart_from_physics() -> None:
     s = score_case(verdict(values=found), truth)
     assert s["values_right"] and s["claim_count"] == 0 and s["truth"] == []
     assert s["parameters"][0]["covered"] and s["parameters"][0]["relative_error"] == pytest.approx(1 / 650)
+    # distances believed 5 % too long: their scale is 1 / 1.05 of the believed one, which a verdict calls 1
+    scale = answer(case="wrong/arm_scale/0", wrong={"arm_scale": {"believed": 1.05, "true": 1.0}})
+    found_scale = {"arm_scale": {"believed": 1.0, "refitted": 0.952, "interval_95": [0.950, 0.954]}}
+    assert score_case(verdict(values=found_scale), scale)["parameters"][0]["covered"]
     assert not score_case(verdict(values={"inertia_xx_kg_m2": found["mass_kg"]}), truth)["values_right"]
 
 

@@ -1,0 +1,52 @@
+"""Lines of the table of real recordings, from a verdict written by hand."""
+
+import pytest
+
+from rotorid.proof import real
+from rotorid.proof.studies import STUDIES, Published, Study
+
+
+def verdict(**changes):
+    def errors(a, b, c):
+        return {"rmse": {"held_out": {"before": a, "refitted": b, "after": c}}}
+
+    base = {
+        "verdict": "explained",
+        "runs": {"held_out": ["b"]},
+        "effects": [
+            {
+                "id": "rotor_drag",
+                "status": "established",
+                "alternatives": [],
+                "parameters": [{"symbol": "k_d", "value": 4e-5, "unit": "N s2/(rad m)", "interval_95": [3e-5, 5e-5]}],
+            },
+            {"id": "gust", "status": "not_established", "alternatives": [], "parameters": []},
+        ],
+        "parameters": {},
+        "channels": {"force_x": errors(3.0, 3.0, 0.3), "force_y": errors(4.0, 4.0, 0.4)},
+        "unexplained": {"share": 0.1, "depends_on": ["airspeed_m_s"]},
+    }
+    return base | changes
+
+
+def test_a_line_of_the_table() -> None:
+    row = real.row_of(verdict(), Study("s", "set", ("rotor_drag", "delay"), "about"))
+    assert row["found"] == "rotor_drag" and row["expected_found"] == "rotor_drag"
+    # 3-4-5
+    assert (row["force_before"], row["force_after"]) == (pytest.approx(5.0), pytest.approx(0.5))
+    assert row["moment_after"] is None
+    assert list(row) == real.ROW_COLUMNS
+
+
+def test_a_published_number_in_its_own_terms() -> None:
+    theirs = Published("rotor_drag", "k_d", 0.26, "N s/m", "x", times_total_speed=True)
+    (row,) = real.compared(verdict(), Study("s", "set", (), "", published=(theirs,)), total_speed=6000.0)
+    # 4e-5 N s2/(rad m) times 6000 rad/s
+    assert row["found"] == pytest.approx(0.24) and row["high_95"] == pytest.approx(0.30)
+    assert list(row) == real.COMPARED_COLUMNS
+    assert real.compared(verdict(effects=[]), Study("s", "set", (), "", published=(theirs,)), 6000.0) == []
+
+
+def test_studies_have_names_of_their_own() -> None:
+    names = [s.name for s in STUDIES]
+    assert len(set(names)) == len(names)

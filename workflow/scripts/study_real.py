@@ -1,0 +1,42 @@
+"""The mismatch stage on one set of real recordings.
+
+- Reads the set with the runs held out that the study asks for.
+- Writes the verdict, a line for the table, and published numbers beside ours.
+"""
+
+import json
+import traceback
+from pathlib import Path
+
+from rotorid import log
+from rotorid.importers.report import read_report
+from rotorid.mismatch.deliver import judge
+from rotorid.proof import real
+from rotorid.proof.studies import study
+from rotorid.recordings import read_set
+
+
+def main(folder: str, name: str, out: str) -> None:
+    """Run study `name` on the set in `folder`."""
+    report = read_report(Path(folder))
+    result = {"available": report["available"], "reason": report["reason"], "study": name}
+    if report["available"]:
+        wanted = study(name)
+        recordings = real.with_split(read_set(Path(folder)), wanted)
+        try:
+            verdict = json.loads(judge(recordings).text())
+        except Exception as error:  # a stage that stops on real data is a result: the table leaves the study out
+            traceback.print_exc()
+            result |= {"available": False, "reason": f"the stage stopped: {type(error).__name__}: {error}"}
+        else:
+            result |= {
+                "row": real.row_of(verdict, wanted),
+                "compared": real.compared(verdict, wanted, real.mean_total_speed(recordings)),
+                "verdict": verdict,
+            }
+    Path(out).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(folder=snakemake.input.recordings, name=snakemake.wildcards.study, out=snakemake.output.result)

@@ -1,0 +1,37 @@
+"""The table of real recordings.
+
+- One line a study that could be made; published coefficients beside ours.
+- Beside the NeuroBEM flights held out, NeuroBEM's own prediction of the same flight.
+"""
+
+from pathlib import Path
+
+import pandas as pd
+
+from rotorid import log
+from rotorid.proof import real
+
+
+def main(studies: list[str], flights: str, table: str, coefficients: str) -> None:
+    """Gather the results of `studies`; `flights` holds NeuroBEM's own errors."""
+    results = real.read_results([Path(p) for p in studies])
+    rows = pd.DataFrame([r["row"] for r in results], columns=real.ROW_COLUMNS)
+    own = pd.read_csv(flights)
+    reference = own[own["model"] == "neurobem"].set_index("flight") if len(own) else own
+    for group in ("force", "moment"):
+        rows[f"{group}_neurobem"] = [
+            reference.loc[held, group] if len(own) and held in reference.index else None for held in rows["held_out"]
+        ]
+    rows.to_csv(table, index=False, float_format="%.6g")
+    found = [c for r in results for c in r["compared"]]
+    pd.DataFrame(found, columns=real.COMPARED_COLUMNS).to_csv(coefficients, index=False, float_format="%.6g")
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            studies=snakemake.input.studies,
+            flights=snakemake.input.flights,
+            table=snakemake.output.table,
+            coefficients=snakemake.output.coefficients,
+        )
