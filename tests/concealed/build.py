@@ -13,14 +13,14 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from . import cases, rotorpy_cases
+from . import cases, ground, rotorpy_cases
 from .richsim import scene
 from .write import write_set
 
 
 def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> Path:
     """Write one set and its answer; with `signals` also the noise-free tables beside the answer."""
-    make = {"richsim": scene.make, "rotorpy": rotorpy_cases.make}[case.generator]
+    make = {"richsim": scene.make, "rotorpy": rotorpy_cases.make, "ground": ground.make}[case.generator]
     recording, truth, ideals = make(case.settings, case.seed)
     write_set(recording, out / case.set_name)
     answers.mkdir(parents=True, exist_ok=True)

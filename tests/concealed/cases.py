@@ -10,6 +10,8 @@ from fnmatch import fnmatch
 
 import numpy as np
 
+from . import ground_cases
+from .ground import GroundPlan
 from .richsim.hidden import OUTSIDE, Hidden
 from .richsim.scene import Plan, Run
 from .richsim.sensors import Noise
@@ -23,7 +25,7 @@ class Case:
     name: str
     seed: int
     generator: str
-    settings: Plan | RotorpyPlan
+    settings: Plan | RotorpyPlan | GroundPlan
     truth: tuple[str, ...]
 
     @property
@@ -533,10 +535,15 @@ def rotorpy() -> list[Case]:
     return out
 
 
+def ground() -> list[Case]:
+    """Benches and stands (`bench/…`, `stand/…`)."""
+    return [Case(name, seed, "ground", plan, tuple(truth)) for name, seed, plan, truth in ground_cases.plans()]
+
+
 def all_cases() -> list[Case]:
     """Every case, in a fixed order; names are unique."""
     out = [*singles(), *mixtures(), *wrong_values(), *confusable(), *power(), *partial()]
-    out += [*outside(), *mistakes(), *rotorpy(), *clean()]
+    out += [*outside(), *mistakes(), *rotorpy(), *clean(), *ground()]
     names = [c.name for c in out]
     if len(set(names)) != len(names):
         raise ValueError("two cases carry the same name")

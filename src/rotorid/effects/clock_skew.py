@@ -1,9 +1,12 @@
 """A sensor's clock that runs at another rate, so that its lateness grows.
 
-Recognised before the physics (rotorid.mismatch.mistakes); it is no wrench.
+On a flight it is recognised before the physics (rotorid.mismatch.mistakes): it is no wrench. On a stand or bench the
+reading lies on another clock than what loads it.
 """
 
-from rotorid.effects.contract import Effect, Parameter
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.recorded import late_sensors
 
 
@@ -19,6 +22,32 @@ def set_forms(vehicle):
     return late_sensors(vehicle, "written at t: the value of t − T − e t", parameters, (0.004, 0.0), late_s)
 
 
+def at_other_times(loading, late_s):
+    """The load `late_s` (n,) earlier less the load now, (n, 6), linear between samples."""
+    times = loading.run_time_s - late_s
+    earlier = [np.interp(times, loading.run_time_s, column) for column in loading.load.T]
+    return Contribution(reading=np.stack(earlier, axis=1) - loading.load)
+
+
+def other_rate(loading, vehicle, values):
+    """y(t) = F(t − e t), t from the run's start."""
+    return at_other_times(loading, values[0] * loading.run_time_s)
+
+
+def reading_forms(instrument):
+    rate = 1.0 / max(instrument.rate_hz * instrument.duration_s, 10.0)
+    starts = tuple(s * k * rate for k in (3.0, 15.0, 60.0) if k * rate < 0.1 for s in (-1, 1))
+    return (
+        Form(
+            "other rate",
+            "y(t) = F(t − e t)",
+            (Parameter("e", "1", -0.1, 0.1, True, starts, "seconds lost per second", negligible=rate),),
+            other_rate,
+            excited_by=("load_change",),
+        ),
+    )
+
+
 EFFECT = Effect(
     id="clock_skew",
     name="a clock that runs at another rate",
@@ -28,6 +57,7 @@ EFFECT = Effect(
     sign="positive e: the sensor falls further behind as the run goes on",
     validity="a rate that is constant over a run; jumps of a clock are left out",
     source="clock arithmetic; catalogue B11",
+    reading_forms=reading_forms,
     confusers=("delay",),
     separating_manoeuvre="tap the frame sharply at the start and at the end of a long run",
     kind="sensor",

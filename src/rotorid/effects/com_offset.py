@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import weight
 
 
 def moment_only(motion, vehicle, values):
@@ -36,6 +37,27 @@ def forms(vehicle):
     )
 
 
+def weight_moment(loading, vehicle, values):
+    """On a stand the weight, not the thrust, moves with the centre of mass: M = r_c × m g."""
+    offset = np.zeros(3)
+    offset[: len(values)] = values
+    here, there = weight(loading.motion, vehicle), weight(loading.motion, vehicle, offset)
+    return Contribution(reading=there - here)
+
+
+def reading_forms(instrument):
+    vehicle = instrument.vehicle
+    if instrument.bench or vehicle.tared or not vehicle.mass_kg or not any(c >= 3 for c in instrument.channels):
+        return ()
+    space = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xyz")
+    forms = [Form("moment of the weight", "M = r_c × m g", space[:2], weight_moment, excited_by=("always",))]
+    if instrument.tilts:
+        forms.append(
+            Form("moment of the weight, in space", "M = r_c × m g", space, weight_moment, excited_by=("always",))
+        )
+    return tuple(forms)
+
+
 EFFECT = Effect(
     id="com_offset",
     name="an offset of the centre of mass",
@@ -51,6 +73,7 @@ EFFECT = Effect(
         "change of inertia (m r², below 1 % for r under 5 mm)"
     ),
     excited_by=("rotor_speed", "angular_velocity", "angular_acceleration"),
+    reading_forms=reading_forms,
     confusers=("unequal_rotors", "thrust_tilt"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets with rotor speeds recorded",
 )

@@ -104,6 +104,8 @@ class Contribution:
     """Error of the gyroscope's reading, rad/s."""
     angular_acceleration: np.ndarray | None = None
     """Time derivative of that error, rad/s2 (stated apart: differentiating a noisy reading would bias it)."""
+    reading: np.ndarray | None = None
+    """Error of a stand's or bench's reading, (n, 6), N and N m, sensor axes."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +153,8 @@ class Form:
     excited_by: tuple[str, ...] = ()
     """Fields of `Motion` without which nothing is added: the contribution is zero where all of them are zero
     (`height`: far from the ground). `always` for a form that is there in any flight. Empty takes the effect's."""
+    on_loading: bool = False
+    """Whether the contribution takes a `Loading` (an instrument's) in place of a `Motion`."""
 
     @property
     def linear(self) -> tuple[int, ...]:
@@ -162,6 +166,9 @@ class Form:
 
 
 FormsFor = Callable[[Vehicle], tuple[Form, ...]]
+ReadingForms = "Callable[[Instrument], tuple[Form, ...]]"
+"""Forms of an instrument (`rotorid.effects.loading.Instrument`); their contribution takes a `Loading` in place of a
+`Motion` and gives a `reading`."""
 
 
 @dataclass(frozen=True)
@@ -249,6 +256,8 @@ class Effect:
     """Forms that spoil a recorded set."""
     form_named: Callable[[str], Form | None] = lambda name: None
     """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
+    reading_forms: ReadingForms | None = None
+    """Forms of kinds `stand` and `bench`; None where the forms for a flight hold on a stand as well."""
 
     def excitation(self, form: Form) -> tuple[str, ...]:
         """What excites one of the effect's forms."""

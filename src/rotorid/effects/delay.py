@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Parameter, SpeedForm
+from rotorid.effects.clock_skew import at_other_times
+from rotorid.effects.contract import Effect, Form, Parameter, SpeedForm
 from rotorid.effects.recorded import late_sensors
 
 
@@ -34,12 +35,28 @@ def set_forms(vehicle):
     return late_sensors(vehicle, "written at t: the value of t − T", parameters, (0.03,), lambda t, values: values[0])
 
 
+def late_reading(loading, vehicle, values):
+    """y(t) = F(t − T)."""
+    return at_other_times(loading, values[0])
+
+
+def reading_forms(instrument):
+    """A reading late by more than two samples; what is less is a nuisance or cannot be told from a filter."""
+    dt = 1.0 / instrument.rate_hz
+    starts = (1.5 * dt, 4 * dt, 12 * dt, -1.5 * dt, -4 * dt)
+    late = Parameter(
+        "T", "s", -30 * dt, 60 * dt, nonlinear=True, starts=starts, meaning="time behind", negligible=2 * dt
+    )
+    return (Form("of the reading", "y(t) = F(t − T)", (late,), late_reading, excited_by=("load_change",)),)
+
+
 EFFECT = Effect(
     id="delay",
     name="a delay",
     sentence="one recording follows another late, without being smoothed",
     forms=lambda vehicle: (),
     set_forms=set_forms,
+    reading_forms=reading_forms,
     speed_forms=(
         SpeedForm(
             "of the command",

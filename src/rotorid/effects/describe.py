@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import COLUMNS_OF, Effect, Form, Parameter, SetForm, SpeedForm
+from rotorid.effects.loading import AXES, Instrument, forms_of
 from rotorid.recordings.vehicle import Vehicle
 
 EXAMPLE = Vehicle(
@@ -29,6 +31,22 @@ EXAMPLE = Vehicle(
 )
 """The thesis's quadrotor: forms depend on the number of rotors, bounds on the vehicle's size."""
 
+ALL_CHANNELS = tuple(range(len(AXES)))
+EXAMPLE_STAND = Instrument(
+    vehicle=EXAMPLE.model_copy(update={"kind": "stand", "tared": False, "sensor_mount": "level"}),
+    channels=ALL_CHANNELS,
+    loaded=ALL_CHANNELS,
+    rate_hz=100.0,
+    duration_s=60.0,
+    run_s=60.0,
+    runs=("first", "second"),
+    tilts=True,
+    temperature=True,
+    returns=ALL_CHANNELS,
+    distance="wall_distance_m",
+)
+"""A stand that shows every effect: its forms' parameters depend on its channels, bounds on rate and duration."""
+
 EXCITATION = {
     "rotor_speed": "rotors that turn",
     "rotor_acceleration": "rotors that speed up or slow down",
@@ -44,6 +62,9 @@ EXCITATION = {
     "voltage": "a voltage below the largest",
     "limit": "commands beyond the limit",
     "time": "time since the start",
+    "load": "any load",
+    "load_change": "a load that changes",
+    "tilt": "a tilted mount",
 }
 KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistake in the set"}
 INTRODUCTION = """\
@@ -53,7 +74,9 @@ Written by `rotorid effects --markdown`; a test holds that this page is the cata
 [conventions](conventions.md): body x forward, y right, z down; v velocity through the air, Ω body rates, R attitude
 (body to world), ω_i rotor speed, T_i thrust C_F ω_i², Q_i torque C_Q ω_i², r_i place of a hub, v_i = v + Ω × r_i its
 velocity. The number after "catalogue" in a source is the row of the project's list of omitted physics. Ranges are
-physical bounds for the thesis's quadrotor (0.652 kg, 0.125 m arms); they scale with the vehicle.
+physical bounds for the thesis's quadrotor (0.652 kg, 0.125 m arms); they scale with the vehicle. Forms "on an
+instrument" are those of kinds `stand` and `bench`: F is the load that the believed values predict at the sensor, y the
+reading, f a frequency; their ranges are those of a stand read at 100 Hz for 60 s.
 
 An effect is one file of `src/rotorid/effects/`; the forms inside one id compete. Any form can be switched on in a
 vehicle file and is then simulated and recorded:
@@ -88,6 +111,25 @@ def columns_of(form: Form | SpeedForm | SetForm) -> tuple[str, ...]:
     return tuple(dict.fromkeys(COLUMNS_OF[name] for name in form.requires))
 
 
+def reading_rows(effect: Effect, instrument: Instrument = EXAMPLE_STAND) -> list[FormRow]:
+    """Forms of an effect on a stand or bench of its own, those of one equation in one row."""
+    if effect.reading_forms is None:
+        return []
+    found: dict[str, list[Form]] = {}
+    for form in forms_of(effect, instrument):
+        found.setdefault(form.equation, []).append(form)
+    return [
+        FormRow(
+            tuple(form.name for form in forms),
+            equation,
+            tuple(dict.fromkeys(p for form in forms for p in form.parameters)),
+            ("force_*_n, moment_*_n_m", *(COLUMNS_OF[n] for n in dict.fromkeys(n for f in forms for n in f.requires))),
+            effect.excitation(forms[0]),
+        )
+        for equation, forms in found.items()
+    ]
+
+
 def rows(effect: Effect, vehicle: Vehicle = EXAMPLE) -> list[FormRow]:
     """Forms of an effect, those that differ by a number or a sensor alone in one row."""
     found: dict[tuple, FormRow] = {}
@@ -113,8 +155,25 @@ def number(value: float) -> str:
 def parameter_text(parameter: Parameter) -> str:
     """Symbol, range, unit and meaning."""
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    text = f"{parameter.symbol} from {number(parameter.low)} to {number(parameter.high)}{unit}: {parameter.meaning}"
-    return text + (", fitted" if parameter.nonlinear else "")
+    bounded = math.isfinite(parameter.low) and math.isfinite(parameter.high)
+    span = f" from {number(parameter.low)} to {number(parameter.high)}{unit}" if bounded else f" in {parameter.unit}"
+    return f"{parameter.symbol}{span}: {parameter.meaning}" + (", fitted" if parameter.nonlinear else "")
+
+
+def parameter_texts(parameters: tuple[Parameter, ...]) -> list[str]:
+    """Parameters of a row, a long series of one letter, range and meaning by its ends."""
+    series: dict[tuple, list[Parameter]] = {}
+    for p in parameters:
+        series.setdefault((p.symbol.split("_")[0], p.low, p.high, p.meaning), []).append(p)
+    texts = []
+    for same in series.values():
+        if len(same) > 3:
+            units = " or ".join(dict.fromkeys(p.unit for p in same))
+            whole = replace(same[0], symbol=f"{same[0].symbol} … {same[-1].symbol}", unit=units)
+            texts.append(parameter_text(whole))
+        else:
+            texts += [parameter_text(p) for p in same]
+    return texts
 
 
 def names_text(names: tuple[str, ...]) -> str:
@@ -133,19 +192,28 @@ def listing() -> str:
     return "".join(f"{e.id:<{wide}}  {KINDS[e.kind]:<18}  {e.sentence}\n" for e in effects)
 
 
+def formless(effect: Effect) -> str:
+    """Why an effect lists no form."""
+    if effect.reading_forms is not None:
+        return "it has no form to fit: it is recognised from the readings themselves"
+    return "its forms are made for windows that the data show (`F = Rᵀ f(t)`, linear between knots 0.6 s apart)"
+
+
 def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as plain text."""
     out = [f"{effect.id}: {effect.name} ({KINDS[effect.kind]})", f"  {effect.sentence}", ""]
-    for row in rows(effect, vehicle):
-        out.append(f"  form {names_text(row.names)}")
+    every = [("form", row) for row in rows(effect, vehicle)]
+    every += [("on an instrument", row) for row in reading_rows(effect)]
+    for kind, row in every:
+        out.append(f"  {kind} {names_text(row.names)}")
         out.append(f"    {row.equation}")
-        out += [f"    {parameter_text(p)}" for p in row.parameters]
+        out += [f"    {text}" for text in parameter_texts(row.parameters)]
         out.append(f"    columns: {'; '.join(row.columns)}")
         if row.excited_by:
             out.append(f"    shows with: {excitation_text(row.excited_by)}")
         out.append("")
-    if not rows(effect, vehicle):
-        out += ["  its forms are made for windows that the data show", ""]
+    if not every:
+        out += [f"  {formless(effect)}", ""]
     out += [
         f"  sign: {effect.sign}",
         f"  validity: {effect.validity}",
@@ -159,23 +227,23 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
 def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as a section of the page."""
     out = [f"### `{effect.id}`: {effect.name}\n", f"{KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
-    table = rows(effect, vehicle)
+    table = [(names_text(row.names), row) for row in rows(effect, vehicle)]
+    table += [(f"on an instrument: {names_text(row.names)}", row) for row in reading_rows(effect)]
     if table:
         out.append("| form | equation | parameters | columns | shows with |\n| --- | --- | --- | --- | --- |")
-        for row in table:
+        for names, row in table:
             cells = (
-                names_text(row.names),
+                names,
                 row.equation,
-                "<br>".join(parameter_text(p) for p in row.parameters),
+                "<br>".join(parameter_texts(row.parameters)),
                 "<br>".join(f"`{c}`" if " " not in c else c for c in row.columns),
                 excitation_text(row.excited_by),
             )
             out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         out.append("")
     else:
-        out.append(
-            "Its forms are made for windows that the data show (`F = Rᵀ f(t)`, linear between knots 0.6 s apart).\n"
-        )
+        text = formless(effect)
+        out.append(f"{text[0].upper()}{text[1:]}.\n")
     confusers = ", ".join(f"`{c}`" for c in effect.confusers) or "nothing known"
     out += [
         f"- Sign: {effect.sign}.",

@@ -8,8 +8,10 @@ from pathlib import Path
 
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.forward import forward_channels, prove
+from rotorid.mismatch.forward import Forward, forward_channels, prove
 from rotorid.mismatch.improve import improved_vehicle
+from rotorid.mismatch.instrument.analyse import analyse_instrument
+from rotorid.mismatch.instrument.predict import prove as prove_reading
 from rotorid.mismatch.locate import locate
 from rotorid.mismatch.page import make_page
 from rotorid.mismatch.verdict import Verdict, make_verdict
@@ -27,13 +29,19 @@ def deliver(
 ) -> Verdict:
     """Analyse a set and write its verdict, its page and the improved vehicle."""
     progress(f"{recordings.name}: analysing {len(recordings.runs)} runs")
-    return write_files(analyse(recordings), verdict_path, page_path, improved_path, progress)
+    return write_files(analysis_of(recordings), verdict_path, page_path, improved_path, progress)
+
+
+def analysis_of(recordings: RecordingSet) -> Analysis:
+    """The analysis for the kind of the set."""
+    return analyse(recordings) if recordings.vehicle.kind == "flight" else analyse_instrument(recordings)
 
 
 def judge(recordings: RecordingSet) -> Verdict:
     """The verdict alone, without page and improved vehicle: what `verdict.json` would say."""
-    analysis = analyse(recordings)
-    return make_verdict(analysis, locate(analysis), forward_channels(analysis).channels)
+    analysis = analysis_of(recordings)
+    forward = forward_channels(analysis).channels if analysis.instrument is None else {}
+    return make_verdict(analysis, locate(analysis), forward)
 
 
 def write_files(
@@ -48,10 +56,15 @@ def write_files(
         path.parent.mkdir(parents=True, exist_ok=True)
     progress("locating")
     locations = locate(analysis)
-    progress("running the simulation forward")
-    write_vehicle(improved_vehicle(analysis), improved_path)
-    forward = forward_channels(analysis)
-    prove(analysis, read_vehicle(improved_path), forward)
+    improved = improved_vehicle(analysis)
+    write_vehicle(improved, improved_path)
+    if analysis.instrument is None:
+        progress("running the simulation forward")
+        forward = forward_channels(analysis)
+        prove(analysis, read_vehicle(improved_path), forward)
+    else:
+        forward = Forward({})
+        prove_reading(analysis, improved, read_vehicle(improved_path))
     verdict = make_verdict(analysis, locations, forward.channels)
     verdict_path.write_text(verdict.text(), encoding="utf-8")
     progress("drawing")

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from rotorid.effects.contract import Form
+from rotorid.effects.loading import Instrument, Loading
 from rotorid.recordings import RecordingSet, Split, Vehicle
 
 Status = Literal["established", "ambiguous", "absorbed", "not_established"]
@@ -93,5 +94,9 @@ class Analysis:
     next_separates: tuple[str, ...] = ()
     next_sigma: float = 0.0
     force_source: str = "accelerometer"
+    instrument: Instrument | None = None
+    """Kinds `stand` and `bench`: what is known of the instrument."""
+    loadings: tuple[Loading, ...] = ()
+    """Kinds `stand` and `bench`: loads and readings as analysed, rotor speeds as the improved model has them."""
     notes: tuple[str, ...] = field(default_factory=tuple)
     """Things a reader must know (what was derived, what was corrected)."""

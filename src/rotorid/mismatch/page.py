@@ -24,6 +24,7 @@ from rotorid.mismatch.verdict import (
     Location,
     Verdict,
     main_channel,
+    spoken,
 )
 from rotorid.mismatch.words import (
     FORWARD_WORDS,
@@ -60,7 +61,7 @@ def make_page(analysis: Analysis, verdict: Verdict, forward_notes: Sequence[str]
     shown, more = shown_locations(verdict.locations)
     known = {e.id for e in verdict.effects} | {n.id for n in verdict.not_testable}
     silent = [effect_words(i) for i in catalogue() if i not in known]
-    return environment.from_string(PAGE).render(
+    page = environment.from_string(PAGE).render(
         css=Markup(CSS),
         set=verdict.set,
         runs=runs_text(verdict),
@@ -90,6 +91,7 @@ def make_page(analysis: Analysis, verdict: Verdict, forward_notes: Sequence[str]
         next=next_text(verdict),
         notes=notes(analysis, forward_notes),
     )
+    return spoken(page, analysis)
 
 
 def pretty(text: str) -> Markup:
@@ -450,6 +452,11 @@ def value_range(name: str, believed: float, refitted: float, low: float, high: f
 def better_text(verdict: Verdict) -> str:
     if verdict.verdict == "no_mismatch":
         return "There is nothing to gain that these recordings could show."
+    if verdict.kind != "flight":
+        return (
+            "“Refitted” has the same physics with its values re-estimated; “improved” adds the effects found. All "
+            "compare the reading with what load, rotor speeds and weight predict."
+        )
     return (
         "“Refitted” has the same physics with its values re-estimated; “improved” adds the effects found. Forces, "
         "moments and rotor speeds compare inverse dynamics; the others compare simulation run forward for half a "

@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from rotorid.effects.contract import Form
+from rotorid.effects.loading import Loading
 from rotorid.mismatch.findings import Analysis, Finding
+from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.rows import project
@@ -16,8 +18,10 @@ HIGHEST_CUTOFF_HZ = 20.0
 GROUPS = ("force", "moment", "accelerometer", "gyroscope")
 
 
-def segments_of(analysis: Analysis) -> list[Segment]:
-    """Evenly sampled stretches of every run, as the analysis sees them."""
+def segments_of(analysis: Analysis) -> list[Segment] | list[Loading]:
+    """Evenly sampled stretches of every run, as the analysis sees them; loadings of a stand or bench."""
+    if analysis.instrument is not None:
+        return list(analysis.loadings)
     runs, vehicle = analysis.recordings.runs, analysis.believed
     rate_hz, cutoff_hz = analysis_rate_hz(runs, vehicle, HIGHEST_CUTOFF_HZ)
     return [s for run in runs for s in build_segments(run, vehicle, rate_hz, cutoff_hz)]
@@ -68,6 +72,9 @@ def effort(segments: list[Segment]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for segment in segments:
+        if isinstance(segment, Loading):
+            parts.setdefault(segment.run, []).append((segment.time_s, _changes(segment)))
+            continue
         motion = segment.motion
         given = [motion.rotor_acceleration, motion.angular_velocity, motion.angular_acceleration, motion.specific_force]
         squares = [np.zeros(motion.size) if g is None else (np.nan_to_num(g) ** 2).sum(axis=1) for g in given]
@@ -76,10 +83,22 @@ def effort(segments: list[Segment]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return {run: (np.concatenate([t for t, _ in p]), np.concatenate([e for _, e in p])) for run, p in parts.items()}
 
 
+def _changes(loading: Loading) -> np.ndarray:
+    """Squares of the rates of the loads and of the loads themselves, (n, 4)."""
+    rate = np.gradient(loading.load, loading.dt_s, axis=0) ** 2
+    size = (loading.load - loading.rest) ** 2
+    return np.stack([rate[:, :3].sum(1), rate[:, 3:].sum(1), size[:, :3].sum(1), size[:, 3:].sum(1)], axis=1)
+
+
 def _series(finding: Finding, segments: list[Segment], vehicle) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Channel group to instants (n,) and contribution (n, 3) over all stretches of a run."""
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for segment in segments:
+        if isinstance(segment, Loading):
+            added = np.nan_to_num(form_reading(finding.form, finding.values, segment, vehicle))
+            for group, values in (("force", added[:, :3]), ("moment", added[:, 3:])):
+                parts.setdefault(group, []).append((segment.time_s, values))
+            continue
         added = finding.form.contribution(segment.motion, vehicle, np.asarray(finding.values, float))
         for group, values in project(added, segment, vehicle, GROUPS).items():
             parts.setdefault(group, []).append((segment.motion.time_s, np.nan_to_num(values)))

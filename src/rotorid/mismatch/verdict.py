@@ -24,6 +24,7 @@ from rotorid.mismatch.words import (
     effect_words,
     listed,
     number,
+    on_the_ground,
     parameter_words,
     plus_minus,
     regime_words,
@@ -216,7 +217,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         kind=analysis.recordings.vehicle.kind,
         runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
         verdict=word,
-        sentence=plain_sentence(analysis, word, locations, channels),
+        sentence=spoken(plain_sentence(analysis, word, locations, channels), analysis),
         channels=channels,
         locations=tuple(locations),
         effects=tuple(effect_verdict(f) for f in analysis.findings),
@@ -237,6 +238,11 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             predicted_separation_sigma=analysis.next_sigma,
         ),
     )
+
+
+def spoken(text: str, analysis: Analysis) -> str:
+    """A text about flights as it is said of this kind of set."""
+    return text if analysis.recordings.vehicle.kind == "flight" else on_the_ground(text)
 
 
 def inverse_channels(analysis: Analysis) -> dict[str, Channel]:

@@ -29,6 +29,14 @@ REGIME_WORDS = {
     "battery_voltage_v": ("battery voltage", "V"),
     "voltage_v": ("battery voltage", "V"),
     "time_s": ("time", "s"),
+    "load_force_x": ("load along x", "N"),
+    "load_force_y": ("load along y", "N"),
+    "load_force_z": ("load along z", "N"),
+    "load_moment_x": ("moment of the load about x", "N m"),
+    "load_moment_y": ("moment of the load about y", "N m"),
+    "load_moment_z": ("moment of the load about z", "N m"),
+    "roll_rad": ("roll of the mount", "rad"),
+    "pitch_rad": ("pitch of the mount", "rad"),
 }
 """Regime variables in words, with their unit; any other is named from its column."""
 UNIT_SUFFIXES = (
@@ -53,9 +61,48 @@ PARAMETER_WORDS = {
     "inertia_xx_kg_m2": ("roll inertia", "kg m²"),
     "inertia_yy_kg_m2": ("pitch inertia", "kg m²"),
     "inertia_zz_kg_m2": ("yaw inertia", "kg m²"),
+    "reading_gain": ("gain of the reading", ""),
+    "reading_gain_x": ("gain of the reading along x", ""),
+    "reading_gain_y": ("gain of the reading along y", ""),
+    "reading_gain_z": ("gain of the reading along z", ""),
     "arm_scale": ("rotors' distances, as a factor on those believed,", ""),
     "rotor_speed_limits_rad_s": ("rotor speed at full throttle", "rad/s"),
 }
+
+
+GROUND_WORDS = (
+    ("on flights not used", "on runs not used"),
+    ("on the flight it was fitted to", "on the run it was fitted to"),
+    ("a flight not used", "a run not used"),
+    ("a flight that was fitted", "a run that was fitted"),
+    ("On held-out flight", "On held-out runs"),
+    ("half a second of flight", "half a second"),
+    ("on held-out flight", "on held-out runs"),
+    ("Error on fitted flight", "Error on fitted runs"),
+    ("does not depend on how it was flown", "does not depend on how it was loaded"),
+    ("What to fly next", "What to measure next"),
+    ("Faster, higher or rougher flight would show", "Larger, faster and returning loads would show"),
+    ("The believed vehicle describes", "The believed values describe"),
+    ("the believed vehicle describes", "the believed values describe"),
+    (
+        "Nothing was found that the believed vehicle leaves out.",
+        "Nothing was found that the believed values leave out.",
+    ),
+    ("forward force", "force along x"),
+    ("sideways force", "force along y"),
+    ("vertical force", "force along z"),
+    ("roll moment", "moment about x"),
+    ("pitch moment", "moment about y"),
+    ("yaw moment", "moment about z"),
+)
+"""What is said of flights, as it is said of a stand or bench."""
+
+
+def on_the_ground(text: str) -> str:
+    """A text about flights for a stand or bench."""
+    for flown, still in GROUND_WORDS:
+        text = text.replace(flown, still).replace(capital(flown), capital(still))
+    return text
 
 
 def channel_words(channel: str) -> str:

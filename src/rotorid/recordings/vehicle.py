@@ -83,6 +83,8 @@ class Vehicle(_Strict):
     rotor_speed_limits_rad_s: tuple[float, float] | None = None
     noise: Noise = Noise()
     trust: dict[str, float] = Field(default_factory=dict)
+    reading_gain: tuple[float, float, float] | None = None
+    """Factors of a bench's force readings by axis (`improved_vehicle.yaml` only)."""
     effects: tuple[dict[str, Any], ...] = ()
     """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""
 

@@ -18,7 +18,9 @@ from scipy.optimize import least_squares
 import rotorid.effects
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import COLUMNS_OF, LACK, Motion, SpeedPath, not_testable_reason
+from rotorid.effects.describe import EXAMPLE_STAND, EXCITATION
 from rotorid.effects.gust import window_form
+from rotorid.effects.loading import forms_of
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.prepare import make_terms
 from rotorid.mismatch.rows import form_columns, project, residual
@@ -75,6 +77,14 @@ def set_forms():
             yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
 
 
+def reading_forms():
+    """Every form of an instrument's own; what they add is held by `tests/unit/mismatch/test_instrument.py`."""
+    for effect in EFFECTS:
+        if effect.reading_forms is not None:
+            for form in forms_of(effect, EXAMPLE_STAND):
+                yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
+
+
 def flown_with(effect, form) -> list[Motion]:
     """True flights with the typical values of a form switched on."""
     return motions(fly(effect.id, form))
@@ -111,7 +121,10 @@ def test_an_effect_is_stated_in_full(effect):
     assert set(effect.confusers) <= set(catalogue()) - {effect.id}
     vehicle = audit_vehicle()
     acting = (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle))
-    assert acting or effect.form_named is not type(effect).form_named
+    read = forms_of(effect, EXAMPLE_STAND) if effect.reading_forms is not None else ()
+    # The steps of a reading are recognised from the readings themselves, without a form.
+    assert acting or read or effect.form_named is not type(effect).form_named or effect.id == "quantisation"
+    assert len({form.name for form in read}) == len(read)
     assert len({form.name for form in acting}) == len(acting)
     # The file says nothing of where it is used: the id is the file's name.
     assert (Path(__file__).parents[3] / "src/rotorid/effects" / f"{effect.id}.py").is_file()
@@ -128,6 +141,19 @@ def test_a_form_is_stated_in_full(effect, form):
         assert bool(p.starts) or not p.nonlinear, p.symbol
     for value, p in zip(getattr(form, "neutral", ()), form.parameters, strict=False):
         assert p.low <= value <= p.high
+
+
+@pytest.mark.parametrize(("effect", "form"), list(reading_forms()))
+def test_a_form_of_an_instrument_is_stated_in_full(effect, form):
+    assert "=" in form.equation and form.on_loading
+    assert len({p.symbol for p in form.parameters}) == len(form.parameters) > 0
+    for p in form.parameters:
+        assert p.unit and p.meaning, p.symbol
+        assert p.low < p.high and all(p.low <= s <= p.high for s in p.starts), p.symbol
+        # A gain of a reading may be anything; what is searched for needs an end and a start.
+        assert not p.nonlinear or (p.starts and np.isfinite([p.low, p.high]).all()), p.symbol
+    excitation = effect.excitation(form)
+    assert excitation and set(excitation) <= set(EXCITATION)
 
 
 @pytest.mark.parametrize(("effect", "form"), list(wrench_forms()))

@@ -1,0 +1,73 @@
+"""A low-pass of the amplifier, common to all channels."""
+
+import numpy as np
+from scipy.signal import bilinear, lfilter
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.creep import followed
+from rotorid.effects.loading import change_of_load
+
+
+def first_order(loading, vehicle, values):
+    """y = F / (1 + i f/f_c)."""
+    load = change_of_load(loading)
+    return Contribution(reading=followed_now(load, 1.0 / (2 * np.pi * max(values[0], 1e-3)), loading.dt_s) - load)
+
+
+def followed_now(load, tau_s, dt_s):
+    """The lag without the hold's delay of one sample: linear between samples."""
+    late = followed(load, tau_s, dt_s)
+    ratio = dt_s / max(tau_s, 1e-6)
+    share = 1.0 - np.exp(-ratio)
+    # First-order hold: y_k = y_(k-1) e^-r + x_(k-1) (share/r − e^-r) + x_k (1 − share/r).
+    weight = 1.0 - share / ratio
+    # `late` holds x_(k-1) over the sample; correct by the ramp to x_k.
+    step = np.diff(load, axis=0, prepend=np.zeros((1, load.shape[1])))
+    return late + lfilter([weight], [1.0, -(1.0 - share)], step, axis=0)
+
+
+def second_order(loading, vehicle, values):
+    """Butterworth of second order with cutoff f_c."""
+    load = change_of_load(loading)
+    w = 2 * np.pi * min(max(values[0], 1e-3), 0.45 / loading.dt_s)
+    w = 2 / loading.dt_s * np.tan(w * loading.dt_s / 2)
+    b, a = bilinear([w * w], [1.0, np.sqrt(2) * w, w * w], 1.0 / loading.dt_s)
+    return Contribution(reading=lfilter(b, a, load, axis=0) - load)
+
+
+def reading_forms(instrument):
+    lowest, highest = 1.0 / max(instrument.duration_s, 1.0), 0.4 * instrument.rate_hz
+    starts = tuple(f for f in (0.3, 0.8, 2.0, 5.0, 12.0, 30.0) if 3 * lowest < f < highest)
+    if not starts:
+        return ()
+    # What is late by less than a sample is a nuisance: 1/(2π f_c) or √2/(2π f_c) of at least two samples.
+    first, second = 0.08 * instrument.rate_hz, 0.11 * instrument.rate_hz
+
+    def cutoff(high):
+        own = tuple(f for f in starts if f < high)
+        return Parameter("f_c", "Hz", lowest, high, nonlinear=True, starts=own or (0.5 * high,), meaning="cutoff")
+
+    return (
+        Form("first order", "y = F / (1 + i f/f_c)", (cutoff(first),), first_order),
+        Form("second order", "|y| = |F| / √(1 + (f/f_c)⁴)", (cutoff(second),), second_order),
+    )
+
+
+EFFECT = Effect(
+    id="amplifier_filter",
+    name="the low-pass of the amplifier",
+    sentence="every channel follows changes of the load late and smoothed",
+    forms=lambda vehicle: (),
+    reading_forms=reading_forms,
+    source="catalogue B13",
+    sign="f_c is positive; every reading lags behind its load, more so the lower f_c, and no steady reading changes",
+    validity=(
+        "one linear low-pass from rest, alike on all channels, with its cutoff below 0.08 (first order) or "
+        "0.11 (second order) of the recording's rate; aliasing and unequal filters of the channels are left "
+        "out"
+    ),
+    excited_by=("load_change",),
+    confusers=("motor_lag", "delay", "creep"),
+    separating_manoeuvre="tap the stand with the motors off, or record rotor speeds",
+    kind="sensor",
+)

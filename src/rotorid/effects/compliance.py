@@ -1,0 +1,55 @@
+"""A bench or mount that bends under its load."""
+
+import numpy as np
+
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.loading import AXES, UNITS, cross_channels
+
+
+def _growing(loading):
+    """F|F|, (n, 6): an arm that gives way in proportion to the load turns and stretches the reading by it."""
+    return loading.load * np.abs(loading.load)
+
+
+def _form(name, pairs):
+    parameters = tuple(
+        Parameter(f"k_{AXES[t]},{AXES[s]}", f"{UNITS[t]}/({UNITS[s]})2", meaning="reading per square of the load")
+        for t, s in pairs
+    )
+    aside = tuple(i for i, (t, s) in enumerate(pairs) if t != s)
+    must = aside[:1] if len(aside) == 1 else ()
+    return Form(name, "y_i = F_i + k_ij F_j |F_j|", parameters, cross_channels(pairs, _growing), must_show=must)
+
+
+def reading_forms(instrument):
+    sources = tuple(s for s in instrument.loaded if s < 3)
+    forms = []
+    for s in sources:
+        targets = tuple(t for t in instrument.channels if t < 3 or not instrument.bench)
+        if len(targets) > 1:
+            forms.append(_form(f"under {AXES[s]}", tuple((t, s) for t in targets)))
+            aside = [t for t in targets if t != s and t < 3]
+            forms += [_form(f"under {AXES[s]}, towards {AXES[t]}", ((s, s), (t, s))) for t in aside]
+    if len(sources) > 1:
+        pairs = tuple((t, s) for s in sources for t in instrument.channels if t < 3)
+        forms.append(_form("under all forces", pairs))
+    return tuple(forms)
+
+
+EFFECT = Effect(
+    id="compliance",
+    name="the bending of the bench",
+    sentence="under load the structure gives way, so the error grows faster than the load and its direction turns",
+    forms=lambda vehicle: (),
+    reading_forms=reading_forms,
+    source="thesis 2.5 and 2.8: the PLA bench",
+    sign="positive k_ij: a load along +j reads further towards +i, by k_ij times its square",
+    validity=(
+        "deflections small and elastic, in proportion to the load, without delay; the stiffness of each "
+        "direction is taken as constant"
+    ),
+    excited_by=("load",),
+    confusers=("load_nonlinearity", "crosstalk"),
+    separating_manoeuvre="measure the deflection beside the load, or brace the structure and repeat",
+    kind="physics",
+)

@@ -1,0 +1,81 @@
+"""A reading that goes on growing for a while after a load has come on."""
+
+import numpy as np
+from numba import njit
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import change_of_load, one_per_channel
+
+
+@njit(cache=True)
+def _follow(load, share):
+    out = np.empty_like(load)
+    for j in range(load.shape[1]):
+        state = 0.0
+        for i in range(load.shape[0]):
+            out[i, j] = state
+            state += share * (load[i, j] - state)
+    return out
+
+
+def followed(load, tau_s, dt_s):
+    """First-order lag of (n, k) from rest, exact for loads that hold over a sample."""
+    return _follow(np.ascontiguousarray(load), 1.0 - np.exp(-dt_s / max(tau_s, 1e-6)))
+
+
+def creeping(loading, tau_s):
+    """What creep adds per unit of its share, (n, 6)."""
+    return followed(change_of_load(loading), tau_s, loading.dt_s)
+
+
+def all_alike(loading, vehicle, values):
+    """y = F + c LP(F), the share alike on all channels."""
+    return Contribution(reading=values[0] * creeping(loading, values[1]))
+
+
+def _own(channels):
+    def contribution(loading, vehicle, values):
+        reading = np.zeros((loading.size, 6))
+        reading[:, list(channels)] = creeping(loading, values[-1])[:, list(channels)] * np.asarray(values[:-1])
+        return Contribution(reading=reading)
+
+    return contribution
+
+
+def reading_forms(instrument):
+    span = instrument.duration_s
+    shortest = max(0.5, 10.0 / instrument.rate_hz)
+    if span < 4 * shortest:
+        return ()
+    starts = tuple(t for t in (1.5, 6.0, 25.0, 100.0, 400.0) if shortest <= t <= span) or (0.5 * span,)
+    tau = Parameter("t_c", "s", shortest, 3 * span, nonlinear=True, starts=starts, meaning="time constant")
+    share = Parameter("c", "1", 0.0, 0.3, meaning="share of the load")
+    text = "y = F + c (F after a lag of t_c)"
+    forms = [Form("alike on all channels", text, (share, tau), all_alike)]
+    loaded = tuple(c for c in instrument.channels if c in instrument.loaded)
+    if len(loaded) > 1:
+        own = one_per_channel("c", "1", loaded, low=-0.05, high=0.3, meaning="share of the load")
+        forms.append(Form("own on each channel", text, (*own, tau), _own(loaded)))
+    return tuple(forms)
+
+
+EFFECT = Effect(
+    id="creep",
+    name="creep of the sensor",
+    sentence="after each change of load the reading creeps on in the same direction",
+    forms=lambda vehicle: (),
+    reading_forms=reading_forms,
+    source="catalogue B2",
+    sign=(
+        "positive c: the reading goes on in the direction of the change of load, by c of it in the end, and "
+        "comes back likewise after unloading"
+    ),
+    validity=(
+        "one exponential with one time constant, linear in the load, from rest; several time constants at "
+        "once and a change with temperature are left out"
+    ),
+    excited_by=("load_change",),
+    confusers=("zero_drift", "wall_interference", "battery_sag", "amplifier_filter"),
+    separating_manoeuvre="hold a weight for minutes, take it off and go on recording",
+    kind="sensor",
+)

@@ -1,0 +1,122 @@
+"""A reading that depends on whether the load came from below or from above."""
+
+import numpy as np
+from numba import njit
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import AXES, UNITS, change_of_load, cross_channels, on_channels, one_per_channel
+
+HALF = "half the height of the loop"
+NARROW, WIDE = 0.02, 0.15
+"""Half widths of the play as shares of the largest load."""
+
+
+@njit(cache=True)
+def _play(load, width):
+    out = np.empty_like(load)
+    state = 0.0
+    for i in range(len(load)):
+        state = min(max(state, load[i] - width), load[i] + width)
+        out[i] = state
+    return out
+
+
+def play(load, width):
+    """Play (backlash) of half width `width` that follows a load (n,) from zero, (n,)."""
+    return _play(np.ascontiguousarray(load), width)
+
+
+def branches(instrument, share):
+    """Branch of each channel between −1 (load falling) and 1 (rising), (n, 6), by the play operator."""
+
+    def signal(loading):
+        load = change_of_load(loading)
+        out = np.zeros_like(load)
+        for c in instrument.loaded:
+            width = share * instrument.largest[c]
+            out[:, c] = (load[:, c] - play(load[:, c], width)) / width
+        return out
+
+    return signal
+
+
+def lens(instrument, share):
+    """The same loop, zero at no load and at the largest: what a spring of metal does, (n, 6)."""
+    branch = branches(instrument, share)
+
+    def signal(loading):
+        part = np.abs(change_of_load(loading)) / np.array(instrument.largest)
+        return branch(loading) * 4.0 * part * np.clip(1.0 - part, 0.0, 1.0)
+
+    return signal
+
+
+def reading_forms(instrument):
+    loaded = tuple(c for c in instrument.channels if c in instrument.returns)
+    if not loaded:
+        return ()
+    text = "y = F + h (branch of F: 1 rising, −1 falling)"
+    forms = []
+    for name, share in (("narrow", NARROW), ("wide", WIDE)):
+        forms.append(on_channels(f"{name} play", text, "h", "{}", loaded, branches(instrument, share), meaning=HALF))
+        forms.append(
+            on_channels(
+                f"{name} lens", text + " × 4 f (1 − f)", "h", "{}", loaded, lens(instrument, share), meaning=HALF
+            )
+        )
+        if 1 < len(loaded) <= 3:
+            for c in loaded:
+                own = one_per_channel("h", "{}", (c,), meaning=HALF)
+                for shape, signal in (("play", branches(instrument, share)), ("lens", lens(instrument, share))):
+                    forms.append(Form(f"{name} {shape} of {AXES[c]}", text, own, cross_channels(((c, c),), signal)))
+    shares = tuple(Parameter(f"h_{n}", "1", meaning=HALF + " by the largest load") for n in ("narrow", "wide"))
+    forms.append(Form("two plays, alike on all channels", text, shares, _alike(instrument, loaded)))
+    if len(loaded) == 1:
+        own = tuple(Parameter(f"h_{n}", UNITS[loaded[0]], meaning=HALF) for n in ("narrow", "wide"))
+        forms.append(Form("two plays", text, own, _two_plays(instrument, loaded[0])))
+    return tuple(forms)
+
+
+def _alike(instrument, loaded):
+    signals = [branches(instrument, share) for share in (NARROW, WIDE)]
+    scale = np.zeros(6)
+    scale[list(loaded)] = np.array(instrument.largest)[list(loaded)]
+
+    def contribution(loading, vehicle, values):
+        return Contribution(reading=sum(v * s(loading) for v, s in zip(values, signals, strict=True)) * scale)
+
+    return contribution
+
+
+def _two_plays(instrument, channel):
+    signals = [branches(instrument, share) for share in (NARROW, WIDE)]
+
+    def contribution(loading, vehicle, values):
+        reading = np.zeros((loading.size, 6))
+        reading[:, channel] = sum(v * s(loading)[:, channel] for v, s in zip(values, signals, strict=True))
+        return Contribution(reading=reading)
+
+    return contribution
+
+
+EFFECT = Effect(
+    id="hysteresis",
+    name="hysteresis of the sensor",
+    sentence="at the same load the reading differs between loading and unloading",
+    forms=lambda vehicle: (),
+    reading_forms=reading_forms,
+    source="catalogue B3",
+    sign=(
+        "positive h: at the same load the reading is higher by h while the load rises (towards +) and lower "
+        "by h while it falls; negative h is a reading that hangs behind its load"
+    ),
+    validity=(
+        "a loop independent of the rate of loading, by play operators whose half widths are 2 and 15 per cent "
+        "of the largest load; shows only where loads come back from above, and what was loaded before the run "
+        "is not known"
+    ),
+    excited_by=("load_change",),
+    confusers=("creep", "amplifier_filter", "motor_lag"),
+    separating_manoeuvre="load up and down in the same steps at two rates",
+    kind="sensor",
+)

@@ -1,0 +1,63 @@
+"""A reading that is not proportional to the load on its own axis."""
+
+import numpy as np
+
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.loading import AXES, UNITS, cross_channels
+
+CURVE = "curvature of the characteristic"
+
+
+def reading_forms(instrument):
+    loaded = tuple(c for c in instrument.channels if c in instrument.loaded)
+    forms = []
+    shapes = (
+        ("square", "y = F + a_2 F²", "a_2", "1/({})", lambda x: x.load**2),
+        ("odd square", "y = F + a_2 F|F|", "a_2", "1/({})", lambda x: x.load * np.abs(x.load)),
+        ("cube", "y = F + a_3 F³", "a_3", "1/({})2", lambda x: x.load**3),
+    )
+    groups = [(loaded, "")] + [((c,), f" of {AXES[c]}") for c in loaded if len(loaded) > 1 and c < 3]
+    for group, suffix in groups:
+        if not group:
+            continue
+        pairs = tuple((c, c) for c in group)
+        for name, text, symbol, unit, signal in shapes:
+            own = tuple(Parameter(f"{symbol}_{AXES[c]}", unit.format(UNITS[c]), meaning=CURVE) for c in group)
+            forms.append(Form(name + suffix, text, own, cross_channels(pairs, signal)))
+        both = tuple(Parameter(f"a_2_{AXES[c]}", f"1/({UNITS[c]})", meaning=CURVE) for c in group) + tuple(
+            Parameter(f"a_3_{AXES[c]}", f"1/({UNITS[c]})2", meaning=CURVE) for c in group
+        )
+        forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
+    return tuple(forms)
+
+
+def _both(pairs):
+    square, cube = cross_channels(pairs, lambda x: x.load**2), cross_channels(pairs, lambda x: x.load**3)
+
+    def contribution(loading, vehicle, values):
+        first, second = square(loading, vehicle, values[: len(pairs)]), cube(loading, vehicle, values[len(pairs) :])
+        return type(first)(reading=first.reading + second.reading)
+
+    return contribution
+
+
+EFFECT = Effect(
+    id="load_nonlinearity",
+    name="a curved characteristic of the sensor",
+    sentence="the reading's error grows with the load on the same axis, faster than in proportion",
+    forms=lambda vehicle: (),
+    reading_forms=reading_forms,
+    source="catalogue B4",
+    sign=(
+        "positive a_2 of the square raises the reading under a load of either sign; positive a of the odd "
+        "square and of the cube make it too large in magnitude"
+    ),
+    validity=(
+        "a static curve of each channel by the load on its own axis, inside the loads recorded; the linear "
+        "gain is the calibration's and no part of it"
+    ),
+    excited_by=("load",),
+    confusers=("thrust_curve", "compliance", "hysteresis"),
+    separating_manoeuvre="load with dead weights over the whole range, motors off",
+    kind="sensor",
+)

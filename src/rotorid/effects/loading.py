@@ -1,0 +1,193 @@
+"""What an instrument (kind `stand` or `bench`) went through, and what a form of its effects is evaluated on.
+
+A stand carries a vehicle on a six-axis sensor and reads the wrench that the vehicle exerts on it; a bench is loaded
+with known forces. Either way there is a load that the believed values predict, and a reading. Readings and loads are
+(n, 6): force_x … moment_z, N and N m, sensor axes; a channel that is not recorded is NaN in the reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter
+from rotorid.recordings.vehicle import Vehicle
+
+CHANNELS = tuple(f"{g}_{a}" for g in ("force", "moment") for a in "xyz")
+UNITS = ("N", "N", "N", "N m", "N m", "N m")
+AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+REST_S = 3.0
+"""A gap in the recording longer than this is taken as the load having been off."""
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What is known of an instrument and its set before any number is fitted."""
+
+    vehicle: Vehicle
+    channels: tuple[int, ...]
+    """Channels that are recorded, numbers in `CHANNELS`."""
+    loaded: tuple[int, ...]
+    """Channels whose load varies by more than a twentieth of the largest of their kind."""
+    rate_hz: float
+    duration_s: float
+    """Of the longest stretch without a gap."""
+    run_s: float
+    """Of the longest run, gaps and all."""
+    runs: tuple[str, ...]
+    training: tuple[str, ...] = ()
+    """Runs that are fitted; empty for all."""
+    largest: tuple[float, ...] = (1.0,) * 6
+    """Largest load of each channel, N and N m."""
+    tilts: bool = False
+    """Whether the mount's attitude differs between runs or within one."""
+    temperature: bool = False
+    """Whether a temperature is recorded that changes."""
+    returns: tuple[int, ...] = ()
+    """Channels whose load also comes back from above to values that are not zero."""
+    by_hand: bool = False
+    """Whether loads were put on by hand, so that nothing that happens within seconds can be told from that."""
+    distance: str = ""
+    """Name of an unknown column that is a distance to a wall or fixture."""
+
+    @property
+    def bench(self) -> bool:
+        return self.vehicle.kind == "bench"
+
+
+@dataclass(frozen=True)
+class Loading:
+    """Even samples of one run without a gap."""
+
+    run: str
+    time_s: np.ndarray
+    run_time_s: np.ndarray
+    """Time since the run's first sample, s."""
+    load: np.ndarray
+    """Wrench that the believed values predict at the sensor, (n, 6)."""
+    reading: np.ndarray
+    """Wrench as read, (n, 6)."""
+    rest: np.ndarray
+    """Load before the first sample as far as known, (6,): the weight on an untared stand, else nothing."""
+    motion: Motion
+    """Rotor speeds and what acts on them; empty on a bench."""
+    attitude: tuple[np.ndarray, np.ndarray] | None = None
+    """Roll and pitch of the mount, (n,) each, rad."""
+    temperature: np.ndarray | None = None
+    """Change of temperature since the run's first sample, (n,), K."""
+    distance: np.ndarray | None = None
+    """Distance to a wall or fixture, (n,), m."""
+    command: np.ndarray | None = None
+    """Commanded rotor speeds (throttle times full speed), (n, k), rad/s."""
+    measured: bool = True
+    """Whether the rotor speeds were measured (not commanded)."""
+    keep: np.ndarray | None = None
+    """Mask of the samples to be compared, (n,); None for all."""
+    extra: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def dt_s(self) -> float:
+        return float(self.time_s[1] - self.time_s[0])
+
+    def with_load(self, load: np.ndarray) -> Loading:
+        return replace(self, load=load)
+
+
+def rotation_of(roll: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """Body vectors into level axes for roll and pitch (n,), rad, shape (n, 3, 3): R_y(pitch) R_x(roll)."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    zero = np.zeros_like(cr)
+    return np.stack(
+        [
+            np.stack([cp, sp * sr, sp * cr], axis=-1),
+            np.stack([zero, cr, -sr], axis=-1),
+            np.stack([-sp, cp * sr, cp * cr], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+def turned(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """R v at every instant, (n, 3)."""
+    return np.einsum("nij,nj->ni", rotation, np.broadcast_to(vectors, (len(rotation), 3)))
+
+
+def at_sensor(force: np.ndarray | None, moment: np.ndarray | None, motion: Motion, vehicle: Vehicle) -> np.ndarray:
+    """A wrench about the body's origin as the sensor reads it, (n, 6): moved to the sensor, turned if it stays level.
+
+    M_s = M − r_s × F, r_s = `sensor_position_m` in body axes.
+    """
+    force = np.zeros((motion.size, 3)) if force is None else force
+    moment = np.zeros((motion.size, 3)) if moment is None else moment
+    moment = moment - np.cross(np.array(vehicle.sensor_position_m), force)
+    if vehicle.sensor_mount == "level" and motion.rotation is not None:
+        force, moment = turned(motion.rotation, force), turned(motion.rotation, moment)
+    return np.concatenate([force, moment], axis=1)
+
+
+def weight(motion: Motion, vehicle: Vehicle, arm_m: np.ndarray | None = None) -> np.ndarray:
+    """Reading of the vehicle's weight acting at `arm_m` (body axes, default the origin), (n, 6)."""
+    down = np.array([0.0, 0.0, vehicle.mass_kg * vehicle.gravity_m_s2])
+    if motion.rotation is None:
+        force = np.broadcast_to(down, (motion.size, 3))
+    else:
+        force = turned(np.swapaxes(motion.rotation, 1, 2), down)
+    arm = np.zeros(3) if arm_m is None else np.asarray(arm_m, float)
+    return at_sensor(force, np.cross(arm, force), motion, vehicle)
+
+
+def one_per_channel(name: str, unit: str, channels: tuple[int, ...], **limits) -> tuple[Parameter, ...]:
+    """A parameter for each channel, `name_Fx` …; `unit` takes the channel's unit in place of `{}`."""
+    return tuple(Parameter(f"{name}_{AXES[c]}", unit.format(UNITS[c]), **limits) for c in channels)
+
+
+def on_channels(
+    name: str,
+    equation: str,
+    symbol: str,
+    unit: str,
+    channels: tuple[int, ...],
+    signal: Callable[[Loading], np.ndarray],
+    **limits,
+) -> Form:
+    """A form that adds the same signal (n,), or its own column of (n, 6), to each channel with its own coefficient."""
+
+    def contribution(loading: Loading, vehicle: Vehicle, values) -> Contribution:
+        s = signal(loading)
+        reading = np.zeros((loading.size, 6))
+        for c, value in zip(channels, values, strict=True):
+            reading[:, c] = value * (s if s.ndim == 1 else s[:, c])
+        return Contribution(reading=reading)
+
+    return Form(name, equation, one_per_channel(symbol, unit, channels, **limits), contribution)
+
+
+def cross_channels(pairs: tuple[tuple[int, int], ...], signal: Callable[[Loading], np.ndarray]):
+    """Contribution of signal[:, source] with its own coefficient on each target, for pairs (target, source)."""
+
+    def contribution(loading: Loading, vehicle: Vehicle, values) -> Contribution:
+        s = signal(loading)
+        reading = np.zeros((loading.size, 6))
+        for (target, source), value in zip(pairs, values, strict=True):
+            reading[:, target] += value * s[:, source]
+        return Contribution(reading=reading)
+
+    return contribution
+
+
+def forms_of(effect: Effect, instrument: Instrument) -> tuple[Form, ...]:
+    """Forms of an effect on an instrument; those for a flight hold on a stand, not on a bench."""
+    if effect.reading_forms is not None:
+        return tuple(replace(form, on_loading=True) for form in effect.reading_forms(instrument))
+    return () if instrument.bench else effect.forms(instrument.vehicle)
+
+
+def change_of_load(loading: Loading) -> np.ndarray:
+    """Load less what rested on the sensor before, (n, 6)."""
+    return loading.load - loading.rest

@@ -1,0 +1,59 @@
+"""A stand that rings at a frequency of its own."""
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import change_of_load
+
+
+def resonance(signal, frequency_hz, damping, dt_s):
+    """ω_n²/(s² + 2 ζ ω_n s + ω_n²) on (n, k), exact for inputs that are linear between samples, from rest."""
+    w = 2 * np.pi * max(frequency_hz, 1e-3)
+    b, a, _ = cont2discrete(([w * w], [1.0, 2 * max(damping, 1e-4) * w, w * w]), dt_s, method="foh")
+    return lfilter(b[0], a, signal, axis=0)
+
+
+def ringing(loading, vehicle, values):
+    """y = H(s) F, so y − F = (H − 1) F."""
+    load = change_of_load(loading)
+    return Contribution(reading=resonance(load, values[0], values[1], loading.dt_s) - load)
+
+
+def reading_forms(instrument):
+    highest = 0.4 * instrument.rate_hz
+    starts = tuple(
+        f for f in (3.0, 5.0, 8.0, 12.0, 18.0, 26.0, 38.0, 55.0) if f < highest and f > 4 / instrument.duration_s
+    )
+    if not starts:
+        return ()
+    return (
+        Form(
+            "second order",
+            "y = f_n² F / (f_n² − f² + 2 i ζ f_n f)",
+            (
+                Parameter("f_n", "Hz", 0.5, highest, nonlinear=True, starts=starts, meaning="natural frequency"),
+                Parameter("zeta", "1", 0.001, 0.6, nonlinear=True, starts=(0.05,), meaning="damping ratio"),
+            ),
+            ringing,
+        ),
+    )
+
+
+EFFECT = Effect(
+    id="structural_resonance",
+    name="a resonance of the structure",
+    sentence="after each change of load the reading rings at one fixed frequency",
+    forms=lambda vehicle: (),
+    reading_forms=reading_forms,
+    source="catalogue B8",
+    sign="f_n and ζ are positive; no steady reading changes, a step overshoots by exp(−π ζ/√(1 − ζ²))",
+    validity=(
+        "one linear mode alike on all channels, from rest, below 0.4 of the recording's rate; further modes "
+        "and their coupling are left out"
+    ),
+    excited_by=("load_change",),
+    confusers=("motor_lag", "amplifier_filter"),
+    separating_manoeuvre="tap the stand with the motors off and look at the ringing",
+    kind="physics",
+)

@@ -1,0 +1,82 @@
+"""Air that a wall or fixture throws back into the rotor."""
+
+import numpy as np
+
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.creep import followed
+from rotorid.effects.loading import at_sensor
+from rotorid.effects.scale import rotor_radius_m
+
+
+def thrust_part(gain, loading, vehicle):
+    """Reading of the believed thrust times a gain (n, k)."""
+    thrust = vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2 * gain
+    hubs = vehicle.rotor_positions_m()
+    force, moment = np.zeros((loading.size, 3)), np.zeros((loading.size, 3))
+    force[:, 2] = -thrust.sum(axis=1)
+    moment[:, 0], moment[:, 1] = -thrust @ hubs[:, 1], thrust @ hubs[:, 0]
+    return at_sensor(force, moment, loading.motion, vehicle)
+
+
+def recirculation(loading, vehicle, values):
+    """T_i = (1 − c LP_τ) C_F ω_i²: air takes τ to come round, then the rotor works in its own wake."""
+    thrust = vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2
+    gain = -values[0] * followed(thrust, values[1], loading.dt_s) / np.maximum(thrust, 1e-9)
+    return Contribution(reading=thrust_part(np.where(thrust > 1e-9, gain, 0.0), loading, vehicle))
+
+
+def by_distance(loading, vehicle, values):
+    """T_i = (1 + c (R/d)²) C_F ω_i², d the distance to the wall."""
+    ratio = (rotor_radius_m(vehicle) / np.maximum(loading.distance, 1e-3)) ** 2
+    return Contribution(reading=thrust_part(values[0] * ratio[:, None], loading, vehicle))
+
+
+def reading_forms(instrument):
+    if instrument.bench:
+        return ()
+    forms = []
+    span, shortest = instrument.duration_s, max(0.5, 10.0 / instrument.rate_hz)
+    if span > 4 * shortest:
+        starts = tuple(t for t in (2.0, 6.0, 15.0, 40.0) if shortest <= t <= span) or (0.5 * span,)
+        forms.append(
+            Form(
+                "recirculation",
+                "T = C_F ω² − c (C_F ω² after a lag of τ)",
+                (
+                    Parameter("c", "1", 0.0, 0.5, meaning="share of the thrust"),
+                    Parameter(
+                        "tau", "s", shortest, 3 * span, nonlinear=True, starts=starts, meaning="time to come round"
+                    ),
+                ),
+                recirculation,
+                ("rotor_speed",),
+            )
+        )
+    if instrument.distance:
+        forms.append(
+            Form(
+                "by distance",
+                "T = C_F ω² (1 + c (R/d)²)",
+                (Parameter("c", "1", -20.0, 20.0, meaning="gain of thrust at d = R"),),
+                by_distance,
+            )
+        )
+    return tuple(forms)
+
+
+EFFECT = Effect(
+    id="wall_interference",
+    name="air thrown back by a wall",
+    sentence="thrust falls off within seconds of spinning up, or changes with the distance of a wall",
+    forms=lambda vehicle: (),
+    reading_forms=reading_forms,
+    source="catalogue B12",
+    sign="positive c of the recirculation takes thrust away; positive c by distance adds thrust near the wall",
+    validity=(
+        "R/d well below 1 for the form by distance; one time constant of the recirculating air and a loss "
+        "alike on all rotors; the torque is taken as unchanged"
+    ),
+    excited_by=("rotor_speed",),
+    confusers=("battery_sag", "creep", "ground_effect"),
+    separating_manoeuvre="turn the propeller round (puller, pusher), or move the wall and repeat",
+)

@@ -1,0 +1,214 @@
+"""From a recording set of kind `stand` or `bench` to what is off in it, in the same form as for a flight.
+
+1. mistakes in the set, 2. what lies between command and rotor speed, 3. the grouped search over everything that acts
+on the load or on its reading, with the believed values free, 4. nonlinear parameters refined, 5. a word on each id.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.loading import CHANNELS, UNITS
+from rotorid.mismatch.analyse import changed_vehicle, throttle_or_thrust
+from rotorid.mismatch.decide import WIDEST_TRUST, wrong_values
+from rotorid.mismatch.findings import Analysis, Finding, Trace
+from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
+from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
+from rotorid.mismatch.instrument.decide import findings_of
+from rotorid.mismatch.instrument.mistakes import find_mistakes
+from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
+from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
+from rotorid.mismatch.instrument.sampling import quantisation
+from rotorid.mismatch.instrument.setup import Setup, set_up
+from rotorid.mismatch.select import Selection
+from rotorid.recordings import RecordingSet, Vehicle
+
+ABSORBED_P = 1e-6
+ABSORBED_GAIN = 50.0
+
+
+def analyse_instrument(recordings: RecordingSet) -> Analysis:
+    """The whole analysis of a set of kind `stand` or `bench`."""
+    recordings, findings, remarks = find_mistakes(recordings)
+    setup = set_up(recordings)
+    terms, reasons = make_terms(setup)
+    measured = all(x.measured for x in setup.loadings)
+    chain = find_chain(setup)
+    model = fitted_model(setup, terms, loadings=None if chain is None or measured else moved(setup, chain))
+    if chain is not None and not measured and model.selection.active:
+        # What was found at the reading changes what the commands must explain: once more with it known.
+        others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
+        chain = find_chain(setup, others)
+        model = fitted_model(setup, terms, model.selection.active, moved(setup, chain))
+    if chain is None:
+        reasons.update({k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in SPEED_IDS})
+    else:
+        findings += chain.findings
+        why = supply_reason(setup)
+        if why is not None:
+            reasons["battery_sag"] = why
+    found = findings_of(model)
+    findings += found if measured else [throttle_or_thrust(f) for f in found]
+    coarse, why = quantisation(setup, model.noise)
+    if coarse is not None:
+        findings.append(coarse)
+    elif why:
+        reasons["quantisation"] = why
+
+    def size(key: str, change: float) -> float:
+        return float(model.search.sizes_of(key, np.array([change])).max())
+
+    values = wrong_values(model.regression, model.search, model.selection, None, size)
+    nothing = Selection([], model.selection.fit)
+    plain = wrong_values(model.regression, model.search, nothing, None, size)
+    findings += absorbed(model, values, findings)
+    traces, before, after = make_traces(setup, model, plain, values)
+    next_step, separates, sigma = next_experiment(findings, model)
+    p_before, p_after, depends = dependence(model, before, after)
+    share, channels, description = leftover(model, before, after, p_after, depends)
+    known = {f.id for f in findings if f.status in ("established", "ambiguous")}
+    return Analysis(
+        recordings=recordings,
+        split=setup.split,
+        believed=setup.vehicle,
+        refitted=improved(setup.vehicle, plain),
+        improved=with_full_speed(improved(setup.vehicle, values), setup, chain),
+        findings=tuple(findings),
+        values=named_values(setup, values) | full_speed_value(setup, chain),
+        not_testable={k: v for k, v in reasons.items() if k not in known},
+        traces=traces + (speed_traces(setup, chain) if chain is not None and measured else ()),
+        noise_floor=noise_floors(setup, model, chain),
+        p_values={c: (p_before[c], p_after[c]) for c in p_before},
+        regimes=regimes(model),
+        unexplained_share=share,
+        unexplained_channels=channels,
+        unexplained_depends_on=tuple(depends),
+        unexplained_description=description,
+        next_manoeuvre=next_step,
+        next_separates=separates,
+        next_sigma=sigma,
+        force_source="sensor",
+        instrument=setup.instrument,
+        loadings=model.loadings,
+        notes=(*remarks, *notes_of(setup)),
+    )
+
+
+def with_full_speed(vehicle: Vehicle, setup: Setup, chain: ChainResult | None) -> Vehicle:
+    """The vehicle with the speed at full throttle where that was estimated."""
+    if chain is None or not setup.estimated_full_speed:
+        return vehicle
+    return vehicle.model_copy(update={"rotor_speed_limits_rad_s": (0.0, chain.full_speed)})
+
+
+def full_speed_value(setup: Setup, chain: ChainResult | None) -> dict[str, tuple[float, float, float, float]]:
+    """The speed at full throttle, nothing believed, where no limits are stated."""
+    if chain is None or not setup.estimated_full_speed:
+        return {}
+    full, reach = chain.full_speed, 1.96 * chain.full_speed_sd
+    return {"rotor_speed_limits_rad_s": (float("nan"), full, full - reach, full + reach)}
+
+
+def noise_floors(setup: Setup, model: ReadingModel, chain: ChainResult | None) -> dict[str, float]:
+    """Noise of each channel."""
+    out = {CHANNELS[c]: float(model.noise[c]) for c in setup.instrument.channels}
+    if chain is not None and chain.noise_rad_s is not None:
+        out |= {f"rotor_speed_{i + 1}": chain.noise_rad_s for i in range(setup.vehicle.rotor_count)}
+    return out
+
+
+def notes_of(setup: Setup) -> list[str]:
+    """What a reader must know of how the readings were used."""
+    notes = []
+    if setup.settling_s:
+        notes.append(
+            f"Loads were put on by hand: readings are left out for {setup.settling_s:.1f} s after each change, because "
+            "they differ from one time to the next by more than their noise."
+        )
+    if setup.average > 1:
+        notes.append(f"Readings are averaged over {setup.average} samples.")
+    if setup.steady_points:
+        notes.append("The recordings are steady points: nothing that takes time can be seen in them.")
+    return notes
+
+
+def next_experiment(findings: list[Finding], model: ReadingModel) -> tuple[str, tuple[str, ...], float]:
+    """What to measure to tell the alternatives of the surest open class apart.
+
+    The separation predicted is how many standard errors the effect itself has in these data: an experiment in which
+    the alternatives act apart would show it about as clearly.
+    """
+    open_ones = sorted((f for f in findings if f.status == "ambiguous"), key=lambda f: f.p_value)
+    if not open_ones:
+        return "", (), 0.0
+    first = open_ones[0]
+    known = [e for e in first.parameters if e.high > e.low]
+    sigma = max((abs(e.value) / ((e.high - e.low) / 3.92) for e in known), default=0.0)
+    return catalogue()[first.id].separating_manoeuvre, first.alternatives, float(sigma)
+
+
+def improved(vehicle: Vehicle, values: dict[str, tuple[float, float]]) -> Vehicle:
+    """The vehicle with values changed."""
+    changed = changed_vehicle(vehicle, {k: v[0] for k, v in values.items() if not k.startswith("gain")})
+    gain = [1.0 + sum(v[0] for k, v in values.items() if k in ("gain", f"gain_{a}")) for a in "xyz"]
+    return changed if gain == [1.0, 1.0, 1.0] else changed.model_copy(update={"reading_gain": tuple(gain)})
+
+
+def named_values(setup: Setup, values: dict) -> dict[str, tuple[float, float, float, float]]:
+    """Wrong values under the contract's names: believed, refitted and its interval."""
+    out = {}
+    for key, (relative, sd) in values.items():
+        believed = believed_value(setup.vehicle, key)
+        out[VALUE_NAMES[key]] = tuple(
+            float(believed * (1 + x)) for x in (0.0, relative, relative - 1.96 * sd, relative + 1.96 * sd)
+        )
+    return out
+
+
+def believed_value(vehicle: Vehicle, key: str) -> float:
+    """The number that a value's name stands for; 1 for a factor."""
+    if key == "mass":
+        return vehicle.mass_kg
+    if key == "thrust":
+        return float(vehicle.thrust_coefficients_n_s2().mean())
+    return float(vehicle.torque_coefficients_n_m_s2().mean()) if key == "torque" else 1.0
+
+
+def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list[Finding]:
+    """Effects that look significant while the wrong values are held at their belief, and vanish with them."""
+    if not values:
+        return []
+    search, regression = model.search, model.regression
+    held = [k for k in search.always if k not in values]
+    base = regression.fit(held + model.selection.active)
+    taken, out = {f.id for f in findings}, {}
+    for term in regression.terms:
+        if term.kind != "effect" or term.effect in taken or term.effect in out:
+            continue
+        fit = regression.fit([*held, *model.selection.active, term.key])
+        p = regression.wald(fit, regression.columns([term.key]), search.blocks)
+        if p < ABSORBED_P and fit.gain - base.gain > ABSORBED_GAIN:
+            name = catalogue()[term.effect].name
+            text = f"{name} looked significant with the believed values; the refitted values explain it"
+            out[term.effect] = Finding(id=term.effect, status="absorbed", sentence=text, p_value=p)
+    return list(out.values())
+
+
+def make_traces(setup: Setup, model: ReadingModel, plain: dict, values: dict):
+    """Traces, and residuals (n, 6) of every stretch before and after: values named are changed, others as believed."""
+    regression = model.regression
+    nuisance = [t.key for t in regression.terms if t.kind == "nuisance"]
+    loose = {k: WIDEST_TRUST for k in (*plain, *values)}
+    only = regression.fit(nuisance + list(plain), loose=loose)
+    full = regression.fit(nuisance + list(values) + model.selection.active, loose=loose)
+    traces, before, after = [], [], []
+    for r in model.rows:
+        y = np.nan_to_num(r.y)
+        refitted = y - r.x[:, :, only.columns] @ only.beta
+        left = y - r.x[:, :, full.columns] @ full.beta
+        before.append(y)
+        after.append(left)
+        for c in setup.instrument.channels:
+            traces.append(Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], refitted[:, c], left[:, c]))
+    return tuple(traces), before, after

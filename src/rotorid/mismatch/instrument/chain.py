@@ -1,0 +1,564 @@
+"""What lies between command and rotor speed on a stand: lag, delay, throttle curve, sag, saturation.
+
+Where speeds are measured beside the commands they are the response; where only commands or throttles are recorded
+the response is the wrench, with a constant for each channel and the reading's effects found so far left free. A chain
+of speed forms is grown one id at a time by nonlinear least squares on whitened residuals; tests and intervals are
+block-robust.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+from scipy.stats import f as f_distribution
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import SpeedForm, SpeedPath
+from rotorid.effects.loading import Loading, forms_of
+from rotorid.mismatch.findings import Estimate, Finding, Trace
+from rotorid.mismatch.instrument.columns import form_reading
+from rotorid.mismatch.instrument.predict import full_voltage_of
+from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces_of, with_speed
+from rotorid.mismatch.prepare import training_rule
+from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
+
+IDS = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation", "delay")
+ENTER_P = 1e-5
+COST_PER_PARAMETER = 10.0
+SMALLEST_SIZE = 0.15
+MOST_SAMPLES = 12_000
+RATE_HZ = 30.0
+"""Rate at which wrenches are compared where no speed is measured."""
+QUICK_FIT = 6
+MOST_TRIED = 4
+MOST_FORMS = 4
+SUB_SAMPLE = 1.2
+"""Offsets in time up to so many samples are a nuisance."""
+OTHER_SUPPLY = 0.05
+"""Relative distance between the voltages of fitted and held-out runs that makes them different supplies."""
+LEAST_SPAN = 0.02
+"""Relative span of the voltage below which its effect cannot be tested."""
+BLOCK_S = 1.0
+LEAST_BLOCKS = 12
+SHORT = 60
+ALIKE = 12.0
+"""Whitened squares within which another form explains as well."""
+
+WITH_A_SCALE = ("power of voltage, own reference", "affine", "quadratic")
+"""Forms that hold a scale of their own: with the full speed free they would hold it twice."""
+
+Chain = tuple[tuple[str, SpeedForm], ...]
+
+
+@dataclass(frozen=True)
+class ChainFit:
+    """A fitted chain: full speed first where it is free, then the parameters of every form."""
+
+    chain: Chain
+    theta: np.ndarray
+    cost: float
+    inflation: float = 1.0
+
+    def values(self, scaled: bool) -> np.ndarray:
+        return self.theta[1:] if scaled else self.theta
+
+
+@dataclass
+class ChainResult:
+    """What was found between command and speed."""
+
+    fit: ChainFit
+    full_speed: float
+    full_speed_sd: float
+    findings: list[Finding] = field(default_factory=list)
+    noise_rad_s: float | None = None
+
+
+def applied(loading: Loading, chain: Chain, values, full_speed: float, first_full: float, volts) -> np.ndarray:
+    """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed."""
+    speed = loading.command * (full_speed / first_full)
+    at = 0
+    for _, form in chain:
+        path = SpeedPath(speed, loading.time_s, full_speed, loading.motion.voltage, volts)
+        # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
+        with np.errstate(invalid="ignore"):
+            speed = np.nan_to_num(form.apply(path, np.asarray(values[at : at + len(form.parameters)])))
+        at += len(form.parameters)
+    return speed
+
+
+class Problem:
+    """Residuals of a chain on the stretches that are fitted."""
+
+    def __init__(self, setup: Setup, others: list | None = None):
+        """`others` are (form, values) of effects of the reading found so far; their linear gains stay free."""
+        self.setup = setup
+        self.first_full = setup.full_speed or largest_command(setup)
+        self.scaled = setup.estimated_full_speed
+        self.volts = full_voltage_of(setup.loadings)
+        self.measured = all(x.measured for x in setup.loadings)
+        rule = training_rule(setup.split, list(setup.loadings))
+        self.rule = rule
+        fitted = [x for x in setup.loadings if rule(x.run, float(np.median(x.time_s))) is True]
+        self.fitted = thinned(fitted or list(setup.loadings))
+        held = [x for x in setup.loadings if rule(x.run, float(np.median(x.time_s))) is False]
+        self.held = thinned(held)
+        self.others = others or []
+        # A lag of some hundredths of a second must still show: few stretches at a fine rate rather than all coarse.
+        finest = max(1, int(setup.instrument.rate_hz / RATE_HZ))
+        self.average = 1 if self.measured else min(setup.average, finest)
+        self.channels = list(setup.instrument.channels)
+        self.short = np.median([x.size for x in self.fitted]) < SHORT
+        self.taps: list[np.ndarray] = []
+
+    def raw(self, chain: Chain, theta, loadings=None) -> list[np.ndarray]:
+        """Measured minus modelled response of every stretch, (rows, channels or rotors), not whitened."""
+        full, values = (theta[0], theta[1:]) if self.scaled else (self.first_full, theta)
+        out = []
+        for x in self.fitted if loadings is None else loadings:
+            speed = applied(x, chain, values, full, self.first_full, self.volts)
+            if self.measured:
+                out.append(x.motion.rotor_speed - speed)
+                continue
+            moved = loaded_by(replace(x, motion=with_speed(x.motion, speed)), self.setup.vehicle)
+            left = moved.reading - moved.load
+            for form, given in self.others:
+                left = left - form_reading(form, given, moved, self.setup.vehicle)
+            rows = averaged(left[:, self.channels], self.average)
+            out += [rows[p] for p in pieces_of(moved, self.average)]
+        return out
+
+    def free(self, parts: list[np.ndarray]) -> list[np.ndarray]:
+        """Residuals with a constant by channel taken off, where the wrench is the response."""
+        if self.measured:
+            return parts
+        mean = np.concatenate(parts).mean(axis=0)
+        return [p - mean for p in parts]
+
+    def learn(self, chain: Chain, theta) -> None:
+        """Whitening filters of the residual of a chain."""
+        parts = self.free(self.raw(chain, theta))
+        width = parts[0].shape[1]
+        self.taps = []
+        for c in range(width):
+            own = [p[:, c] for p in parts]
+            sigma = max(float(np.sqrt(np.mean(np.concatenate(own) ** 2))), 1e-12)
+            self.taps.append(np.array([1.0 / sigma]) if self.short else autoregression(own))
+        self.noise = np.array([np.sqrt(np.mean(np.concatenate([p[:, c] for p in parts]) ** 2)) for c in range(width)])
+
+    def white(self, chain: Chain, theta, loadings=None) -> np.ndarray:
+        """Whitened residuals of all stretches in a row."""
+        parts = self.free(self.raw(chain, theta, loadings))
+        return np.concatenate(
+            [np.stack([lfilter(t, [1.0], p[:, c]) for c, t in enumerate(self.taps)], axis=1).ravel() for p in parts]
+        )
+
+    def other_supply(self) -> bool:
+        """Whether the held-out runs have a supply voltage that the fitted ones never had."""
+        fitted, held = volts_of(self.fitted), volts_of(self.held)
+        if not len(fitted) or not len(held):
+            return False
+        return held.max() < (1 - OTHER_SUPPLY) * fitted.min() or held.min() > (1 + OTHER_SUPPLY) * fitted.max()
+
+    def neutral(self) -> np.ndarray:
+        return np.array([self.first_full]) if self.scaled else np.zeros(0)
+
+    def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+        low = [0.2 * self.first_full] if self.scaled else []
+        high = [5.0 * self.first_full] if self.scaled else []
+        for _, form in chain:
+            low += [p.low for p in form.parameters]
+            high += [p.high for p in form.parameters]
+        return np.array(low), np.array(high)
+
+    def fit(self, chain: Chain, start: np.ndarray, most: int = 30) -> ChainFit:
+        """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
+        low, high = self.bounds(chain)
+        if not len(start):
+            w = self.white(chain, start)
+            return ChainFit(chain, start, float(w @ w))
+        span = np.where(np.isfinite(high - low), high - low, np.maximum(np.abs(start), 1.0))
+        start = np.clip(start, low + 1e-9 * span, high - 1e-9 * span)
+        scale = np.maximum(np.abs(start), 0.02 * span)
+        found = least_squares(
+            lambda theta: self.white(chain, theta),
+            start,
+            bounds=(low, high),
+            x_scale=scale,
+            diff_step=1e-4,
+            max_nfev=most,
+        )
+        return ChainFit(chain, found.x, float(2 * found.cost))
+
+    def covariance(self, fit: ChainFit) -> tuple[np.ndarray, int]:
+        """Block-robust covariance of the parameters, and the number of blocks."""
+        base = self.white(fit.chain, fit.theta)
+        low, high = self.bounds(fit.chain)
+        columns = []
+        for i in range(len(fit.theta)):
+            step = 1e-4 * max(abs(fit.theta[i]), 0.01 * min(high[i] - low[i], 1e3))
+            moved = fit.theta.copy()
+            moved[i] += step if moved[i] + step <= high[i] else -step
+            columns.append((self.white(fit.chain, moved) - base) / (moved[i] - fit.theta[i]))
+        jacobian = np.stack(columns, axis=1)
+        unit = 1.0 / np.sqrt(np.maximum((jacobian**2).sum(axis=0), 1e-300))
+        gram = (jacobian * unit).T @ (jacobian * unit)
+        inverse = np.linalg.pinv(gram + 1e-9 * np.eye(len(gram)), hermitian=True)
+        blocks = self.blocks(len(base))
+        scores = np.array([(jacobian[b] * unit).T @ base[b] for b in blocks])
+        count = len(blocks)
+        robust = inverse @ (scores.T @ scores) @ inverse * count / max(count - len(fit.theta), 1)
+        sigma2 = float(base @ base) / max(len(base) - len(fit.theta), 1)
+        return at_least(robust, inverse * max(sigma2, 1.0)) * np.outer(unit, unit), count
+
+    def blocks(self, size: int) -> list[np.ndarray]:
+        width = len(self.taps)
+        if self.short:
+            return np.array_split(np.arange(size), max(size // width, 2))
+        rate = self.setup.instrument.rate_hz / self.average
+        per = max(int(BLOCK_S * rate), 2) * width
+        count = max(min(size // per, 400), min(LEAST_BLOCKS, size // (2 * width)), 2)
+        return [b for b in np.array_split(np.arange(size), count) if len(b)]
+
+
+def volts_of(loadings) -> np.ndarray:
+    """Battery voltages of stretches, V, the lowest and highest hundredth of the samples left out."""
+    known = [x.motion.voltage for x in loadings if x.motion.voltage is not None]
+    if not known:
+        return np.zeros(0)
+    values = np.concatenate(known)
+    return values[(values >= np.quantile(values, 0.01)) & (values <= np.quantile(values, 0.99))]
+
+
+def supply_reason(setup: Setup) -> str | None:
+    """Why the sag of the battery cannot be tested on the runs that are fitted; None if it can."""
+    problem = Problem(setup)
+    volts = volts_of(problem.fitted)
+    if len(volts) and np.ptp(volts) < LEAST_SPAN * volts.mean():
+        return (
+            f"the supply voltage hardly varies in the runs that are fitted ({volts.min():.1f} to {volts.max():.1f} V)"
+        )
+    if problem.other_supply():
+        held = volts_of(problem.held)
+        return (
+            f"the runs that are fitted have {volts.min():.1f} to {volts.max():.1f} V, those held out "
+            f"{held.min():.1f} to {held.max():.1f} V: too few fitted points with another voltage to tell"
+        )
+    return None
+
+
+def thinned(loadings: list[Loading]) -> list[Loading]:
+    """Stretches spread over the runs with MOST_SAMPLES at most."""
+    total = sum(x.size for x in loadings)
+    step = max(1, int(np.ceil(total / MOST_SAMPLES)))
+    return loadings[::step] if len(loadings) >= 4 * step else loadings
+
+
+def largest_command(setup: Setup) -> float:
+    """Largest command of a set, rad/s."""
+    return max(float(np.max(x.command)) for x in setup.loadings)
+
+
+def candidates(setup: Setup) -> list[tuple[str, SpeedForm]]:
+    """Forms that these recordings can test."""
+    out = []
+    for key in IDS:
+        if setup.steady_points and key in ("motor_lag", "delay"):
+            continue
+        for form in catalogue()[key].speed_forms:
+            if "voltage" in form.requires and any(x.motion.voltage is None for x in setup.loadings):
+                continue
+            if form.name == "drift in time" and all(x.motion.voltage is not None for x in setup.loadings):
+                continue
+            if setup.estimated_full_speed and form.name in WITH_A_SCALE:
+                continue
+            out.append((key, form))
+    return out
+
+
+def starts(form: SpeedForm) -> list[np.ndarray]:
+    """Starting values of a form: its nonlinear parameters' own, a little off neutral for the others."""
+    neutral = np.array(form.neutral, float)
+    options = [neutral + 0.01 * np.array([min(p.high - p.low, 1.0) for p in form.parameters])]
+    for values in zip(*[p.starts or (n,) for p, n in zip(form.parameters, neutral, strict=True)], strict=False):
+        options.append(np.array(values, float))
+    return options[:4]
+
+
+def ordered(chain: Chain) -> Chain:
+    return tuple(sorted(chain, key=lambda pair: pair[1].stage))
+
+
+def start_of(chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm], values, scaled: bool) -> np.ndarray:
+    """Start of a chain from the fit of another that lacks one form."""
+    theta = [fit.theta[0]] if scaled else []
+    at = 1 if scaled else 0
+    known = {}
+    for key, form in fit.chain:
+        known[key] = fit.theta[at : at + len(form.parameters)]
+        at += len(form.parameters)
+    for key, form in chain:
+        theta += list(values if key == new[0] else known.get(key, form.neutral))
+    return np.array(theta, float)
+
+
+def best_start(problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+    """Of a new form's starting values those that already explain most."""
+    options = [start_of(chain, fit, new, v, problem.scaled) for v in starts(new[1])]
+    return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
+
+
+def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
+    """The chain between command and speed; None where no command is recorded."""
+    if not all(x.command is not None for x in setup.loadings):
+        return None
+    if not any(np.any(x.command > 0) for x in setup.loadings):
+        return None
+    problem = Problem(setup, others)
+    forms = candidates(setup)
+    problem.learn((), problem.neutral())
+    best = problem.fit((), problem.neutral())
+    dropped: dict[str, str] = {}
+    for _ in range(MOST_FORMS):
+        # Whitening by the residual of the richest chain seen: by a poor one's, everything would look like noise.
+        problem.learn(best.chain, best.theta)
+        best = problem.fit(best.chain, best.theta)
+        tried = []
+        for pair in forms:
+            if pair[0] in {k for k, _ in best.chain} or pair[0] in dropped:
+                continue
+            chain = ordered((*best.chain, pair))
+            fit = problem.fit(chain, best_start(problem, chain, best, pair), QUICK_FIT)
+            tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
+        tried.sort(key=lambda t: -t[0])
+        grown = False
+        for score, pair, fit in tried[:MOST_TRIED]:
+            if score <= 0:
+                break
+            fit = problem.fit(fit.chain, fit.theta)
+            reason = weakness(problem, fit, best, pair)
+            if reason is None:
+                best, grown = fit, True
+                break
+            dropped.setdefault(pair[0], reason)
+        if not grown:
+            break
+    problem.learn(best.chain, best.theta)
+    best = problem.fit(best.chain, best.theta)
+    best = pruned(problem, better_forms(problem, best, forms), dropped)
+    return worded(problem, best, forms, dropped)
+
+
+def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | None:
+    """Why a form does not enter; None if it does."""
+    inner = richer(problem, fit)
+    where = place_of(inner.chain, pair[0], problem.scaled)
+    covariance, count = problem.covariance(inner)
+    p = p_value(inner.theta[where] - np.array(pair[1].neutral), covariance[where, where], count)
+    if p > ENTER_P:
+        return f"p = {p:.2g}"
+    old, new = problem.raw(without.chain, without.theta), problem.raw(inner.chain, inner.theta)
+    change = np.concatenate([a - b for a, b in zip(old, new, strict=True)])
+    size = float((np.sqrt(np.quantile(change**2, 0.95, axis=0)) / np.maximum(problem.noise, 1e-12)).max())
+    if size < SMALLEST_SIZE:
+        return f"its size is {size:.2g} of the noise"
+    if problem.held and not problem.other_supply():
+        gain = float(np.sum(problem.white(without.chain, without.theta, problem.held) ** 2)) - float(
+            np.sum(problem.white(inner.chain, inner.theta, problem.held) ** 2)
+        )
+        if gain < 0:
+            return "it did not help on the held-out runs"
+    return None
+
+
+def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFit:
+    """The chain without what is no longer significant beside the forms that came after it."""
+    while best.chain:
+        covariance, count = problem.covariance(best)
+        doubtful = {}
+        for key, form in best.chain:
+            where = place_of(best.chain, key, problem.scaled)
+            p = p_value(best.theta[where] - np.array(form.neutral), covariance[where, where], count)
+            if p > ENTER_P:
+                doubtful[key] = p
+        if not doubtful:
+            return best
+        worst = max(doubtful, key=doubtful.get)
+        dropped.setdefault(worst, f"p = {doubtful[worst]:.2g} beside the others")
+        kept = [(k, f) for k, f in best.chain if k != worst]
+        theta = [best.theta[:1]] if problem.scaled else []
+        theta += [best.theta[place_of(best.chain, k, problem.scaled)] for k, _ in kept]
+        start = np.concatenate(theta) if theta else np.zeros(0)
+        best = richer(problem, ChainFit(tuple(kept), start, best.cost))
+    return best
+
+
+def p_value(offset: np.ndarray, covariance: np.ndarray, count: int) -> float:
+    """Hotelling's T² over blocks."""
+    q = len(offset)
+    if count - q < 2:
+        return 1.0
+    statistic = quadratic_form(offset, covariance)
+    return float(f_distribution.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
+
+
+def richer(problem: Problem, fit: ChainFit) -> ChainFit:
+    """The fit once more, whitened by its own residual."""
+    problem.learn(fit.chain, fit.theta)
+    return problem.fit(fit.chain, fit.theta)
+
+
+def better_forms(problem: Problem, best: ChainFit, forms) -> ChainFit:
+    """Forms of the ids in the chain exchanged where another explains more for its parameters."""
+    for key, current in list(best.chain):
+        top, found = -COST_PER_PARAMETER * len(current.parameters) - best.cost, best
+        for pair in forms:
+            if pair[0] != key or pair[1] is current:
+                continue
+            chain = ordered(tuple(pair if k == key else (k, f) for k, f in best.chain))
+            fit = problem.fit(chain, best_start(problem, chain, best, pair))
+            score = -COST_PER_PARAMETER * len(pair[1].parameters) - fit.cost
+            if score > top:
+                top, found = score, fit
+        best = found
+    return best
+
+
+def place_of(chain: Chain, key: str, scaled: bool) -> slice:
+    at = 1 if scaled else 0
+    for own, form in chain:
+        if own == key:
+            return slice(at, at + len(form.parameters))
+        at += len(form.parameters)
+    raise KeyError(key)
+
+
+def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
+    """Findings of a chain with intervals, p-values and alternatives."""
+    covariance, count = problem.covariance(best) if len(best.theta) else (np.zeros((0, 0)), 2)
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    setup, effects = problem.setup, catalogue()
+    channels = (
+        tuple(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)) if problem.measured else ("force_z",)
+    )
+    findings = []
+    lags = any(k == "motor_lag" for k, _ in best.chain)
+    dt_s = 1.0 / setup.instrument.rate_hz
+    for key, form in best.chain:
+        where = place_of(best.chain, key, problem.scaled)
+        if key == "delay" and abs(best.theta[where][0] + lags * dt_s) <= SUB_SAMPLE * dt_s:
+            continue  # the lag's own step of one sample taken back, or less than a sample: no finding
+        values, deviation = best.theta[where], sd[where]
+        p = p_value(values - np.array(form.neutral), covariance[where, where], count)
+        others = alternatives(problem, best, key, forms)
+        findings.append(
+            Finding(
+                id=key,
+                status="ambiguous" if others else "established",
+                values=tuple(float(v) for v in values),
+                equation=form.equation,
+                sentence=effects[key].sentence,
+                parameters=tuple(
+                    Estimate(pr.symbol, float(v), pr.unit, float(v - 1.96 * s), float(v + 1.96 * s))
+                    for pr, v, s in zip(form.parameters, values, deviation, strict=True)
+                ),
+                p_value=p,
+                channels=channels,
+                alternatives=tuple(sorted({key, *others})) if others else (),
+            )
+        )
+    names = {f.id for f in findings}
+    for key, reason in dropped.items():
+        if key not in names:
+            text = f"{effects[key].name} did not hold: {reason}"
+            findings.append(Finding(id=key, status="not_established", sentence=text))
+    full = float(best.theta[0]) if problem.scaled else problem.first_full
+    noise = float(np.sqrt(np.mean(problem.noise**2))) if problem.measured else None
+    return ChainResult(best, full, float(sd[0]) if problem.scaled else 0.0, findings, noise)
+
+
+def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]:
+    """Ids that in a form's place explain as well."""
+    out = []
+    rest = tuple((k, f) for k, f in best.chain if k != key)
+    taken = {k for k, _ in rest}
+    size = len(next(f for k, f in best.chain if k == key).parameters)
+    for pair in forms:
+        if pair[0] == key or pair[0] in taken or pair[0] in out or len(pair[1].parameters) > size + 1:
+            continue
+        chain = ordered((*rest, pair))
+        fit = problem.fit(chain, best_start(problem, chain, best, pair))
+        if fit.cost < best.cost + ALIKE:
+            out.append(pair[0])
+    if not problem.measured:
+        out += reading_alternatives(problem, best, rest, key)
+    return out
+
+
+def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str) -> list[str]:
+    """Effects of the reading that explain as well in a form's place, where no speed is measured."""
+    rivals = {"motor_lag": ("amplifier_filter",), "delay": ("amplifier_filter", "delay")}.get(key, ())
+    out = ["thrust_curve"] if key == "throttle_curve" else []
+    for name in rivals:
+        for form in forms_of(catalogue()[name], problem.setup.instrument):
+            for p in form.parameters[0].starts:
+                others = problem.others
+
+                def white(theta, form=form, others=others):
+                    problem.others = [*others, (form, theta[:1])]
+                    try:
+                        return problem.white(rest, theta[1:])
+                    finally:
+                        problem.others = others
+
+                start = np.concatenate(
+                    [
+                        [p],
+                        [t for t in best.theta[:1]] if problem.scaled else [],
+                        *[best.theta[place_of(best.chain, k, problem.scaled)] for k, _ in rest],
+                    ]
+                )
+                low, high = problem.bounds(rest)
+                low, high = np.append(form.parameters[0].low, low), np.append(form.parameters[0].high, high)
+                found = least_squares(
+                    white,
+                    np.clip(start, low, high),
+                    bounds=(low, high),
+                    x_scale=np.maximum(np.abs(start), 1e-3),
+                    diff_step=1e-4,
+                    max_nfev=15,
+                )
+                if 2 * found.cost < best.cost + ALIKE and name not in out:
+                    out.append(name)
+    return out
+
+
+def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
+    """Loadings with the speeds that the chain makes of the commands (where none are measured)."""
+    problem = Problem(setup)
+    values = result.fit.values(problem.scaled)
+    out = []
+    for x in setup.loadings:
+        speed = applied(x, result.fit.chain, values, result.full_speed, problem.first_full, problem.volts)
+        command = x.command * (result.full_speed / problem.first_full)
+        out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
+    return tuple(out)
+
+
+def speed_traces(setup: Setup, result: ChainResult) -> tuple[Trace, ...]:
+    """Measured less commanded and less modelled speed of every rotor, where both are recorded."""
+    problem = Problem(setup)
+    start = problem.neutral()
+    if problem.scaled:
+        start = np.array([result.full_speed])
+    believed = problem.raw((), start, setup.loadings)
+    left = problem.raw(result.fit.chain, result.fit.theta, setup.loadings)
+    out = []
+    for x, a, b in zip(setup.loadings, believed, left, strict=True):
+        times, a, b = averaged(x.time_s, setup.average), averaged(a, setup.average), averaged(b, setup.average)
+        for i in range(a.shape[1]):
+            out.append(Trace(x.run, f"rotor_speed_{i + 1}", "rad/s", times, a[:, i], a[:, i], b[:, i]))
+    return tuple(out)

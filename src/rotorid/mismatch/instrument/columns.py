@@ -1,0 +1,202 @@
+"""Rows of the regression for an instrument: reading less load, and what every candidate would add to it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Contribution, Form, not_testable_reason
+from rotorid.effects.loading import Loading, at_sensor, forms_of, weight
+from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
+from rotorid.mismatch.prepare import form_terms
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.recordings import Vehicle
+
+DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "gain": 0.03}
+VALUE_NAMES = {
+    "thrust": "thrust_coefficient_n_s2",
+    "torque": "torque_coefficient_n_m_s2",
+    "mass": "mass_kg",
+    "arm": "arm_scale",
+    "gain": "reading_gain",
+    "gain_x": "reading_gain_x",
+    "gain_y": "reading_gain_y",
+    "gain_z": "reading_gain_z",
+}
+TAKES_TIME = ("clock_skew", "delay", "amplifier_filter", "structural_resonance", "rotor_acceleration_torque", "creep")
+"""Ids that steady points cannot show."""
+QUICK = ("clock_skew", "delay", "amplifier_filter", "structural_resonance")
+"""Ids that show only in the moments after a change of load."""
+STILL = "the vehicle does not move on a stand"
+NO_ROTORS = "a bench has no rotors"
+SPEED_IDS = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
+MISTAKES = ("axis_sign", "unit_error", "rotor_order", "spin_direction", "sensor_dropout")
+OFFSET = "offset:load-reading"
+DISPLACED = ("velocity", "angular_velocity", "angular_acceleration", "specific_force", "accelerometer", "gyroscope")
+
+
+def value_keys(setup: Setup) -> list[str]:
+    """Believed values that this set can contradict."""
+    vehicle, channels = setup.vehicle, setup.instrument.channels
+    if vehicle.kind == "bench":
+        loaded = [k for k in setup.instrument.loaded if k < 3]
+        return ["gain"] + ([f"gain_{'xyz'[k]}" for k in loaded] if len(loaded) > 1 else [])
+    keys = []
+    commanded = not all(x.measured for x in setup.loadings)
+    if not (commanded and setup.estimated_full_speed):
+        keys.append("thrust")
+    if 5 in channels and vehicle.torque_coefficients_n_m_s2().any():
+        keys.append("torque")
+    if has_weight(vehicle) and any(k < 3 for k in channels):
+        keys.append("mass")
+    if any(k in (3, 4) for k in channels) and np.abs(vehicle.rotor_positions_m()).max() > 0:
+        keys.append("arm")
+    return keys
+
+
+def trust_of(key: str, vehicle: Vehicle) -> float:
+    """Relative one-sigma of a believed value."""
+    return max(vehicle.trust.get(VALUE_NAMES[key], DEFAULT_TRUST[key.split("_")[0]]), 1e-6)
+
+
+def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
+    """Every term that this set can test, and the ids that it cannot, with the reason."""
+    terms = [Term(key, "value", prior_sd=(trust_of(key, setup.vehicle),)) for key in value_keys(setup)]
+    reasons: dict[str, str] = {}
+    if not setup.steady_points and not setup.instrument.by_hand:
+        terms.append(Term(OFFSET, "nuisance", prior_sd=(0.5 / setup.instrument.rate_hz,)))
+    for effect in catalogue().values():
+        if effect.id in SPEED_IDS or effect.id in MISTAKES or effect.id == "quantisation":
+            continue
+        if setup.instrument.by_hand and effect.id in QUICK:
+            reasons[effect.id] = "loads were put on by hand: their first moments are not known"
+            continue
+        if setup.steady_points and effect.id in TAKES_TIME:
+            reasons[effect.id] = "the recordings are steady points: nothing that takes time shows in them"
+            continue
+        found, why = [], None
+        for form in forms_of(effect, setup.instrument):
+            if not effect.reading_forms:
+                lacking = lacks(form, setup)
+                if lacking:
+                    why = why or lacking
+                    continue
+            found += form_terms(effect.id, form)
+        terms += found
+        if not found:
+            reasons[effect.id] = why or _reason(effect.id, setup)
+    return terms, reasons
+
+
+def lacks(form: Form, setup: Setup) -> str | None:
+    """Why a form for a flight cannot be tested on this stand."""
+    if any(name in DISPLACED for name in form.requires):
+        return STILL
+    reason = next((r for x in setup.loadings if (r := not_testable_reason(form, x.motion, setup.vehicle))), None)
+    return reason
+
+
+def _reason(effect_id: str, setup: Setup) -> str:
+    """Why nothing of an id could be tested."""
+    vehicle = setup.vehicle
+    stand_only = ("wall_interference", "sensor_origin", "com_offset", "cable_stiffness", "mount_tilt")
+    if setup.instrument.bench and (catalogue()[effect_id].reading_forms is None or effect_id in stand_only):
+        return NO_ROTORS if effect_id not in ("sensor_origin",) else "no moment is read"
+    if effect_id == "com_offset":
+        return "the weight was zeroed away" if vehicle.tared else "no mass is stated or no moment is read"
+    if effect_id == "cable_stiffness":
+        return "zeroed in each attitude" if vehicle.tared else "the mount is never tilted"
+    if effect_id == "sensor_origin":
+        return "no moment is read"
+    if effect_id == "hysteresis":
+        return "the load never comes back from above to a value other than none"
+    if effect_id in ("crosstalk", "mount_tilt", "compliance"):
+        return "one channel only is read"
+    if effect_id in ("amplifier_filter", "structural_resonance", "creep", "zero_drift", "wall_interference"):
+        return "the recordings are too short or too slow to show it"
+    return STILL
+
+
+def reading_of(added: Contribution, loading: Loading, vehicle: Vehicle) -> np.ndarray:
+    """What a contribution adds to the reading, (n, 6)."""
+    if added.reading is not None:
+        return added.reading
+    return at_sensor(added.force, added.moment, loading.motion, vehicle)
+
+
+def form_reading(form: Form, values, loading: Loading, vehicle: Vehicle) -> np.ndarray:
+    """Reading that a form adds at parameter values, (n, 6); forms for a flight act through the motion."""
+    values = np.asarray(values, float)
+    subject = loading if form.on_loading else loading.motion
+    return reading_of(form.contribution(subject, vehicle, values), loading, vehicle)
+
+
+def value_column(key: str, loading: Loading, vehicle: Vehicle) -> np.ndarray:
+    """Reading of a relative change of one believed value, (n, 6)."""
+    if key == "gain":
+        return loading.load
+    if key.startswith("gain_"):
+        out = np.zeros_like(loading.load)
+        axis = "xyz".index(key[-1])
+        out[:, axis] = loading.load[:, axis]
+        return out
+    if key == "mass":
+        return weight(loading.motion, vehicle)
+    if key == "torque":
+        still = vehicle.model_copy(update={"thrust_coefficient_n_s2": 1e-300})
+        return rotor_wrench(loading.motion, still)
+    still = vehicle.model_copy(update={"torque_coefficient_n_m_s2": None})
+    if key == "thrust":
+        return rotor_wrench(loading.motion, still)
+    flat = still.model_copy(
+        update={"rotors": tuple(r.model_copy(update={"x_m": 0.0, "y_m": 0.0}) for r in vehicle.rotors)}
+    )
+    return rotor_wrench(loading.motion, still) - rotor_wrench(loading.motion, flat)
+
+
+def term_columns(term: Term, loading: Loading, vehicle: Vehicle) -> list[np.ndarray]:
+    """Columns of a term, (n, 6) each."""
+    if term.kind == "value":
+        return [value_column(term.key, loading, vehicle)]
+    if term.kind == "nuisance":
+        return [np.gradient(loading.load, loading.dt_s, axis=0)]
+    form, values = term.form, np.asarray(term.values, float)
+    if term.slope_of is not None:
+        step = 1e-3 * max(abs(values[term.slope_of]), 1e-6)
+        up, down = values.copy(), values.copy()
+        up[term.slope_of] += step
+        down[term.slope_of] -= step
+        return [(form_reading(form, up, loading, vehicle) - form_reading(form, down, loading, vehicle)) / (2 * step)]
+    if not form.linear:
+        return [form_reading(form, values, loading, vehicle)]
+    columns = []
+    for index in form.linear:
+        unit = values.copy()
+        unit[list(form.linear)] = 0.0
+        unit[index] = 1.0
+        columns.append(form_reading(form, unit, loading, vehicle))
+    return columns
+
+
+def rows_of(setup: Setup, terms: list[Term], loadings=None) -> list[Rows]:
+    """Rows of every stretch's parts, averaged; a channel that is not compared is NaN in y and zero in x."""
+    out = []
+    channels = list(setup.instrument.channels)
+    for loading in setup.loadings if loadings is None else loadings:
+        pieces = pieces_of(loading, setup.average)
+        if not pieces:
+            continue
+        y = np.full((loading.size, 6), np.nan)
+        y[:, channels] = (loading.reading - loading.load)[:, channels]
+        small, times = averaged(y, setup.average), averaged(loading.time_s, setup.average)
+        x = np.zeros((len(small), 6, sum(t.size for t in terms)))
+        at = 0
+        for term in terms:
+            for column in term_columns(term, loading, setup.vehicle):
+                x[:, channels, at] = averaged(column[:, channels], setup.average)
+                at += 1
+        out += [Rows(loading.run, times[p], small[p], x[p]) for p in pieces]
+    return out
+
+
+__all__ = ["OFFSET", "VALUE_NAMES", "form_reading", "make_terms", "rows_of", "value_keys"]

@@ -1,0 +1,73 @@
+"""From the selected terms of an instrument to a word on each id."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.loading import CHANNELS
+from rotorid.mismatch.decide import estimates, held_out_gain
+from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.instrument.model import ReadingModel, active_values, in_training, nonlinear_deviation
+
+SHOWS = 0.33
+"""A channel counts where the contribution is at least this share of its strongest, in units of the noise."""
+REACH = 1.96
+ALIKE = {("tare_offset", "mass")}
+
+
+def main_channels(model: ReadingModel, key: str) -> list[int]:
+    """Channels that a term shows in, the strongest first."""
+    fit, regression = model.selection.fit, model.regression
+    cols = regression.columns([key])
+    beta = fit.beta[[list(fit.columns).index(c) for c in cols]]
+    size = model.search.sizes_of(key, beta)
+    order = np.argsort(-size)
+    return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]
+
+
+def findings_of(model: ReadingModel) -> list[Finding]:
+    """A finding for every term that entered, and for those that looked like something and did not survive."""
+    effects, search, selection = catalogue(), model.search, model.selection
+    rule = in_training(model.setup)
+    held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
+    with_it = model.regression.fit(search.always + selection.active)
+    out = []
+    for key in selection.active:
+        term, effect = search.terms[key], effects[search.terms[key].effect]
+        channels = main_channels(model, key)
+        without = search.without(key, selection.active)
+        values = active_values(model, key)
+        if term.form.nonlinear:
+            sd = nonlinear_deviation(model, key, model.loadings)
+            parameters = tuple(
+                Estimate(p.symbol, float(v), p.unit, float(v - REACH * s), float(v + REACH * s))
+                for p, v, s in zip(term.form.parameters, values, sd, strict=True)
+            )
+        else:
+            parameters = estimates(model.regression, selection.fit, search, key)
+        alternatives = alternatives_of(model, key)
+        out.append(
+            Finding(
+                id=term.effect,
+                status="ambiguous" if alternatives else "established",
+                form=term.form,
+                values=tuple(float(v) for v in values),
+                equation=term.form.equation,
+                sentence=effect.sentence,
+                parameters=parameters,
+                p_value=selection.p_values[key],
+                channels=tuple(CHANNELS[c] for c in channels),
+                alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
+                gain=held_out_gain(model.rows, model.regression, with_it, without, channels[0], held),
+            )
+        )
+    for effect_id, reason in selection.not_established.items():
+        name = effects[effect_id].name
+        out.append(Finding(id=effect_id, status="not_established", sentence=f"{name} did not hold: {reason}"))
+    return out
+
+
+def alternatives_of(model: ReadingModel, key: str) -> list[str]:
+    """Ids that could stand in for a term on these data."""
+    return model.search.alternatives(key, model.selection.active)

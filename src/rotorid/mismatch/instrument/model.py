@@ -1,0 +1,426 @@
+"""The regression of an instrument: whitening, blocks, search over the catalogue, nonlinear parameters refined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+
+from rotorid.effects.loading import Loading
+from rotorid.mismatch.instrument.columns import rows_of, term_columns
+from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
+from rotorid.mismatch.prepare import training_rule
+from rotorid.mismatch.regression import Regression, autoregression, build, chi2_p, full_fit_residuals, ridge_inverse
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.select import (
+    COST_PER_EFFECT,
+    COST_PER_PARAMETER,
+    EXPECTED_HELD_OUT,
+    UNSTEADY_P,
+    UNSTEADY_SHARE,
+    Search,
+    Selection,
+)
+
+SHORT = 60
+"""Stretches of fewer rows are too short to learn the colour of their noise from: they are taken as blocks."""
+MOST_BLOCKS = 150
+LEAST_BLOCKS = 40
+BLOCK_S = 2.0
+ROWS_PER_COLUMN = 8
+STRONGEST = 0.9
+TARE_MARGIN = 2.0
+"""A tare comes from a few samples and is only as good as their mean: an offset must be this much larger."""
+LEAST_BLOCKS_OF_A_RUN = 5
+EXCITED_SHARE = 0.1
+MAIN_SHARE = 0.2
+ROUNDS = 3
+MOST_OF_A_FORM = 6
+"""Parameters of a form from which it joins in the second round only."""
+
+
+class ReadingSearch(Search):
+    """The search in two rounds: first without forms of many parameters, which would swallow several causes at once."""
+
+    rich = False
+
+    def __init__(self, regression: Regression, sizes_of, known_sizes=None):
+        super().__init__(regression, sizes_of, known_sizes)
+        self.total_gram = regression.gram[regression.training].sum(axis=0)
+        self.total_cross = regression.cross[regression.training].sum(axis=0)
+
+    def _allowed(self, term: Term) -> bool:
+        return self.rich or term.size <= MOST_OF_A_FORM or "own in each run" in term.key
+
+    def physical(self, term, beta, error):
+        """Also no nonlinear parameter at its bound, and none that is below what an instrument resolves."""
+        for i in term.form.nonlinear:
+            parameter, value = term.form.parameters[i], term.values[i]
+            near = 0.01 * min(parameter.high - parameter.low, abs(value) + 1e-12)
+            if value > parameter.high - near or (value < parameter.low + near and parameter.low > 0):
+                return False
+            if not term.form.linear and abs(value) < parameter.negligible:
+                return False
+        return super().physical(term, beta, error)
+
+    def candidates(self, active):
+        return [c for c in super().candidates(active) if self._allowed(self.terms[c.key])]
+
+    def best_form(self, key, active):
+        if self.rich:
+            return super().best_form(key, active)
+        every = self.terms
+        self.terms = {k: t for k, t in every.items() if self._allowed(t) or k == key or k in active}
+        try:
+            return super().best_form(key, active)
+        finally:
+            self.terms = every
+
+    def simpler(self, active):
+        every = self.terms
+        self.terms = {k: t for k, t in every.items() if self._allowed(t) or k in active}
+        try:
+            return super().simpler(active)
+        finally:
+            self.terms = every
+
+    def swapped(self, active, dropped):
+        every = self.terms
+        self.terms = {k: t for k, t in every.items() if self._allowed(t) or k in active}
+        try:
+            return super().swapped(active, dropped)
+        finally:
+            self.terms = every
+
+    def worth(self, keys):
+        """As for flights, from the summed Gram matrix alone: there is no noise of regressors to correct here."""
+        reg = self.regression
+        cols = reg.columns(self.always + keys)
+        gram, cross = self.total_gram[np.ix_(cols, cols)], self.total_cross[cols]
+        beta = ridge_inverse(gram + np.diag(reg.precision[cols])) @ cross
+        gain = float(2 * cross @ beta - beta @ gram @ beta)
+        return gain - COST_PER_PARAMETER * sum(self.terms[k].size for k in keys) - COST_PER_EFFECT * len(keys)
+
+    def failed_held_out(self, active):
+        """The term whose own part should help on the held-out blocks and does most harm there instead.
+
+        The other coefficients are held: on an instrument a run may load one axis only, and a believed value that
+        moves with a term must not decide about it on another axis.
+        """
+        mask = self.regression.held_out
+        if mask.sum() < 4 or not active:
+            return None
+        fit = self.regression.fit(self.always + active)
+        index = np.flatnonzero(mask)
+        worst, found = 0.0, None
+        for key in active:
+            cols = self.regression.columns([key])
+            beta = fit.beta[[list(fit.columns).index(c) for c in cols]]
+            cross = self.regression.cross[np.ix_(index, cols)]
+            every = self.regression.gram[np.ix_(index, cols, fit.columns)]
+            own = np.array([beta @ g[:, [list(fit.columns).index(c) for c in cols]] @ beta for g in every])
+            gains = np.sort(2 * cross @ beta - 2 * (every @ fit.beta) @ beta + own)
+            cut = max(1, len(gains) // 8)
+            gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
+            if own.sum() > EXPECTED_HELD_OUT and gain < worst:
+                worst, found = gain, key
+        return found
+
+    def unsteady(self, active):
+        """A term one of whose coefficients differs from run to run, beyond doubt and by much.
+
+        Each coefficient is refitted in the runs that excite it, all others held.
+        """
+        reg = self.regression
+        fit = reg.fit(self.always + active)
+        place = {c: i for i, c in enumerate(fit.columns)}
+        runs = np.unique(reg.run[reg.training])
+        for key in active:
+            for column in reg.columns([key]):
+                beta = fit.beta[place[column]]
+                total = reg.gram[reg.training][:, column, column].sum()
+                found = []
+                for run in runs:
+                    mask = np.flatnonzero(reg.training & (reg.run == run))
+                    own = reg.gram[mask, column, column]
+                    if len(mask) < LEAST_BLOCKS_OF_A_RUN or own.sum() < EXCITED_SHARE * total / len(runs):
+                        continue
+                    rest = reg.gram[np.ix_(mask, [column], fit.columns)][:, 0, :] @ fit.beta - own * beta
+                    scores = reg.cross[mask, column] - rest
+                    here = scores.sum() / own.sum()
+                    spread = np.sum((scores - own * here) ** 2) / own.sum() ** 2
+                    found.append((here, max(spread, 1.0 / own.sum())))
+                if len(found) < 2:
+                    continue
+                b, v = np.array(found).T
+                mean = np.sum(b / v) / np.sum(1 / v)
+                q = float(np.sum((b - mean) ** 2 / v))
+                wide = np.sqrt(np.mean((b - mean) ** 2)) > UNSTEADY_SHARE * abs(mean)
+                main = beta**2 * total > MAIN_SHARE * np.sum(
+                    fit.beta[[place[c] for c in reg.columns([key])]] ** 2
+                    * np.diagonal(reg.gram[reg.training].sum(axis=0))[reg.columns([key])]
+                )
+                if wide and main and chi2_p(q, len(b) - 1) < UNSTEADY_P:
+                    return key
+        return None
+
+    def run(self, active=None) -> Selection:
+        """Both rounds; the second starts from what the first found."""
+        first = super().run(active)
+        self.rich = True
+        second = super().run(first.active)
+        kept = {self.terms[k].effect for k in second.active}
+        dropped = {e: r for e, r in (first.not_established | second.not_established).items() if e not in kept}
+        return replace(second, trail=first.trail + second.trail, not_established=dropped)
+
+
+@dataclass
+class ReadingModel:
+    """A fitted model of an instrument's reading."""
+
+    setup: Setup
+    loadings: tuple[Loading, ...]
+    terms: list[Term]
+    rows: list[Rows]
+    regression: Regression
+    search: Search
+    selection: Selection
+    noise: np.ndarray
+    """One sigma of a row's noise by channel, (6,); NaN where a channel is not compared."""
+
+
+def in_training(setup: Setup):
+    """Rule of prepare.training_rule for the stretches of a set."""
+    return training_rule(setup.split, list(setup.loadings))
+
+
+def block_length(setup: Setup, rows: list[Rows]) -> int:
+    """Rows of a block: short stretches whole, else about BLOCK_S, within bounds on their number."""
+    typical = float(np.median([len(r.y) for r in rows]))
+    total = sum(len(r.y) for r in rows)
+    if typical < SHORT:
+        return max(2, int(typical)) if len(rows) >= 12 else max(2, total // LEAST_BLOCKS)
+    wanted = BLOCK_S * setup.rate_hz
+    return int(np.clip(wanted, max(total / MOST_BLOCKS, 5), max(total / LEAST_BLOCKS, 5)))
+
+
+def noise_and_filters(setup: Setup, terms: list[Term], rows: list[Rows]) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """Noise by channel (6,) and whitening filters, from what the whole catalogue leaves."""
+    total = sum(len(r.y) for r in rows)
+    size = rows[0].x.shape[2]
+    kept = modest(terms, total // ROWS_PER_COLUMN) if size > total // ROWS_PER_COLUMN else np.arange(size)
+    precision = np.concatenate([1.0 / np.square(np.asarray(t.prior_sd, float)) for t in terms])
+    thin = [Rows(r.run, r.time_s, r.y, r.x[:, :, kept]) for r in rows]
+    left, _ = full_fit_residuals(thin, precision[kept])
+    noise, filters = np.full(6, np.nan), {}
+    correction = np.sqrt(total / max(total - len(kept), 1))
+    short = np.median([len(r.y) for r in rows]) < SHORT
+    for c in setup.instrument.channels:
+        parts = [r[:, c] - r[:, c].mean() * short for r in left]
+        sigma = float(np.sqrt(np.mean(np.concatenate([r[:, c] for r in left]) ** 2))) * correction
+        noise[c] = max(sigma, 1e-12)
+        filters[c] = np.array([1.0 / noise[c]]) if short else autoregression(parts)
+    return noise, filters
+
+
+def modest(terms: list[Term], most: int) -> np.ndarray:
+    """Columns of the first form of each id, the short ones first, as many as the rows can bear."""
+    at, places = 0, []
+    seen: set[str] = set()
+    for t in terms:
+        if t.effect not in seen or t.kind != "effect":
+            places.append((t.size if t.kind == "effect" else 0, at, t.size))
+            seen.add(t.effect)
+        at += t.size
+    chosen: list[int] = []
+    for _, start, size in sorted(places):
+        if len(chosen) + size > max(most, 2):
+            break
+        chosen += range(start, start + size)
+    return np.array(sorted(chosen), int)
+
+
+def reading_model(
+    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None
+) -> ReadingModel:
+    """Rows, regression and search; `filters` (noise, taps) of an earlier round are kept where given."""
+    loadings = setup.loadings if loadings is None else loadings
+    rows = rows_of(setup, terms, loadings)
+    noise, taps = filters if filters is not None else noise_and_filters(setup, terms, rows)
+    short = np.median([len(r.y) for r in rows]) < SHORT
+    per = block_length(setup, rows)
+    regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz)
+    sizes = size_function(rows, regression, noise, max(1, int(setup.rate_hz)) if not short else 1)
+    search = ReadingSearch(regression, sizes, np.zeros(6))
+    selection = search.run(active)
+    return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
+
+
+def size_function(rows: list[Rows], regression: Regression, noise: np.ndarray, per: int):
+    """Size of a term by channel: its rms over the strongest tenth of the seconds, in units of the noise, (6,)."""
+    loud = np.where(np.isfinite(noise), noise, np.inf)
+    margin = {t.key: TARE_MARGIN if t.effect == "tare_offset" else 1.0 for t in regression.terms}
+    margin |= {t.key: 2 * TARE_MARGIN for t in regression.terms if t.key == "tare_offset/own in each run"}
+
+    def sizes(key: str, beta: np.ndarray) -> np.ndarray:
+        cols = regression.columns([key])
+        energies = []
+        for r in rows:
+            square = (r.x[:, :, cols] @ beta) ** 2
+            count = max(1, len(square) // per)
+            whole = len(square) // count * count
+            energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
+        strongest = np.quantile(np.concatenate(energies), STRONGEST, axis=0)
+        return np.sqrt(strongest) / loud / margin[key]
+
+    return sizes
+
+
+def whitened(model: ReadingModel, values: list[np.ndarray]) -> list[np.ndarray]:
+    """Columns (n, 6) of every stretch's rows through the whitening filters, flattened over channels."""
+    taps = model.regression.filters
+    longest = max(len(t) for t in taps.values()) - 1
+    return [np.stack([lfilter(taps[c], [1.0], v[:, c])[longest:] for c in taps], axis=1).ravel() for v in values]
+
+
+def refined(model: ReadingModel, loadings=None) -> list[Term]:
+    """Terms with the nonlinear parameters of those at work fitted, all linear ones free (variable projection)."""
+    setup, search = model.setup, model.search
+    moving = [k for k in model.selection.active if search.terms[k].form.nonlinear]
+    if not moving:
+        return model.terms
+    stretches = list(model.loadings)
+    rule = in_training(setup)
+    owner = [k for k, x in enumerate(stretches) for _ in pieces_of(x, setup.average)]
+    fitted = [i for i, r in enumerate(model.rows) if rule(r.run, float(np.median(r.time_s))) is True]
+    fitted = fitted or list(range(len(model.rows)))
+    index = {}
+    for i, k in enumerate(owner):
+        index[i] = pieces_of(stretches[k], setup.average)[i - owner.index(k)]
+    channels = list(setup.instrument.channels)
+    fixed = [k for k in (*search.always, *model.selection.active) if k not in moving]
+    reg = model.regression
+
+    def white(values):
+        return np.concatenate(whitened(model, values))
+
+    y = white([np.nan_to_num(model.rows[r].y) for r in fitted])
+    base = [white([model.rows[r].x[:, :, c] for r in fitted]) for c in reg.columns(fixed)]
+    prior = reg.precision[reg.columns(fixed)]
+    spans = [(k, i) for k in moving for i in search.terms[k].form.nonlinear]
+    start = np.array([search.terms[k].values[i] for k, i in spans])
+    limits = [search.terms[k].form.parameters[i] for k, i in spans]
+    low, high = np.array([p.low for p in limits]), np.array([p.high for p in limits])
+    scale = np.maximum(np.abs(start), 1e-9)
+
+    def with_values(theta):
+        out = {k: np.array(search.terms[k].values, float) for k in moving}
+        for (k, i), value in zip(spans, theta, strict=True):
+            out[k][i] = value
+        return {k: replace(search.terms[k], values=tuple(v)) for k, v in out.items()}
+
+    def columns_of(term):
+        whole: dict[int, list[np.ndarray]] = {}
+        parts = []
+        for i in fitted:
+            k = owner[i]
+            if k not in whole:
+                whole[k] = [averaged(x, setup.average) for x in term_columns(term, stretches[k], setup.vehicle)]
+            block = []
+            for column in whole[k]:
+                full = np.zeros((len(index[i]), 6))
+                full[:, channels] = column[index[i]][:, channels]
+                block.append(full)
+            parts.append(block)
+        return [white([p[k] for p in parts]) for k in range(len(parts[0]))]
+
+    def residual(theta):
+        target, free = y, list(base)
+        weights = list(prior)
+        for term in with_values(theta).values():
+            own = columns_of(term)
+            if term.form.linear:
+                free += own
+                weights += [0.0] * len(own)
+            else:
+                target = target - own[0]
+        if not free:
+            return target
+        x = np.stack(free, axis=1)
+        gram = x.T @ x + np.diag(weights)
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        beta = unit * np.linalg.solve(gram * np.outer(unit, unit) + 1e-10 * np.eye(len(gram)), unit * (x.T @ target))
+        return target - x @ beta
+
+    start = np.clip(start, low + 1e-9 * scale, high - 1e-9 * scale)
+    found = least_squares(
+        residual, start, bounds=(low, high), x_scale=scale, diff_step=1e-3, max_nfev=25, xtol=1e-6, ftol=1e-8
+    )
+    best = with_values(found.x)
+    return [best.get(t.key, t) for t in model.terms]
+
+
+def fitted_model(setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None) -> ReadingModel:
+    """Search and refinement in turn until the same terms come out."""
+    model = reading_model(setup, terms, active, loadings)
+    for _ in range(ROUNDS):
+        before = set(model.selection.active)
+        if not any(model.search.terms[k].form.nonlinear for k in before):
+            break
+        terms = refined(model, loadings)
+        again = reading_model(setup, terms, model.selection.active, loadings, (model.noise, model.regression.filters))
+        same = set(again.selection.active) == before
+        model = again
+        if same:
+            break
+    return model
+
+
+def active_values(model: ReadingModel, key: str) -> np.ndarray:
+    """Parameter values of a term at work, linear and nonlinear."""
+    term = model.search.terms[key]
+    values = np.array(term.values, float)
+    if term.form.linear:
+        fit = model.selection.fit
+        where = [list(fit.columns).index(c) for c in model.regression.columns([key])]
+        values[list(term.form.linear)] = fit.beta[where]
+    return values
+
+
+def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
+    """One-sigma of every parameter of a term with nonlinear ones, (p,): its slopes join the regression."""
+    setup, term = model.setup, model.search.terms[key]
+    values = active_values(model, key)
+    at_work = [
+        replace(t, values=tuple(active_values(model, t.key))) if t.key in model.selection.active else t
+        for t in model.terms
+    ]
+    chosen = [t for t in at_work if t.kind != "effect" or t.key in model.selection.active]
+    own = replace(term, values=tuple(values))
+    slopes = [
+        Term(f"{key}/slope{i}", "slope", term.effect, term.form, tuple(values), 1, (np.inf,), slope_of=i)
+        for i in term.form.nonlinear
+    ]
+    if not term.form.linear:
+        chosen = [t for t in chosen if t.key != key]
+    rows = rows_of(setup, [*chosen, *slopes], loadings)
+    if not term.form.linear:
+        # The form itself, at gain one, is in the model: only its slopes are fitted.
+        known = rows_of(setup, [own], loadings)
+        rows = [Rows(r.run, r.time_s, r.y - k.x[:, :, 0], r.x) for r, k in zip(rows, known, strict=True)]
+    per = block_length(setup, rows)
+    regression = build(
+        rows, [*chosen, *slopes], model.regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz
+    )
+    fit = regression.fit([t.key for t in (*chosen, *slopes)], jackknife=True)
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    at = {c: s for c, s in zip(fit.columns, sd, strict=True)}
+    out = np.zeros(len(values))
+    for i, slope in zip(term.form.nonlinear, slopes, strict=True):
+        out[i] = at[regression.columns([slope.key])[0]]
+    if term.form.linear:
+        for i, c in zip(term.form.linear, regression.columns([key]), strict=True):
+            out[i] = at[c]
+    return out

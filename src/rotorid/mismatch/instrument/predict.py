@@ -1,0 +1,90 @@
+"""What a vehicle file with its effects says an instrument reads: the simulator of kinds `stand` and `bench`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Form, SpeedForm
+from rotorid.effects.loading import Instrument, Loading, forms_of
+from rotorid.errors import InputError
+from rotorid.mismatch.findings import Analysis
+from rotorid.mismatch.instrument.columns import form_reading
+from rotorid.mismatch.instrument.setup import loaded_by, with_speed
+from rotorid.recordings import Vehicle
+from rotorid.vehicle.improved import speeds_of_commands
+
+SAME = 1e-5
+"""Relative difference above which a vehicle read back is not the model written."""
+
+
+def entries(vehicle: Vehicle, instrument: Instrument) -> tuple[list[tuple[Form, np.ndarray]], bool]:
+    """Forms that act on load or reading with their values, and whether any acts between command and speed."""
+    found, chain = [], False
+    for number, entry in enumerate(vehicle.effects, 1):
+        where = f"vehicle {vehicle.name}: effects entry {number}"
+        effect = catalogue().get(entry.get("id"))
+        if effect is None:
+            raise InputError(f"{where} has id {entry.get('id')!r}, expected one of the catalogue")
+        if any(f.name == entry.get("form") for f in effect.speed_forms if isinstance(f, SpeedForm)):
+            chain = True
+            continue
+        forms = {f.name: f for f in forms_of(effect, instrument)}
+        if entry.get("form") not in forms:
+            raise InputError(
+                f"{where} ({effect.id}) has form {entry.get('form')!r}, expected one of {', '.join(forms)}"
+            )
+        form, given = forms[entry["form"]], entry.get("parameters") or {}
+        symbols = [p.symbol for p in form.parameters]
+        if set(given) != set(symbols):
+            raise InputError(
+                f"{where} ({effect.id}) gives parameters {', '.join(given)}, expected {', '.join(symbols)}"
+            )
+        found.append((form, np.array([float(given[s]) for s in symbols])))
+    return found, chain
+
+
+def predicted(
+    vehicle: Vehicle, instrument: Instrument, loading: Loading, full_voltage: float | None = None
+) -> np.ndarray:
+    """Reading that the vehicle with its effects predicts for a stretch, (n, 6)."""
+    forms, chain = entries(vehicle, replace(instrument, vehicle=vehicle))
+    if not loading.measured and loading.command is not None:
+        speed = loading.command
+        if chain:
+            only = tuple(e for e in vehicle.effects if is_chain(e))
+            bare = vehicle.model_copy(update={"effects": only})
+            speed = speeds_of_commands(bare, speed, loading.time_s, loading.motion.voltage, full_voltage)
+        loading = replace(loading, motion=with_speed(loading.motion, speed))
+    loaded = loaded_by(loading, vehicle)
+    out = loaded.load.copy()
+    if vehicle.reading_gain is not None:
+        out[:, :3] *= np.array(vehicle.reading_gain)
+    for form, values in forms:
+        out += form_reading(form, values, loaded, vehicle)
+    return out
+
+
+def is_chain(entry: dict) -> bool:
+    """Whether an entry acts between command and rotor speed."""
+    effect = catalogue().get(entry.get("id"))
+    return effect is not None and any(f.name == entry.get("form") for f in effect.speed_forms)
+
+
+def full_voltage_of(loadings: tuple[Loading, ...]) -> float | None:
+    """Largest battery voltage of a set, V."""
+    known = [float(np.max(x.motion.voltage)) for x in loadings if x.motion.voltage is not None]
+    return max(known, default=None)
+
+
+def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle) -> None:
+    """RuntimeError unless a vehicle read back predicts the readings that the model predicts."""
+    volts = full_voltage_of(analysis.loadings)
+    for loading in analysis.loadings:
+        ours = predicted(written, analysis.instrument, loading, volts)
+        theirs = predicted(reloaded, analysis.instrument, loading, volts)
+        scale = max(float(np.abs(ours).max()), 1e-12)
+        if not np.allclose(ours, theirs, rtol=0, atol=SAME * scale):
+            raise RuntimeError(f"improved_vehicle.yaml read back predicts another reading in {loading.run}")

@@ -1,0 +1,392 @@
+"""From a recording set of kind `stand` or `bench` to even stretches of load and reading.
+
+The load is what the believed values predict at the sensor: on a bench the known force, on a stand thrust and torque
+of the rotors moved to the sensor, and the weight where the reading was not zeroed with it on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from rotorid.effects.contract import Motion
+from rotorid.effects.hysteresis import NARROW, play
+from rotorid.effects.loading import CHANNELS, Instrument, Loading, at_sensor, rotation_of, weight
+from rotorid.errors import InputError
+from rotorid.mismatch.instrument.settling import settling_s, without_settling
+from rotorid.mismatch.prepare import split_runs
+from rotorid.mismatch.rows import baseline_wrench
+from rotorid.recordings import RecordingSet, Run, Split, Vehicle
+from rotorid.recordings import columns as c
+
+GAP_STEPS = 4.0
+"""A step of the clock longer than this many median steps begins a new stretch."""
+UNEVEN = 0.3
+"""Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
+SHORTEST = 4
+MOST_VALUES = 45_000
+"""Samples times channels that are analysed; longer sets are averaged over several samples first."""
+LOADED_SHARE = 0.05
+BACK_SHARE = 0.05
+STEADY_HZ = 5.0
+"""Below this rate a recording is a list of steady points: nothing that takes time can be seen."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A set of kind `stand` or `bench` ready for analysis."""
+
+    recordings: RecordingSet
+    vehicle: Vehicle
+    split: Split
+    instrument: Instrument
+    loadings: tuple[Loading, ...]
+    average: int
+    """Samples that one row of the analysis is the mean of."""
+    full_speed: float | None
+    """Rotor speed at full throttle, rad/s; None where it is not stated and not needed."""
+    estimated_full_speed: bool = False
+    settling_s: float = 0.0
+    """How long after a step of the load a bench's readings are left out, s."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Rate of the rows."""
+        return self.instrument.rate_hz / self.average
+
+    @property
+    def steady_points(self) -> bool:
+        return self.instrument.rate_hz < STEADY_HZ
+
+
+def reading_columns(vehicle: Vehicle) -> tuple[str, ...]:
+    """Columns of the six channels; a bench reads forces."""
+    return c.FORCE + c.MOMENT
+
+
+def compared_channels(recordings: RecordingSet) -> tuple[int, ...]:
+    """Channels that can be compared: read and, on a bench, known."""
+    names = c.FORCE + c.MOMENT
+    found = []
+    for k, name in enumerate(names):
+        if recordings.vehicle.kind == "bench" and (
+            k >= 3 or not any(r.has(c.REFERENCE_FORCE[k]) for r in recordings.runs)
+        ):
+            continue
+        if all(run.has(name) for run in recordings.runs):
+            found.append(k)
+    if not found:
+        raise InputError(
+            f"{recordings.name}: no force or moment is recorded in every run"
+            + (" together with its reference" if recordings.vehicle.kind == "bench" else "")
+            + ": nothing can be compared"
+        )
+    return tuple(found)
+
+
+def _filled(run: Run, name: str) -> np.ndarray | None:
+    """A column with empty cells interpolated, its ends held; None where there is no value at all."""
+    if not run.has(name):
+        return None
+    values, time_s = run.column(name), run.time_s
+    known = np.isfinite(values)
+    return values if known.all() else np.interp(time_s, time_s[known], values[known])
+
+
+def _several(run: Run, names: tuple[str, ...]) -> np.ndarray | None:
+    columns = [_filled(run, n) for n in names]
+    return None if not columns or any(x is None for x in columns) else np.stack(columns, axis=1)
+
+
+def commands(run: Run, count: int) -> tuple[np.ndarray | None, bool]:
+    """Commands of a run, (n, k), and whether they are throttles (to be multiplied by the full speed)."""
+    commanded = _several(run, c.rotor_columns("rotor_command", count))
+    if commanded is not None:
+        return commanded, False
+    return _several(run, c.rotor_columns("throttle", count)), True
+
+
+def _pieces(time_s: np.ndarray, keep: np.ndarray, dt_s: float) -> list[np.ndarray]:
+    """Indices of stretches without a gap."""
+    index = np.flatnonzero(keep)
+    cuts = np.flatnonzero(np.diff(time_s[index]) > GAP_STEPS * dt_s) + 1
+    return [p for p in np.split(index, cuts) if len(p) >= SHORTEST]
+
+
+def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
+    """An even grid to interpolate to, None where the samples are even already."""
+    steps = np.diff(time_s)
+    if np.all(np.abs(steps - np.median(steps)) < UNEVEN * np.median(steps)):
+        return None
+    return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
+
+
+def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: float, full_speed: float | None):
+    """Loadings of one run, load still empty."""
+    names = c.FORCE + c.MOMENT
+    read = np.full((len(run.time_s), 6), np.nan)
+    for k in channels:
+        read[:, k] = run.column(names[k])
+    keep = np.isfinite(read[:, list(channels)]).all(axis=1)
+    reference = None
+    if vehicle.kind == "bench":
+        reference = np.nan_to_num(run.array(c.REFERENCE_FORCE))
+        keep &= np.isfinite(run.array(c.REFERENCE_FORCE)[:, [k for k in channels]]).all(axis=1)
+    count = vehicle.rotor_count
+    speeds = _several(run, c.rotor_columns("rotor_speed", count)) if count else None
+    command, throttle = commands(run, count) if count else (None, False)
+    if command is not None and throttle:
+        command = command * full_speed if full_speed else None
+    attitude = _several(run, c.MOUNT)
+    others = {
+        name: _filled(run, name)
+        for name in (c.BATTERY_VOLTAGE, c.TEMPERATURE, c.HEIGHT, *run.unknown_columns)
+        if run.has(name)
+    }
+    out = []
+    for piece in _pieces(run.time_s, keep, dt_s):
+        stamps = run.time_s[piece]
+        grid = _even(stamps, dt_s)
+
+        def at(values, piece=piece, stamps=stamps, grid=grid):
+            if values is None:
+                return None
+            values = values[piece]
+            if grid is None:
+                return values
+            if values.ndim == 1:
+                return np.interp(grid, stamps, values)
+            return np.stack([np.interp(grid, stamps, v) for v in values.T], axis=1)
+
+        time_s = stamps if grid is None else grid
+        if len(time_s) < SHORTEST:
+            continue
+        own = {name: at(values) for name, values in others.items()}
+        speed, ordered, tilt = at(speeds), at(command), at(attitude)
+        rotation = None if tilt is None else rotation_of(tilt[:, 0], tilt[:, 1])
+        if vehicle.kind == "stand" and rotation is None:
+            rotation = np.broadcast_to(np.eye(3), (len(time_s), 3, 3))
+            tilt = np.zeros((len(time_s), 2))
+        motion = Motion(
+            time_s=time_s,
+            rotor_speed=None,
+            rotation=rotation,
+            voltage=own.get(c.BATTERY_VOLTAGE),
+            height=own.get(c.HEIGHT),
+        )
+        if count:
+            motion = with_speed(motion, ordered if speed is None else speed)
+        temperature = own.get(c.TEMPERATURE)
+        load = np.zeros((len(time_s), 6))
+        if reference is not None:
+            load[:, :3] = at(reference)
+        out.append(
+            Loading(
+                run=run.name,
+                time_s=time_s,
+                run_time_s=time_s - run.time_s[0],
+                load=load,
+                reading=at(read),
+                rest=np.zeros(6),
+                motion=motion,
+                attitude=None if tilt is None else (tilt[:, 0], tilt[:, 1]),
+                temperature=None if temperature is None else temperature - others[c.TEMPERATURE][0],
+                command=ordered,
+                measured=speed is not None,
+                extra={k: v for k, v in own.items() if k not in (c.BATTERY_VOLTAGE, c.TEMPERATURE, c.HEIGHT)},
+            )
+        )
+    return out
+
+
+def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
+    """The motion with these rotor speeds (n, k), rad/s, and their derivative (quadratic over five samples)."""
+    if speed is None:
+        return motion
+    acceleration = None
+    if motion.size >= 7:
+        dt_s = float(np.median(np.diff(motion.time_s)))
+        acceleration = savgol_filter(speed, 5, 2, deriv=1, delta=dt_s, axis=0)
+    return replace(motion, rotor_speed=speed, rotor_acceleration=acceleration)
+
+
+def rotor_wrench(motion: Motion, vehicle: Vehicle) -> np.ndarray:
+    """Reading of the believed thrusts and torques, (n, 6)."""
+    force, arm, torque = baseline_wrench(motion, vehicle)
+    return at_sensor(force, arm + torque, motion, vehicle)
+
+
+def has_weight(vehicle: Vehicle) -> bool:
+    """Whether the weight is in the reading."""
+    return vehicle.kind == "stand" and not vehicle.tared and vehicle.mass_kg is not None
+
+
+def loaded_by(loading: Loading, vehicle: Vehicle) -> Loading:
+    """The loading with its load predicted from the believed values (a bench knows its load already)."""
+    if vehicle.kind == "bench":
+        return loading
+    load = rotor_wrench(loading.motion, vehicle)
+    rest = np.zeros(6)
+    if has_weight(vehicle):
+        heavy = weight(loading.motion, vehicle)
+        load, rest = load + heavy, heavy[0]
+    return replace(loading, load=load, rest=rest)
+
+
+def first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> float:
+    """Speed at full throttle that explains the thrust read best, rad/s, a constant left free in each run."""
+    vehicle = recordings.vehicle
+    thrusts, reads = [], []
+    axis = 2
+    if axis not in channels:
+        raise InputError(f"{recordings.name}: throttle without rotor_speed_limits_rad_s needs force_z_n")
+    for run in recordings.runs:
+        u, _ = commands(run, vehicle.rotor_count)
+        thrust = -(u**2) @ vehicle.thrust_coefficients_n_s2()
+        good = np.isfinite(run.column(c.FORCE[axis]))
+        read = run.column(c.FORCE[axis])[good]
+        thrusts.append(thrust[good] - thrust[good].mean())
+        reads.append(read - read.mean())
+    x, y = np.concatenate(thrusts), np.concatenate(reads)
+    square = float(x @ y) / max(float(x @ x), 1e-300)
+    return float(np.sqrt(abs(square))) if square else 1000.0
+
+
+def set_up(recordings: RecordingSet) -> Setup:
+    """Split, stretches and loads of a set."""
+    vehicle = recordings.vehicle
+    channels = compared_channels(recordings)
+    dt_s = float(np.median(np.concatenate([np.diff(r.time_s) for r in recordings.runs])))
+    full, estimated = None, False
+    if vehicle.rotor_count:
+        if not any(commands(r, vehicle.rotor_count)[0] is not None for r in recordings.runs) and not all(
+            r.has(*c.rotor_columns("rotor_speed", vehicle.rotor_count)) for r in recordings.runs
+        ):
+            raise InputError(f"{recordings.name}: neither rotor speeds nor commands nor throttles are recorded")
+        measured = all(r.has(*c.rotor_columns("rotor_speed", vehicle.rotor_count)) for r in recordings.runs)
+        throttle = any(commands(r, vehicle.rotor_count)[1] for r in recordings.runs)
+        if vehicle.rotor_speed_limits_rad_s is not None:
+            full = float(vehicle.rotor_speed_limits_rad_s[1])
+        elif throttle and measured:
+            full, estimated = measured_full_speed(recordings), True
+        elif throttle:
+            full, estimated = first_full_speed(recordings, channels), True
+    loadings = [
+        loaded_by(x, vehicle) for run in recordings.runs for x in stretches_of(run, vehicle, channels, dt_s, full)
+    ]
+    if not loadings:
+        raise InputError(f"{recordings.name}: no run has {SHORTEST} samples in a row with every channel")
+    instrument = instrument_of(recordings, vehicle, channels, tuple(loadings), dt_s)
+    wait_s = 0.0
+    if instrument.bench and 1 / dt_s > STEADY_HZ:
+        wait_s = settling_s(tuple(loadings), instrument.loaded, instrument.largest, dt_s)
+        if wait_s:
+            loadings = without_settling(tuple(loadings), instrument.loaded, instrument.largest, wait_s)
+            instrument = replace(instrument, by_hand=True)
+    total = sum(x.size for x in loadings) * len(channels)
+    average = max(1, int(np.ceil(total / MOST_VALUES)))
+    return Setup(
+        recordings=recordings,
+        vehicle=vehicle,
+        split=split_runs(recordings),
+        instrument=instrument,
+        loadings=tuple(distanced(x, recordings) for x in loadings),
+        average=average if 1 / dt_s / average > STEADY_HZ else 1,
+        full_speed=full,
+        estimated_full_speed=estimated,
+        settling_s=wait_s,
+    )
+
+
+def measured_full_speed(recordings: RecordingSet) -> float:
+    """Speed per unit of throttle, robustly, from speeds that were measured beside it."""
+    count = recordings.vehicle.rotor_count
+    ratios = []
+    for run in recordings.runs:
+        u, _ = commands(run, count)
+        speed = _several(run, c.rotor_columns("rotor_speed", count))
+        if u is not None and speed is not None:
+            turning = u > 0.1 * np.nanmax(u)
+            ratios.append((speed[turning] / u[turning]).ravel())
+    return float(np.median(np.concatenate(ratios))) if ratios else 1000.0
+
+
+def distanced(loading: Loading, recordings: RecordingSet) -> Loading:
+    name = distance_column(recordings)
+    return replace(loading, distance=loading.extra.get(name)) if name else loading
+
+
+def distance_column(recordings: RecordingSet) -> str:
+    """Unknown column that is a distance to a wall or fixture and differs between runs or within one."""
+    for name in recordings.runs[0].unknown_columns:
+        if name.endswith("_m") and any(w in name for w in ("distance", "wall", "fixture")):
+            values = np.concatenate([r.column(name) for r in recordings.runs])
+            if np.isfinite(values).all() and np.ptp(values) > 0:
+                return name
+    return ""
+
+
+def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
+    """What the forms of effects need to know beforehand."""
+    load = np.concatenate([x.load for x in loadings])
+    spread = np.concatenate([x.load - x.rest for x in loadings]).std(axis=0)
+    still = load.std(axis=0) < 1e-9
+    loaded = []
+    for group in ((0, 1, 2), (3, 4, 5)):
+        top = max(spread[list(group)].max(), 1e-12)
+        loaded += [k for k in group if spread[k] > LOADED_SHARE * top and not still[k] and k in channels]
+    if not any(k < 3 for k in loaded) and spread[:3].max() > 1e-9:
+        loaded.insert(0, int(np.argmax(spread[:3])))
+    largest = np.maximum(np.abs(np.concatenate([x.load - x.rest for x in loadings])).max(axis=0), 1e-9)
+    attitudes = [np.concatenate([x.attitude[i] for x in loadings]) for i in (0, 1)] if loadings[0].attitude else []
+    return Instrument(
+        vehicle=vehicle,
+        channels=channels,
+        loaded=tuple(loaded),
+        rate_hz=1.0 / dt_s,
+        duration_s=float(max(x.time_s[-1] - x.time_s[0] for x in loadings)),
+        runs=tuple(r.name for r in recordings.runs),
+        run_s=float(max(r.time_s[-1] - r.time_s[0] for r in recordings.runs)),
+        training=split_runs(recordings).training,
+        largest=tuple(float(v) for v in largest),
+        returns=tuple(k for k in loaded if comes_back(loadings, k, float(largest[k]))),
+        tilts=any(np.ptp(a) > 0.02 for a in attitudes),
+        temperature=all(x.temperature is not None for x in loadings)
+        and any(np.ptp(x.temperature) > 0.1 for x in loadings),
+        distance=distance_column(recordings),
+    )
+
+
+def comes_back(loadings: tuple[Loading, ...], channel: int, largest: float) -> bool:
+    """Whether a load is met from above as well as from below at values other than none."""
+    falling = total = 0
+    for x in loadings:
+        load = x.load[:, channel] - x.rest[channel]
+        width = NARROW * largest
+        branch = (load - play(load, width)) / width * np.sign(load)
+        at_work = np.abs(load) > BACK_SHARE * largest
+        falling += int(np.sum(at_work & (branch < -0.5)))
+        total += int(np.sum(at_work))
+    return falling > BACK_SHARE * max(total, 1)
+
+
+def pieces_of(loading: Loading, count: int) -> list[np.ndarray]:
+    """Numbers of the rows (means of `count` samples) of each part of a stretch that is compared."""
+    total = loading.size // count
+    if loading.keep is None:
+        return [np.arange(total)] if total >= 2 else []
+    good = np.flatnonzero(loading.keep[: total * count].reshape(total, count).all(axis=1))
+    return [p for p in np.split(good, np.flatnonzero(np.diff(good) > 1) + 1) if len(p) >= SHORTEST]
+
+
+def averaged(values: np.ndarray, count: int) -> np.ndarray:
+    """Means of `count` samples in a row, (n, …) to (n // count, …)."""
+    if count == 1:
+        return values
+    whole = len(values) // count * count
+    return values[:whole].reshape(len(values) // count, count, *values.shape[1:]).mean(axis=1)
+
+
+__all__ = ["CHANNELS", "Setup", "averaged", "set_up"]
