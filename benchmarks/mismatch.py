@@ -29,34 +29,16 @@ import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 
+from rotorid.effects.describe import EXAMPLE  # noqa: E402
 from rotorid.mismatch.analyse import analyse  # noqa: E402
-from rotorid.recordings import RecordingSet, Run, Vehicle  # noqa: E402
+from rotorid.recordings import RecordingSet, Run  # noqa: E402
 
 ROWS = ((15, 250), (30, 250), (60, 250), (120, 250), (240, 250), (600, 500))
 HOUR = (3600, 500)
 PERIOD_S = 60
 DRAG, TAU_S, G = 6e-5, 0.04, 9.81
 WIND_M_S = np.array([2.0, -1.0, 0.0])
-VEHICLE = Vehicle(
-    name="benchmark",
-    kind="flight",
-    mass_kg=0.652,
-    inertia_kg_m2={"xx": 2.489e-3, "yy": 2.5743e-3, "zz": 4.6838e-3},
-    rotors=[
-        {"x_m": x, "y_m": y, "spin": s}
-        for x, y, s in (
-            (0.0884, 0.0884, "ccw"),
-            (0.0884, -0.0884, "cw"),
-            (-0.0884, -0.0884, "ccw"),
-            (-0.0884, 0.0884, "cw"),
-        )
-    ],
-    thrust_coefficient_n_s2=1.3877e-6,
-    torque_coefficient_n_m_s2=1.8558e-8,
-    rotor_radius_m=0.0635,
-    ground_z_m=0.0,
-    rotor_speed_limits_rad_s=(0, 2500),
-)
+VEHICLE = EXAMPLE.model_copy(update={"name": "benchmark", "ground_z_m": 0.0, "rotor_speed_limits_rad_s": (0.0, 2500.0)})
 
 
 def periodic(rng: np.random.Generator, rate_hz: int, size: float, highest_hz: float) -> np.ndarray:

@@ -14,7 +14,6 @@ from scipy.stats import t as student_t
 
 from rotorid.bench.loadcell import LineFit, fit_line
 from rotorid.bench.matrix import Calibration, calibrate
-from rotorid.bench.prepare import CELLS, FORCES
 from rotorid.bench.reconstruct import GF_N, Geometry, cell_forces, cell_variance, force_covariance, forces
 from rotorid.errors import InputError
 from rotorid.io.tables import by_recording
@@ -165,11 +164,6 @@ def by_series(table: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
-
-
-def cells_or_forces(prepared: pd.DataFrame) -> tuple[str, ...]:
-    """The channels of a prepared table: six cells, or the sensor's forces."""
-    return CELLS if CELLS[0] in prepared else FORCES
 
 
 def only(means: Means, kept: np.ndarray) -> Means:

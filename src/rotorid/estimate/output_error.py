@@ -107,11 +107,6 @@ def tied(parameters: np.ndarray) -> np.ndarray:
     return np.concatenate([weights_of_inertias(np.exp(parameters[:3])), np.zeros(3)])
 
 
-def tied_with_damping(parameters: np.ndarray) -> np.ndarray:
-    """Parameters: logarithms of the inertias and three damping rates, 1/s."""
-    return np.concatenate([weights_of_inertias(np.exp(parameters[:3])), parameters[3:6]])
-
-
 def untied(parameters: np.ndarray) -> np.ndarray:
     """Parameters: logarithms of the inertias and three gyroscopic weights of their own."""
     return np.concatenate([parameters[3:6], np.exp(-parameters[:3]), np.zeros(3)])

@@ -21,7 +21,6 @@ from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
 
 RPM = 2 * np.pi / 60
-GROUND_VOLTS = 1.0
 
 
 @dataclass(frozen=True)

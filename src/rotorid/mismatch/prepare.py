@@ -22,6 +22,7 @@ from rotorid.mismatch.rows import (
     form_columns,
     offset_columns,
     project,
+    residual,
     slope_column,
     value_columns,
 )
@@ -141,8 +142,6 @@ class Prepared:
     @property
     def groups(self) -> tuple[str, ...]:
         """Channel groups that every segment has."""
-        from rotorid.mismatch.rows import residual
-
         found = [set(residual(s, self.vehicle)) for s in self.segments]
         common = set.intersection(*found) if found else set()
         return tuple(g for g in ("force", "moment", "accelerometer", "gyroscope") if g in common)

@@ -29,18 +29,8 @@ SMALLEST_SIZE = 0.15
 LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
 LIMIT_STAGE = 2
-MOST_SAMPLES = 40_000
-"""Rotor-speed samples per fit; longer recordings are represented by stretches spread over all runs."""
 
 Chain = tuple[tuple[str, SpeedForm], ...]
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """Even stretch of commands; `start` is its offset in seconds from the run's beginning."""
-
-    segment: Segment
-    block_s: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from rotorid.proof.score import kind_and_rest
 Score = Mapping[str, Any]
 NOTHING, OTHER_VALUE, AMBIGUOUS = "nothing", "a value", "several"
 MIXED = ("mixture",)
-FREE_OF_PHYSICS = ("wrong",)
 WELL_SIZED = ("moderate", "strong")
 ORACLE_MARGIN = 1.05
 

@@ -9,8 +9,6 @@ from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
 from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 
-MOST_PROBES_SHARE = 0.2
-
 
 def probes(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
     """Generic inputs on the rows of a stretch, by the names that a person knows."""

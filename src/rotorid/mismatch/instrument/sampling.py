@@ -15,7 +15,6 @@ LEAST_SAMPLES = 200
 ON_GRID = 0.99
 OFF_GRID = 0.02
 """Distance to the grid, as a share of a step, that still counts as on it."""
-MOST_STEPS_OF_NOISE = 6.0
 
 
 def step_of(values: np.ndarray) -> float:

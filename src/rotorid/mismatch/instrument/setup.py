@@ -61,11 +61,6 @@ class Setup:
         return self.instrument.rate_hz < STEADY_HZ
 
 
-def reading_columns(vehicle: Vehicle) -> tuple[str, ...]:
-    """Columns of the six channels; a bench reads forces."""
-    return c.FORCE + c.MOMENT
-
-
 def compared_channels(recordings: RecordingSet) -> tuple[int, ...]:
     """Channels that can be compared: read and, on a bench, known."""
     names = c.FORCE + c.MOMENT

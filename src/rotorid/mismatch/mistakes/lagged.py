@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal.windows import hann
-from scipy.stats import t as student
 
 from rotorid.mismatch.motion import stretches
 from rotorid.signal import kernels
@@ -134,13 +133,6 @@ class LaggedFit:
     nuisance: np.ndarray
     """N, (q, r)."""
     block_count: int
-
-    def lag_p(self, threshold_s: float) -> float:
-        """p-value that the delay is no larger than a threshold."""
-        if self.lag_sd <= 0:
-            return 1.0
-        statistic = (abs(self.lag_s) - threshold_s) / self.lag_sd
-        return float(student.sf(statistic, max(self.block_count - 2, 1)))
 
 
 def _smooth(power: np.ndarray) -> np.ndarray:
