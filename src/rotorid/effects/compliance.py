@@ -22,10 +22,12 @@ def _form(name, pairs):
 
 
 def reading_forms(instrument):
+    if not instrument.bench:
+        return ()
     sources = tuple(s for s in instrument.loaded if s < 3)
     forms = []
     for s in sources:
-        targets = tuple(t for t in instrument.channels if t < 3 or not instrument.bench)
+        targets = tuple(t for t in instrument.channels if t < 3)
         if len(targets) > 1:
             forms.append(_form(f"under {AXES[s]}", tuple((t, s) for t in targets)))
             aside = [t for t in targets if t != s and t < 3]

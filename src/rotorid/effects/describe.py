@@ -45,7 +45,19 @@ EXAMPLE_STAND = Instrument(
     returns=ALL_CHANNELS,
     distance="wall_distance_m",
 )
-"""A stand that shows every effect: its forms' parameters depend on its channels, bounds on rate and duration."""
+"""A stand that shows what stands show: its forms' parameters depend on its channels, bounds on rate and duration."""
+
+FORCES = (0, 1, 2)
+EXAMPLE_BENCH = replace(
+    EXAMPLE_STAND,
+    vehicle=Vehicle(name="bench", kind="bench"),
+    channels=FORCES,
+    loaded=FORCES,
+    returns=FORCES,
+    tilts=False,
+    distance="",
+)
+"""A bench with three channels of force, for the effects that a stand cannot show."""
 
 EXCITATION = {
     "rotor_speed": "rotors that turn",
@@ -111,12 +123,17 @@ def columns_of(form: Form | SpeedForm | SetForm) -> tuple[str, ...]:
     return tuple(dict.fromkeys(COLUMNS_OF[name] for name in form.requires))
 
 
-def reading_rows(effect: Effect, instrument: Instrument = EXAMPLE_STAND) -> list[FormRow]:
-    """Forms of an effect on a stand or bench of its own, those of one equation in one row."""
+def instrument_forms(effect: Effect) -> tuple[Form, ...]:
+    """Forms that an effect has for instruments alone: a stand's, else (where a stand cannot show it) a bench's."""
     if effect.reading_forms is None:
-        return []
+        return ()
+    return forms_of(effect, EXAMPLE_STAND) or forms_of(effect, EXAMPLE_BENCH)
+
+
+def reading_rows(effect: Effect) -> list[FormRow]:
+    """Forms of an effect on a stand or bench, those of one equation in one row."""
     found: dict[str, list[Form]] = {}
-    for form in forms_of(effect, instrument):
+    for form in instrument_forms(effect):
         found.setdefault(form.equation, []).append(form)
     return [
         FormRow(

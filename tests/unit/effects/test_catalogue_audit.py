@@ -18,9 +18,8 @@ from scipy.optimize import least_squares
 import rotorid.effects
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import COLUMNS_OF, LACK, Motion, SpeedPath, not_testable_reason
-from rotorid.effects.describe import EXAMPLE_STAND, EXCITATION
+from rotorid.effects.describe import EXCITATION, instrument_forms
 from rotorid.effects.gust import window_form
-from rotorid.effects.loading import forms_of
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.prepare import make_terms
 from rotorid.mismatch.rows import form_columns, project, residual
@@ -80,9 +79,8 @@ def set_forms():
 def reading_forms():
     """Every form of an instrument's own; what they add is held by `tests/unit/mismatch/test_instrument.py`."""
     for effect in EFFECTS:
-        if effect.reading_forms is not None:
-            for form in forms_of(effect, EXAMPLE_STAND):
-                yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
+        for form in instrument_forms(effect):
+            yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
 
 
 def flown_with(effect, form) -> list[Motion]:
@@ -121,7 +119,7 @@ def test_an_effect_is_stated_in_full(effect):
     assert set(effect.confusers) <= set(catalogue()) - {effect.id}
     vehicle = audit_vehicle()
     acting = (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle))
-    read = forms_of(effect, EXAMPLE_STAND) if effect.reading_forms is not None else ()
+    read = instrument_forms(effect)
     # The steps of a reading are recognised from the readings themselves, without a form.
     assert acting or read or effect.form_named is not type(effect).form_named or effect.id == "quantisation"
     assert len({form.name for form in read}) == len(read)

@@ -98,7 +98,10 @@ def instrument_for(loading: Loading, vehicle: Vehicle) -> Instrument:
 def forms():
     vehicle = stand_vehicle()
     instrument = instrument_for(stand_loading(vehicle), vehicle)
-    return [(key, form) for key in NEW for form in forms_of(catalogue()[key], instrument)]
+    bench = replace(instrument, vehicle=Vehicle.model_validate({"name": "b", "kind": "bench"}))
+    return [
+        (key, form) for key in NEW for form in forms_of(catalogue()[key], bench if key == "compliance" else instrument)
+    ]
 
 
 @pytest.mark.parametrize(("key", "form"), forms(), ids=lambda x: getattr(x, "name", x))

@@ -110,6 +110,8 @@ def _reason(effect_id: str, setup: Setup) -> str:
         return "no moment is read"
     if effect_id == "hysteresis":
         return "the load never comes back from above to a value other than none"
+    if effect_id == "compliance" and not setup.instrument.bench:
+        return "a stand has no known load whose direction could be seen to turn"
     if effect_id in ("crosstalk", "mount_tilt", "compliance"):
         return "one channel only is read"
     if effect_id in ("amplifier_filter", "structural_resonance", "creep", "zero_drift", "wall_interference"):
