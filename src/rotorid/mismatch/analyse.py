@@ -13,9 +13,11 @@ import numpy as np
 from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence, leftover
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.gusts import gust_finding, with_gusts
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.next_flight import next_flight
@@ -29,13 +31,11 @@ from rotorid.mismatch.wrench import (
     WrenchModel,
     after_residual,
     chosen,
-    in_wind,
     nonlinear_intervals,
     path_segments,
     refine_nonlinear,
     reverse_regression,
     speed_path,
-    with_gusts,
     with_wind,
     wrench_model,
 )
@@ -80,9 +80,11 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
             segments, noisy, model = prepared.segments, prepared.noisy_segments, plain
             found = (nothing_between(found[0]), *found[1:])
 
+    segments, noisy = model.segments, model.noisy_segments
     if model.wind is not None:
         findings.append(wind_finding(model))
-        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
+    if model.gusts:
+        findings.append(gust_finding(model.gusts))
     if found is None:
         reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
     else:
@@ -125,6 +127,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
     notes += run_scale_notes(model)
     traces = make_traces(prepared, model, found, measured, plain_values, values)
+    findings, told = with_square_term(findings, told, model)
+    told = without_weight_of_payload(findings, told)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
     findings = together(findings)
@@ -172,9 +176,8 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
             break
     model = with_wind(prepared, model, segments, noisy, terms)
     if model.wind is not None:
-        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
         terms = [t for t in model.terms if not t.run]
-    return with_gusts(prepared, model, segments, noisy, terms)
+    return with_gusts(prepared, model, terms)
 
 
 def thrust_differs(model: WrenchModel) -> bool:
@@ -315,6 +318,36 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     return out
 
 
+def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:
+    """Beside a thrust curve the coefficient of its square is the curve's own parameter c_2, and no wrong value.
+
+    C_F and what the curve adds to it trade off against each other; their sum is what the recording knows.
+    """
+    curve = next((f for f in findings if f.id == "thrust_curve" and f.status in ("established", "ambiguous")), None)
+    key = next((k for k in model.selection.active if model.search.terms[k].effect == "thrust_curve"), None)
+    if curve is None or key is None:
+        return findings, values
+    fit, coefficient = model.selection.fit, believed_value(model.prepared.vehicle, "thrust")
+    share = np.zeros(len(fit.columns))
+    share[fit.columns == model.regression.start["thrust"]] = coefficient
+    symbols = [curve.form.parameters[i].symbol for i in curve.form.linear]
+    if SQUARE in symbols:
+        share[fit.columns == model.regression.start[key] + symbols.index(SQUARE)] = 1.0
+    elif "thrust" not in values:
+        return findings, values
+    value, sd = coefficient + share @ fit.beta, np.sqrt(share @ fit.covariance @ share)
+    square = Estimate("c_2", float(value), "N s2/rad2", float(value - 1.96 * sd), float(value + 1.96 * sd))
+    told = replace(curve, parameters=(*(p for p in curve.parameters if p.symbol != SQUARE), square))
+    return [told if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
+
+
+def without_weight_of_payload(findings: list[Finding], values: dict) -> dict:
+    """Values without the mass (or the thrust, its ratio to it) where a payload that would change it may be at work."""
+    if not any("payload" in f.alternatives for f in findings):
+        return values
+    return {k: v for k, v in values.items() if k not in ("mass", "thrust")}
+
+
 def only_throttle(recordings: RecordingSet) -> bool:
     """Whether rotor speeds are known from the throttle and a believed full speed alone."""
     count = recordings.vehicle.rotor_count
@@ -422,9 +455,9 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
     return vehicle.model_copy(update=change)
 
 
-def offsets_of(model: WrenchModel) -> list[str]:
-    """Nuisance terms that every fit carries."""
-    return [t.key for t in model.regression.terms if t.kind in ("nuisance", "wind")]
+def always_of(model: WrenchModel, *kinds: str) -> list[str]:
+    """Terms of some kinds, which every fit carries."""
+    return [t.key for t in model.regression.terms if t.kind in kinds]
 
 
 def make_traces(
@@ -436,8 +469,8 @@ def make_traces(
     """
     regression = model.regression
     loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
-    plain = regression.fit(offsets_of(model) + list(plain_values), loose=loose)
-    full = regression.fit(offsets_of(model) + list(values) + model.selection.active, loose=loose)
+    plain = regression.fit(always_of(model, "nuisance") + list(plain_values), loose=loose)
+    full = regression.fit(always_of(model, "nuisance", "wind") + list(values) + model.selection.active, loose=loose)
     named = np.where(model.unnamed(full.columns), 0.0, full.beta)
     out = []
     for r, segment in zip(model.rows, prepared.segments, strict=True):

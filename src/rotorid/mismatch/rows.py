@@ -57,6 +57,11 @@ class Term:
     slope_of: int | None = None
     """For the slope of a nonlinear parameter: its index in the form."""
 
+    @property
+    def once(self) -> str:
+        """What can be in a model only once: an effect in one of its forms, or what acts in one window of one run."""
+        return self.key if self.run else self.effect
+
 
 def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Thrust force, thrust moment and reaction torque of the believed rotors, each (n, 3), N and N m."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter, welch
 
 from rotorid.effects.contract import Form
-from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
@@ -54,6 +53,11 @@ class WrenchModel:
     wind: np.ndarray | None = None
     """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
     wind_sd: np.ndarray | None = None
+    gusts: tuple = ()
+    """Gusts (`gusts.Gust`) that drag and lift are built on."""
+    segments: list[Segment] = field(default_factory=list)
+    """What the rows are made of: rotor speeds as the chain has them, moving air where it moves."""
+    noisy_segments: list[Segment] = field(default_factory=list)
 
     def unnamed(self, columns: np.ndarray) -> np.ndarray:
         """Mask of the columns that belong to empirical terms, which no finding may count as its own."""
@@ -114,7 +118,10 @@ def wrench_model(
         return local_sizes(rows, cols, coefficients, noise, per, 1.0 if short else 0.9)
 
     search = Search(regression, sizes_of, known_sizes)
-    return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
+    found = search.run(start)
+    return WrenchModel(
+        prepared, terms, rows, regression, search, found, noise, segments=segments, noisy_segments=noisy_segments
+    )
 
 
 def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float):
@@ -420,22 +427,6 @@ def after_residual(model: WrenchModel) -> list[np.ndarray]:
     """Residual rows with the selected effects, (n, 12) per segment."""
     full = model.regression.fit(model.search.always + model.selection.active)
     return [r.y - r.x[:, :, full.columns] @ full.beta for r in model.rows]
-
-
-def with_gusts(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
-    """The model with gusts in the windows that its residual shows; the same model where there are none."""
-    if "force" not in prepared.groups or any(s.motion.rotation is None for s in segments):
-        return model
-    gusts = []
-    for rows, left, segment in zip(model.rows, after_residual(model), segments, strict=True):
-        index = np.searchsorted(segment.motion.time_s, rows.time_s).clip(0, segment.motion.size - 1)
-        found = windows(left[:, :3], segment.motion.rotation[index], rows.time_s)
-        gusts += gust_terms(segment.run, found)
-    if not gusts:
-        return model
-    again = wrench_model(prepared, terms + gusts, chosen(model), model.selection.active, segments, noisy)
-    again.wind, again.wind_sd = model.wind, model.wind_sd
-    return again
 
 
 def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
