@@ -37,6 +37,8 @@ NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is told from motion."""
 MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
+MEMORY_GRID = 37
+"""Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
 
 @dataclass
@@ -259,6 +261,11 @@ def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: in
 
     low = np.log(max(parameter.low, start / 6, 1e-9) / start)
     high = np.log(min(parameter.high, start * 6) / start)
+    if term.form.memory:
+        # What rings has several minima over its frequency: the search starts about the best of a grid.
+        grid = np.linspace(low, high, MEMORY_GRID)
+        best = int(np.argmin([cost(factor) for factor in grid]))
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, MEMORY_GRID - 1)]
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
     return float(start * np.exp(found.x))
 
