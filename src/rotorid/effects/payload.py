@@ -7,8 +7,6 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.scale import scale
 
-SWING_DAMPING = 0.05
-"""Damping ratio of a load on a cable in air: a swing that fades over about three periods."""
 SWING_RATE_HZ = 100.0
 """Rate of the pendulum's own steps: thirty a radian for the shortest cable allowed."""
 
@@ -16,18 +14,18 @@ SWING_RATE_HZ = 100.0
 def slung(motion, vehicle, values):
     """F = m_p (e·n + L |n'|²) n, n the cable's direction downward, e = g − a what hangs it.
 
-    The pendulum hangs at the centre of mass; `values` are m_p (kg) and L (m). Needs many instants in a row. How it
+    The pendulum hangs at the centre of mass; `values` are m_p (kg), L (m) and ζ. Needs many instants in a row. How it
     hung before the first is not known: it starts at rest along the mean of e over its first period, and what that
     misses fades with the damping. A cable does not push: where it would, the force is zero.
     """
-    mass_kg, length_m = values
+    mass_kg, length_m, damping_ratio = values
     hanging = -np.einsum("nij,nj->ni", motion.rotation, motion.specific_force)
-    direction, rate_square = swing(hanging, motion.time_s, length_m, vehicle.gravity_m_s2)
+    direction, rate_square = swing(hanging, motion.time_s, length_m, damping_ratio, vehicle.gravity_m_s2)
     tension = mass_kg * np.maximum(np.einsum("ni,ni->n", hanging, direction) + length_m * rate_square, 0.0)
     return Contribution(force=np.einsum("nji,nj->ni", motion.rotation, tension[:, None] * direction))
 
 
-def swing(hanging, time_s, length_m, gravity_m_s2):
+def swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2):
     """Direction (n, 3) and squared rate (n,), rad²/s², of a spherical pendulum in world axes.
 
     n'' = (e − (e·n) n)/L − |n'|² n − 2 ζ ω n', ω² = g/L, e = `hanging` (n, 3), m/s2, by leapfrog on blocks of
@@ -41,7 +39,7 @@ def swing(hanging, time_s, length_m, gravity_m_s2):
     coarse, instants = np.add.reduceat(hanging, edges) / counts, np.add.reduceat(time_s, edges) / counts[:, 0]
     omega = sqrt(gravity_m_s2 / length_m)
     period = max(1, round(2 * np.pi / omega / (block * dt)))
-    states = _leapfrog(coarse, coarse[:period].mean(axis=0), block * dt, length_m, 2 * SWING_DAMPING * omega)
+    states = _leapfrog(coarse, coarse[:period].mean(axis=0), block * dt, length_m, 2 * damping_ratio * omega)
     states = np.stack([np.interp(time_s, instants, column) for column in states.T], axis=1)
     direction = states[:, :3] / np.maximum(np.linalg.norm(states[:, :3], axis=1, keepdims=True), 1e-12)
     return direction, states[:, 3]
@@ -117,7 +115,11 @@ def forms(vehicle):
         Form(
             "slung",
             "F = m_p (e·n + L |n'|²) n, n'' = (e − (e·n) n)/L − |n'|² n − 2ζω n', e = g − a",
-            (m_p, Parameter("L", "m", 0.15, 6.0, True, (0.3, 0.6, 1.2, 2.4), "length of the cable")),
+            (
+                m_p,
+                Parameter("L", "m", 0.15, 6.0, True, (0.3, 0.6, 1.2, 2.4), "length of the cable"),
+                Parameter("ζ", "1", 0.002, 0.3, True, (0.03,), "damping of its swing, share of the critical"),
+            ),
             slung,
             ("specific_force", "rotation"),
             memory=True,
@@ -135,7 +137,7 @@ EFFECT = Effect(
     sign="positive m_p pulls down; (x, y) is where it hangs from the believed centre of mass",
     validity=(
         "rigid: a point mass in the rotor plane, its own inertia left out. Slung: any angle, cable taut, hung at "
-        "the centre of mass, damping 0.05 of critical, at rest when the recording starts"
+        "the centre of mass and at rest when the recording starts, damped in proportion to its swing alone"
     ),
     excited_by=("specific_force", "angular_velocity", "angular_acceleration"),
     confusers=("com_offset",),

@@ -52,7 +52,7 @@ FORCE_AND_MOMENT = [
         *("payload", "rigid", [0.1, 0.005, 0.0], dict(specific_force=row(0, 0, -G))),
         *((0, 0, 0.1 * G), (0, -0.005 * G, 0)),
     ),
-    ("payload", "slung", [0.1, 0.5], dict(specific_force=row(0, 0, -G)), (0, 0, 0.1 * G), None),
+    ("payload", "slung", [0.1, 0.5, 0.05], dict(specific_force=row(0, 0, -G)), (0, 0, 0.1 * G), None),
     ("rotational_damping", "linear", [1e-3, 2e-3, 0], dict(angular_velocity=row(3, -1, 5)), None, (-3e-3, 2e-3, 0)),
     ("rotational_damping", "quadratic", [1e-3, 1e-3, 0], dict(angular_velocity=row(3, -2, 5)), None, (-9e-3, 4e-3, 0)),
     # rotor 1 (ccw) speeds up by 1000 rad/s²: the airframe turns clockwise
@@ -169,7 +169,7 @@ def slung_pull(world):
         rotation=level,
     )
     slung = {f.name: f for f in catalogue()["payload"].forms(thesis_vehicle())}["slung"]
-    return slung.contribution(motion, thesis_vehicle(), np.array([0.1, 1.0])).force
+    return slung.contribution(motion, thesis_vehicle(), np.array([0.1, 1.0, 0.05])).force
 
 
 def test_a_slung_load_swings_at_its_own_frequency():
