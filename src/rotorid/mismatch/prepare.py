@@ -30,6 +30,7 @@ from rotorid.mismatch.rows import (
     measured_moment as moment_of,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.voltmeter import without_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
@@ -225,8 +226,8 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
     for run in recordings.runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng)
-    noisy = representative(noisy) if len(noisy) == len(segments) else []
-    segments = representative(segments)
+    noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
+    segments = representative(without_noise(segments))
     prepared = Prepared(recordings, vehicle, split, segments, noisy, Thinner(rate_hz, cutoff), noise, [])
     terms, reasons = make_terms(vehicle, segments, prepared.groups)
     return replace(prepared, terms=terms, not_testable=reasons)

@@ -36,6 +36,8 @@ NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is told from motion."""
 MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
+MEMORY_GRID = 37
+"""Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
 
 @dataclass
@@ -257,15 +259,24 @@ def refine_nonlinear(prepared: Prepared, model: WrenchModel, segments) -> dict[s
 def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: int, segments) -> float:
     """The value of one nonlinear parameter that leaves the least, searched within a factor of six of its start."""
     parameter, start = term.form.parameters[index], values[index]
+    training = [s for s in segments if s.run in prepared.split.training]
+    fixed = assemble_rows(prepared, others, training, chosen(model))
 
     def cost(log_factor: float) -> float:
         trial = values.copy()
         trial[index] = start * np.exp(log_factor)
         moved = replace(term, values=tuple(trial))
-        return profile_cost(prepared, model, [*others, moved], segments, fixed_gain=not term.form.linear)
+        own = assemble_rows(prepared, [moved], training, chosen(model))
+        rows = [replace(a, x=np.concatenate([a.x, b.x], axis=2)) for a, b in zip(fixed, own, strict=True)]
+        return profile_cost(model, [*others, moved], rows, fixed_gain=not term.form.linear)
 
     low = np.log(max(parameter.low, start / 6, 1e-9) / start)
     high = np.log(min(parameter.high, start * 6) / start)
+    if term.form.memory and len(parameter.starts) > 1:
+        # What rings has several minima over its frequency: the search starts about the best of a grid.
+        grid = np.linspace(low, high, MEMORY_GRID)
+        best = int(np.argmin([cost(factor) for factor in grid]))
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, MEMORY_GRID - 1)]
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
     return float(start * np.exp(found.x))
 
@@ -316,10 +327,8 @@ def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dic
     return out
 
 
-def profile_cost(prepared: Prepared, model: WrenchModel, terms: list[Term], segments, fixed_gain: bool) -> float:
-    """Whitened training squares with the linear coefficients of `terms` free (the last at gain one if asked)."""
-    training = [s for s in segments if s.run in prepared.split.training]
-    rows = assemble_rows(prepared, terms, training, chosen(model))
+def profile_cost(model: WrenchModel, terms: list[Term], rows: list[Rows], fixed_gain: bool) -> float:
+    """Whitened squares of rows with the linear coefficients of `terms` free (the last at gain one if asked)."""
     size = rows[0].x.shape[2]
     gram, cross, square = np.zeros((size, size)), np.zeros(size), 0.0
     for r in rows:
