@@ -20,7 +20,7 @@ from rotorid.mismatch.regression import (
     full_fit_residuals,
 )
 from rotorid.mismatch.rows import Rows, Term, residual
-from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.select import FINAL_P, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
     SpeedResult,
@@ -391,6 +391,8 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
         effects = updated
         if np.abs(step).max() < 0.01:
             break
+    if regression.wald(fit, regression.columns(["wind"]), int(regression.training.sum())) > FINAL_P:
+        return model  # a wind that the fit through the drag does not see is none
     sd = np.sqrt(np.diag(fit.covariance)[-2:])
     again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
     drags = ("rotor_drag", "frame_drag")
