@@ -80,15 +80,17 @@ class Selection:
 class Search:
     """Forward search with replacement of forms, backward checks and pair moves."""
 
-    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None):
+    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None, harms=None):
         """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
 
         `known_sizes`, same shape, are of effects that are in the model already (between command and rotor speed).
+        `harms(key, with_it, without)` says whether a term makes one of its channels worse on the held-out rows.
         """
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.sizes_of = sizes_of
+        self.harms = harms
         self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
@@ -348,7 +350,11 @@ class Search:
             trail.append(f"- {doubtful}: fails the jackknife")
 
     def failed_held_out(self, active: list[str]) -> str | None:
-        """The term that should help on the held-out blocks and does the most harm there instead."""
+        """The term that should help on the held-out blocks and does the most harm there instead.
+
+        What helps over all but spoils a channel of its own is refused as well: a tilt that costs the lateral force
+        what it gains in a moment is no tilt.
+        """
         mask = self.regression.held_out
         if mask.sum() < 4 or not active:
             return None
@@ -363,7 +369,11 @@ class Search:
             # A gust in a held-out run must not decide about everything else: the outermost blocks do not count.
             cut = max(1, len(gains) // 8)
             gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
-            if expected > EXPECTED_HELD_OUT and gain < worst:
+            if expected <= EXPECTED_HELD_OUT:
+                continue
+            if gain >= 0 and self.harms is not None and self.harms(key, with_it, without):
+                gain = -1e-9
+            if gain < worst:
                 worst, found = gain, key
         return found
 

@@ -14,6 +14,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
+    Fit,
     Regression,
     autoregression,
     build,
@@ -37,6 +38,13 @@ NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is told from motion."""
 MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
+
+
+LEAST_ACTION = 1.0
+"""Size of a term in a channel, in units of its noise, from which it can do harm there."""
+LEAST_BLOCKS = 16
+HARM_Z = 5.0
+"""Standard errors beyond which a channel is worse off on the held-out rows."""
 
 
 @dataclass
@@ -113,8 +121,40 @@ def wrench_model(
         cols, coefficients = regression.beyond(values, key, beta) if key not in values else (own, beta)
         return local_sizes(rows, cols, coefficients, noise, per, 1.0 if short else 0.9)
 
-    search = Search(regression, sizes_of, known_sizes)
+    rule = training_rule(prepared.split, segments)
+    held = [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in rows]
+
+    def harms(key: str, with_it: Fit, without: Fit) -> bool:
+        return spoils_a_channel(rows, held, regression.columns([key]), with_it, without, noise, per)
+
+    search = Search(regression, sizes_of, known_sizes, harms)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
+
+
+def spoils_a_channel(
+    rows: list[Rows], held: list[np.ndarray], cols: np.ndarray, with_it: Fit, without: Fit, noise: np.ndarray, per: int
+) -> bool:
+    """Whether a term leaves more of a channel that it acts on than there is without it, held out and beyond doubt.
+
+    Squares are compared by blocks of `per` rows without their outermost eighths, as for the whole.
+    """
+    fits = [(with_it.columns, with_it.beta), (without.columns, without.beta)]
+    own = with_it.beta[[list(with_it.columns).index(c) for c in cols]]
+    changes, acts = [], np.zeros(12, bool)
+    for r, mask in zip(rows, held, strict=True):
+        if mask.sum() < 2 * per:
+            continue
+        parts = np.array_split(np.flatnonzero(mask), mask.sum() // per)
+        after, before = ((r.y - r.x[:, :, c] @ b) ** 2 for c, b in fits)
+        changes += [(before[p] - after[p]).mean(axis=0) for p in parts]
+        acts |= np.sqrt(((r.x[mask][:, :, cols] @ own) ** 2).mean(axis=0)) > LEAST_ACTION * noise
+    if len(changes) < LEAST_BLOCKS:
+        return False
+    gains = np.sort(np.array(changes)[:, acts], axis=0)
+    cut = len(gains) // 8
+    gains = gains[cut : len(gains) - cut]
+    doubt = gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
+    return bool((gains.mean(axis=0) < -HARM_Z * np.maximum(doubt, 1e-300)).any())
 
 
 def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float):

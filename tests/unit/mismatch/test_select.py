@@ -139,3 +139,13 @@ def test_what_displaces_another_must_hold_by_itself():
     sizes = search.sizes_of
     search.sizes_of = lambda key, beta: sizes(key, beta) * (0.01 if key == "copy/form" else 1.0)
     assert search.swapped(["there/form"], {}) is None
+
+
+def test_what_spoils_a_channel_of_the_held_out_runs_is_refuted():
+    rng = np.random.default_rng(6)
+    noise, x = case(rng, 1)
+    y = [n + 0.8 * columns[0] for n, columns in zip(noise, x, strict=True)]
+    search = search_of([term("e")], y, x)
+    assert search.failed_held_out(["e/form"]) is None
+    search.harms = lambda key, with_it, without: True
+    assert search.failed_held_out(["e/form"]) == "e/form"
