@@ -467,7 +467,7 @@ def make_traces(
 
 def noise_floors(prepared: Prepared, model: WrenchModel, found, measured: bool) -> dict[str, float]:
     """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain."""
-    out = {CHANNELS[c]: float(model.noise[c]) for c in range(6) if np.isfinite(model.noise[c])}
+    out = {CHANNELS[c]: float(model.floor[c]) for c in range(6) if np.isfinite(model.floor[c])}
     if found is not None and measured and found[0].noise_rad_s is not None:
         gain = float(np.sqrt((prepared.thinner.kernel**2).sum()))
         for i in range(prepared.vehicle.rotor_count):

@@ -40,6 +40,8 @@ MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 
 
+MOST_INFLATION = 2.0
+"""A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
 LEAST_ACTION = 1.0
 """Size of a term in a channel, in units of its noise, from which it can do harm there."""
 LEAST_BLOCKS = 16
@@ -58,7 +60,9 @@ class WrenchModel:
     search: Search
     selection: Selection
     noise: np.ndarray
-    """Noise of each of the twelve channels in the band of the rows."""
+    """Noise of each of the twelve channels in the band of the rows, as the search took it."""
+    floor: np.ndarray
+    """What is left of each channel where the whole catalogue is free to explain."""
     wind: np.ndarray | None = None
     """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
     wind_sd: np.ndarray | None = None
@@ -100,6 +104,38 @@ def wrench_model(
         rows, noisy = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, _ = full_fit_residuals(rows, precision)
+    model = searched(prepared, terms, rows, noisy, left, start, segments, known_sizes)
+    # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
+    # thrust and a deaf gyroscope): such a channel would weigh as if it were exact, and pull at all values.
+    remains = after_residual(model)
+    fitted = [p for p, r in zip(remains, rows, strict=True) if r.run in prepared.split.training]
+    inflated = inflated_channels(fitted, model.noise)
+    if inflated.any():
+        left = [np.where(inflated, own, full) for own, full in zip(remains, left, strict=True)]
+        active = model.selection.active
+        again = searched(prepared, terms, rows, noisy, left, active, segments, known_sizes)
+        model = replace(again, floor=model.floor)
+    return model
+
+
+def inflated_channels(remains: list[np.ndarray], noise: np.ndarray) -> np.ndarray:
+    """Mask of the channels in which residuals (n, 12) are by far larger than their noise (12,)."""
+    rms = np.sqrt(sum((p**2).sum(axis=0) for p in remains) / max(1, sum(len(p) for p in remains)))
+    with np.errstate(invalid="ignore"):
+        return rms > MOST_INFLATION * noise
+
+
+def searched(
+    prepared: Prepared,
+    terms: list[Term],
+    rows: list[Rows],
+    noisy: list[Rows] | None,
+    left: list[np.ndarray],
+    start: list[str] | None,
+    segments: list[Segment],
+    known_sizes: np.ndarray | None,
+) -> WrenchModel:
+    """The search with residuals `left` (n, 12) of every stretch taken for the noise."""
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
     floor = channel_floor()
     filters = {c: autoregression([r[:, c] for r in left], floor[c]) for c in present}
@@ -128,7 +164,7 @@ def wrench_model(
         return spoils_a_channel(rows, held, regression.columns([key]), with_it, without, noise, per)
 
     search = Search(regression, sizes_of, known_sizes, harms)
-    return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
+    return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise, noise)
 
 
 def spoils_a_channel(

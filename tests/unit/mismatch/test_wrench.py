@@ -1,4 +1,4 @@
-"""The model of force and moment: what spoils a channel."""
+"""The model of force and moment: what spoils a channel, and what counts as its noise."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Rows
-from rotorid.mismatch.wrench import spoils_a_channel
+from rotorid.mismatch.wrench import inflated_channels, spoils_a_channel
 
 
 def fit_of(*beta: float) -> Fit:
@@ -42,3 +42,12 @@ def test_a_term_that_is_in_the_moment_alone_spoils_the_force():
 
 def test_rows_that_were_fitted_say_nothing_about_harm():
     assert not spoiled(two_channels(0.0, 1.0), held=False)
+
+
+def test_a_residual_far_above_its_noise_is_itself_the_noise():
+    rng = np.random.default_rng(1)
+    noise = np.full(12, np.nan)
+    noise[[0, 3]] = 0.1, 0.001
+    remains = np.full((500, 12), np.nan)
+    remains[:, 0], remains[:, 3] = 0.1 * rng.normal(size=500), 0.08 * rng.normal(size=500)
+    assert list(np.flatnonzero(inflated_channels([remains], noise))) == [3]
