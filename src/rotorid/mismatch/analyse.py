@@ -23,7 +23,7 @@ from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term, residual
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
-from rotorid.mismatch.speedpath import SpeedResult, commanded_path, nothing_between
+from rotorid.mismatch.speedpath import SpeedFit, SpeedResult, commanded_path, nothing_between
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import (
     WrenchModel,
@@ -124,6 +124,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
     notes += run_scale_notes(model)
+    if found is not None and found[0].lag_alone is not None:
+        notes.append(lag_alone_note(found[0].lag_alone))
     traces = make_traces(prepared, model, found, measured, plain_values, values)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
@@ -186,6 +188,15 @@ def thrust_differs(model: WrenchModel) -> bool:
     spread, p = regression.between_runs(fit, "thrust")
     runs = len(np.unique(regression.run[regression.training]))
     return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
+
+
+def lag_alone_note(fit: SpeedFit) -> str:
+    """The lag as others state it, who fit neither a delay nor a throttle curve beside it."""
+    tau, reach = float(fit.values[0]), 1.96 * float(np.sqrt(fit.covariance[0, 0]))
+    return (
+        "The lateness of the rotors is shared by a lag and what was found beside it; a lag alone would be "
+        f"{1000 * tau:.0f} ms ({1000 * (tau - reach):.0f} to {1000 * (tau + reach):.0f} ms)."
+    )
 
 
 def run_scale_notes(model: WrenchModel) -> list[str]:
