@@ -82,15 +82,17 @@ class Selection:
 class Search:
     """Forward search with replacement of forms, backward checks and pair moves."""
 
-    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None):
+    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None, harms=None):
         """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
 
         `known_sizes`, same shape, are of effects that are in the model already (between command and rotor speed).
+        `harms(key, with_it, without)` says whether a term makes one of its channels worse on the held-out rows.
         """
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.sizes_of = sizes_of
+        self.harms = harms
         self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
@@ -216,7 +218,10 @@ class Search:
         return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
-        """A model with one id in another's place, if it is worth more: the first to enter may be an imitation."""
+        """A model with one id in another's place, if it is worth more: the first to enter may be an imitation.
+
+        The newcomer must hold by itself: what it displaces is not looked at again, and would be lost with it.
+        """
         taken = {self.terms[k].once for k in active} | set(dropped)
         least = self.worth(active) + COST_PER_PARAMETER / 2
         trials = []
@@ -226,29 +231,38 @@ class Search:
             for other in self.terms.values():
                 if other.kind == "effect" and not other.run and other.once not in taken:
                     trial = [other.key if k == gone else k for k in active]
-                    trials.append((self.worth(trial), trial))
+                    trials.append((self.worth(trial), other.key, trial))
         trials = sorted((t for t in trials if t[0] > least), key=lambda t: -t[0])
-        return next((trial for _, trial in trials[:MOST_TRIALS] if self._all_physical(trial)), None)
+        return next(
+            (
+                trial
+                for _, new, trial in trials[:MOST_TRIALS]
+                if self._all_physical(trial) and self.failing(new, trial)[0] is None
+            ),
+            None,
+        )
 
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
+    def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
+        """Why a term of the model does not hold beside the others (None where it does), and its score."""
+        judged = self.judge(key, active, self.without(key, active))
+        size = self.weight(key, judged.beta, active)
+        reason = None
+        if judged.p_value > KEEP_P:
+            reason = f"p = {judged.p_value:.2g} beside the others"
+        elif not judged.physical:
+            reason = "its coefficients are outside physical bounds"
+        elif size < SMALLEST_SIZE:
+            reason = f"its size is {size:.2g} of the noise"
+        return reason, judged.score
+
     def weak(self, active: list[str]) -> tuple[str, str] | None:
         """The worst term of the model that fails a test, with the reason; None if all hold."""
-        worst = None
-        for key in active:
-            judged = self.judge(key, active, self.without(key, active))
-            size = self.weight(key, judged.beta, active)
-            reason = None
-            if judged.p_value > KEEP_P:
-                reason = f"p = {judged.p_value:.2g} beside the others"
-            elif not judged.physical:
-                reason = "its coefficients are outside physical bounds"
-            elif size < SMALLEST_SIZE:
-                reason = f"its size is {size:.2g} of the noise"
-            if reason and (worst is None or judged.score < worst[2]):
-                worst = (key, reason, judged.score)
-        return None if worst is None else worst[:2]
+        found = [(key, *self.failing(key, active)) for key in active]
+        weak = [(score, key, reason) for key, reason, score in found if reason]
+        return min(weak)[1:] if weak else None
 
     def run(self, active: list[str] | None = None) -> Selection:
         """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
@@ -341,7 +355,11 @@ class Search:
             trail.append(f"- {doubtful}: fails the jackknife")
 
     def failed_held_out(self, active: list[str]) -> str | None:
-        """The term that should help on the held-out blocks and does the most harm there instead."""
+        """The term that should help on the held-out blocks and does the most harm there instead.
+
+        What helps over all but spoils a channel of its own is refused as well: a tilt that costs the lateral force
+        what it gains in a moment is no tilt.
+        """
         mask = self.regression.held_out
         if mask.sum() < 4 or not active:
             return None
@@ -356,7 +374,11 @@ class Search:
             # A gust in a held-out run must not decide about everything else: the outermost blocks do not count.
             cut = max(1, len(gains) // 8)
             gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
-            if expected > EXPECTED_HELD_OUT and gain < worst:
+            if expected <= EXPECTED_HELD_OUT:
+                continue
+            if gain >= 0 and self.harms is not None and self.harms(key, with_it, without):
+                gain = -1e-9
+            if gain < worst:
                 worst, found = gain, key
         return found
 
