@@ -41,7 +41,7 @@ def write_tables(
     seconds: dict[str, Any] = {}
     for folder in verdicts:
         seconds |= read_json(folder / "seconds.json")
-    scores = [score_case(said[name], answer) for name, answer in truth.items()]
+    scores = [score_case(said[name], answer, seconds[name]["samples_per_row"]) for name, answer in truth.items()]
     for s in scores:
         s["seconds"], s["flown_s"] = seconds[s["set"]]["seconds"], seconds[s["set"]]["flown_s"]
     by_method = {OURS: [s for s in scores if s["kind"] == "flight"], **peer_scores(peers, truth)}
