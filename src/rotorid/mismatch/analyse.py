@@ -13,6 +13,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Form
 from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence, leftover
@@ -175,7 +176,7 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     if axes := disowned_axes(model):
         terms = [*terms, *(Term(f"{MOMENT_GAIN}{a}", "nuisance", prior_sd=(GAIN_TRUST,)) for a in axes)]
         model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
-    for _ in range(2 if any(model.search.terms[k].form.nonlinear for k in model.selection.active) else 0):
+    for _ in range(2 if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
         again = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
@@ -187,6 +188,11 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     if model.wind is not None:
         terms = [t for t in model.terms if not t.run]
     return with_gusts(prepared, model, terms)
+
+
+def changes_its_columns(form: Form) -> bool:
+    """Whether a form's columns hang on what the model holds: nonlinear parameters, or the accelerations predicted."""
+    return bool(form.nonlinear) or not {"angular_acceleration", "specific_force"}.isdisjoint(form.requires)
 
 
 def thrust_differs(model: WrenchModel) -> bool:
