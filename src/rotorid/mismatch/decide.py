@@ -159,6 +159,7 @@ def wrong_values(
     selection: Selection,
     reverse: Regression | None,
     size_of: Callable[[str, float], float],
+    moving: bool = True,
 ) -> dict[str, tuple[float, float]]:
     """The fewest believed values that must change: relative change and one-sigma.
 
@@ -166,7 +167,7 @@ def wrong_values(
     counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
     sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
     side (`reverse`: measured moments as regressors) agrees, and where it matters: SMALLEST_CHANGE, and a size in
-    units of the noise (`size_of(key, relative change)`).
+    units of the noise (`size_of(key, relative change)`). `moving` is False on a stand, where a mass only weighs.
     """
     nuisance = [t.key for t in regression.terms if t.kind in ("nuisance", "wind")]
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
@@ -213,5 +214,17 @@ def wrong_values(
     out = {}
     for key in named:
         beta, covariance = coefficients(regression, fit, key)
-        out[key] = (float(beta[0]), float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR)))
+        sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
+        out[key] = relative_change(key, float(beta[0]), sd) if moving else (float(beta[0]), sd)
     return out
+
+
+def relative_change(key: str, coefficient: float, sd: float) -> tuple[float, float]:
+    """Relative change of a believed value, and its one-sigma, from its coefficient.
+
+    The columns of a mass and an inertia m hold the acceleration F / m of the believed one: their coefficient is
+    1 − m_believed / m.
+    """
+    if key == "mass" or key.startswith("inertia"):
+        return coefficient / (1.0 - coefficient), sd / (1.0 - coefficient) ** 2
+    return coefficient, sd

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorid.mismatch.decide import SMALLEST_CHANGE, held_out_gain, main_channels, wrong_values
+from rotorid.mismatch.decide import SMALLEST_CHANGE, held_out_gain, main_channels, relative_change, wrong_values
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import Search, Selection
@@ -110,3 +110,12 @@ def test_the_channels_of_a_finding_are_those_it_is_strongest_in():
     rows = Rows("a", np.arange(100) / RATE_HZ, np.zeros((100, 12)), x)
     noise = np.array([0.1, 0.1, 0.1, 0.001, 0.001, 0.001, *[np.nan] * 6])
     assert main_channels([rows], np.array([0]), np.array([1.0]), noise) == [0, 4]
+
+
+def test_the_coefficient_of_a_mass_is_its_share_of_the_true_one():
+    """Believed 0.9 kg of a true 1 kg: the force misses m a by a tenth of the true mass, 0.1 = 1 − 0.9; the change is
+    1/0.9 − 1 = 0.111. A thrust's coefficient is the change itself."""
+    change, sd = relative_change("mass", 0.1, 0.009)
+    assert (change, sd) == (pytest.approx(1 / 9), pytest.approx(0.009 / 0.81))
+    assert relative_change("inertia_xx", 0.1, 0.009) == (change, sd)
+    assert relative_change("thrust", 0.1, 0.009) == (0.1, 0.009)

@@ -59,9 +59,9 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     def size(key: str, change: float) -> float:
         return float(model.search.sizes_of(key, np.array([change])).max())
 
-    values = wrong_values(model.regression, model.search, model.selection, None, size)
+    values = wrong_values(model.regression, model.search, model.selection, None, size, moving=False)
     nothing = Selection([], model.selection.fit)
-    plain = wrong_values(model.regression, model.search, nothing, None, size)
+    plain = wrong_values(model.regression, model.search, nothing, None, size, moving=False)
     findings += absorbed(model, values, findings)
     traces, before, after = make_traces(setup, model, plain, values)
     next_step, separates, sigma = next_experiment(findings, model)
