@@ -418,8 +418,10 @@ class SpeedSearch:
                 if other != key or form is fit.of(key)[0]:
                     continue
                 tried = self.problem.with_covariance(self.best_fit((*base.chain, (key, form)), base, form))
-                better = self.judge(base, tried, key)[1] > self.judge(base, best, key)[1]
-                if better and self.responds(tried):
+                # By one inflation for both: its own would charge a form for what it alone explains.
+                saved = (best.cost - tried.cost) / max(best.inflation, tried.inflation)
+                more = len(tried.values) - len(best.values)
+                if saved > COST_PER_PARAMETER * more and self.responds(tried):
                     best = tried
             fit = best
         return fit
