@@ -103,6 +103,18 @@ def test_a_delay_is_no_lag():
     assert result.fit.values[0] + result.fit.shift_s == pytest.approx(0.045, abs=0.001)
 
 
+def test_a_limit_that_is_reached_in_one_second_of_twenty_is_found():
+    """A burst of 0.2 s in 20 s goes 200 rad/s beyond the limit: twenty times the noise, in one second alone."""
+    segment = recorded(7)
+    command = np.minimum(segment.command, 1450.0)
+    command[700:720] = 1650.0
+    speed = np.minimum(command, 1450.0) + 10.0 * np.random.default_rng(8).standard_normal(command.shape)
+    motion = replace(segment.motion, rotor_speed=speed)
+    result = searched(replace(segment, motion=motion, command=command))
+    assert [k for k, _ in result.fit.chain] == ["command_saturation"]
+    assert result.fit.values[0] == pytest.approx(1450.0 / FULL, rel=0.01)
+
+
 def test_without_a_voltmeter_no_power_of_the_voltage_is_tried():
     names = {f.name for _, f in candidate_forms([recorded(6)])}
     assert "power of voltage" not in names and "drift in time" in names
