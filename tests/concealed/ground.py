@@ -18,6 +18,8 @@ from .write import Recording, plain
 
 FINE = 10
 AXES = ("force_x_n", "force_y_n", "force_z_n", "moment_x_n_m", "moment_y_n_m", "moment_z_n_m")
+MEANS = range(1, 13)
+"""Numbers of neighbouring samples of which a stage may compare the mean."""
 REFERENCES = ("reference_force_x_n", "reference_force_y_n", "reference_force_z_n")
 RANGE_N = 10.0
 GRAVITY = 9.81
@@ -473,6 +475,12 @@ def channels_of(plan):
     return [2] if plan.rotors == 1 else list(range(6))
 
 
+def rms_of_means(values, count):
+    """Rms of the means of every `count` neighbours."""
+    whole = values[: len(values) // count * count].reshape(-1, count)
+    return float(np.sqrt(np.mean(whole.mean(axis=1) ** 2)))
+
+
 def filtered(values, rate_hz, cutoff_hz=20.0):
     if cutoff_hz >= 0.45 * rate_hz:
         return values
@@ -538,8 +546,10 @@ def make(plan, seed):
         tables[name] = pd.DataFrame(columns)
         ideals[name] = pd.DataFrame({"time_s": known["time_s"], **{AXES[c]: reading[:, c] for c in channels}})
         off = reading - response(plan, still, shown, name)
+        remainder = noisy - reading
         oracle[name] = {
             AXES[c].removesuffix("_m").removesuffix("_n"): {
+                "noise_rms_of_means": {str(n): rms_of_means(remainder[:, c], n) for n in MEANS},
                 "noise_rms": float(np.sqrt(np.mean(filtered(noises[name][:, c], plan.rate_hz) ** 2))),
                 "mismatch_rms": float(np.sqrt(np.mean(filtered(off[:, c], plan.rate_hz) ** 2))),
                 "before_rms": float(np.sqrt(np.mean(filtered(off[:, c] + noises[name][:, c], plan.rate_hz) ** 2))),

@@ -170,7 +170,7 @@ CLEAN_COLUMNS = (
 )
 
 
-def clean(kind, start, count=40):
+def clean(kind, start, count=100):
     out = []
     for k in range(count):
         name = f"{kind}/clean/{k:03d}"

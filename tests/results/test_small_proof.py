@@ -6,7 +6,13 @@ import pandas as pd
 import pytest
 
 CASES = Path(__file__).parents[2] / "results/proof/cases.csv"
-NAMED = ("single/rotor_drag/strong/0", "single/motor_lag/strong/0", "mistake/rotor_order/all/1")
+NAMED = (
+    "single/rotor_drag/strong/0",
+    "single/motor_lag/strong/0",
+    "mistake/rotor_order/all/1",
+    "stand/single/com_offset/moderate/0",
+    "bench/single/crosstalk/moderate/0",
+)
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not CASES.is_file(), reason="no proof has been run here")]
 
 
@@ -24,8 +30,14 @@ def test_the_hidden_effect_is_named(cases: pd.DataFrame, name: str) -> None:
     assert cases.loc[name, "named"] and cases.loc[name, "false_count"] == 0
 
 
-def test_a_clean_recording_raises_no_alarm(cases: pd.DataFrame) -> None:
-    assert not cases.loc["clean/000", "false_alarm"]
+@pytest.mark.parametrize("name", ["clean/000", "stand/clean/000"])
+def test_a_clean_recording_raises_no_alarm(cases: pd.DataFrame, name: str) -> None:
+    assert not cases.loc[name, "false_alarm"]
+
+
+def test_stands_and_benches_have_rows_of_their_own(cases: pd.DataFrame) -> None:
+    rows = pd.read_csv(CASES.with_name("summary.csv")).set_index("id")["value"]
+    assert rows["stand_clean_alarms"] == 0 and rows["stand_single_named"] == 1 and rows["bench_single_named"] == 1
 
 
 @pytest.mark.parametrize("name", ["wrong/mass_kg/1", "wrong/inertia_zz_kg_m2/2"])

@@ -153,6 +153,7 @@ rule draw_proof:
     output:
         targets="results/proof/targets.svg",
         confusion="results/proof/confusion.svg",
+        instruments="results/proof/instruments.svg",
         power="results/proof/power.svg",
         oracle="results/proof/oracle.svg",
     params:
@@ -181,6 +182,7 @@ rule chapter_proof:
     output:
         targets="results/report/proof/targets.svg",
         confusion_figure="results/report/proof/confusion.svg",
+        instruments_figure="results/report/proof/instruments.svg",
         power_figure="results/report/proof/power.svg",
         oracle="results/report/proof/oracle.svg",
         rows="results/report/proof/rows.csv",

@@ -1,6 +1,7 @@
 """Figures of the proof.
 
-- Targets met and missed, confusion matrix, power against size, held-out error against the oracle's.
+- Targets met and missed, confusion matrices of flights and of instruments, power against size, held-out error against
+  the oracle's.
 """
 
 import pandas as pd
@@ -10,11 +11,21 @@ from rotorid.plots import proof, style
 
 
 def main(
-    summary: str, confusion: str, power: str, cases: str, targets: str, matrix: str, curves: str, oracle: str
+    summary: str,
+    confusion: str,
+    power: str,
+    cases: str,
+    targets: str,
+    matrix: str,
+    instruments: str,
+    curves: str,
+    oracle: str,
 ) -> None:
-    """Draw four figures from four tables."""
+    """Draw five figures from four tables."""
+    said = pd.read_csv(confusion)
     style.save(proof.targets(pd.read_csv(summary)), targets)
-    style.save(proof.confusion(pd.read_csv(confusion)), matrix)
+    style.save(proof.confusion(said[said["kind"] == "flight"]), matrix)
+    style.save(proof.confusion(said[said["kind"] != "flight"]), instruments)
     style.save(proof.power(pd.read_csv(power)), curves)
     style.save(proof.oracle(pd.read_csv(cases)), oracle)
 
@@ -28,6 +39,7 @@ if __name__ == "__main__":
             cases=snakemake.input.cases,
             targets=snakemake.output.targets,
             matrix=snakemake.output.confusion,
+            instruments=snakemake.output.instruments,
             curves=snakemake.output.power,
             oracle=snakemake.output.oracle,
         )

@@ -28,6 +28,17 @@ def root(path, values):
     return path.full_speed * np.sqrt((1 - a) * u + a * u**2)
 
 
+def power(path, values):
+    """ω = ω_max u^n, u = ω_c/ω_max."""
+    u = np.clip(path.speed / path.full_speed, 0.0, None)
+    return path.full_speed * u ** values[0]
+
+
+def power_from(path, values):
+    """ω = ω_max ((u - u_0)/(1 - u_0))^n, zero below u_0."""
+    return path.full_speed * (dead_zone(path, values[:1]) / path.full_speed) ** values[1]
+
+
 EFFECT = Effect(
     id="throttle_curve",
     name="the curve between throttle and rotor speed",
@@ -72,11 +83,30 @@ EFFECT = Effect(
             root,
             (0.0,),
         ),
+        SpeedForm(
+            "power of the throttle",
+            "ω = ω_max u^n",
+            (Parameter("n", "1", 0.2, 3.0, meaning="exponent; 0.5 for a thrust proportional to the throttle"),),
+            0,
+            power,
+            (1.0,),
+        ),
+        SpeedForm(
+            "power above a dead zone",
+            "ω = ω_max ((u − u_0)/(1 − u_0))^n",
+            (
+                Parameter("u_0", "1", -0.05, 0.5, meaning="command at which the rotors start"),
+                Parameter("n", "1", 0.2, 3.0, meaning="exponent"),
+            ),
+            0,
+            power_from,
+            (0.0, 1.0),
+        ),
     ),
     source="PX4's THR_MDL_FAC; Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F2",
     sign=(
-        "positive a_0 and a_1 turn faster than commanded; positive u_0 is a dead zone; b = 0 is a speed "
-        "proportional to the command"
+        "positive a_0 and a_1 turn faster than commanded; positive u_0 is a dead zone; b = 0 and n = 1 "
+        "are a speed proportional to the command"
     ),
     validity="static and the same for all rotors; at one voltage, or together with battery_sag",
     confusers=("battery_sag", "thrust_curve", "command_saturation"),

@@ -39,7 +39,11 @@ def analysis_of(recordings: RecordingSet) -> Analysis:
 
 def judge(recordings: RecordingSet) -> Verdict:
     """The verdict alone, without page and improved vehicle: what `verdict.json` would say."""
-    analysis = analysis_of(recordings)
+    return verdict_of(analysis_of(recordings))
+
+
+def verdict_of(analysis: Analysis) -> Verdict:
+    """The verdict that an analysis amounts to."""
     forward = forward_channels(analysis).channels if analysis.instrument is None else {}
     return make_verdict(analysis, locate(analysis), forward)
 

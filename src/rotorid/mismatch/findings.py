@@ -94,6 +94,8 @@ class Analysis:
     next_separates: tuple[str, ...] = ()
     next_sigma: float = 0.0
     force_source: str = "accelerometer"
+    samples_per_row: int = 1
+    """How many samples a row of a stand's or bench's traces is the mean of."""
     instrument: Instrument | None = None
     """Kinds `stand` and `bench`: what is known of the instrument."""
     loadings: tuple[Loading, ...] = ()

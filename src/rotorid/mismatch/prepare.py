@@ -287,6 +287,12 @@ def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[di
     return columns
 
 
+def at_knots(columns: list[dict[str, np.ndarray]], knots_s: np.ndarray, time_s: np.ndarray):
+    """Columns (north, east) of a wind that is a line from knot to knot, of each knot in turn; nothing outside."""
+    hats = [np.interp(time_s, knots_s, unit, left=0.0, right=0.0)[:, None] for unit in np.eye(len(knots_s))]
+    return [{group: part * hat for group, part in column.items()} for column in columns for hat in hats]
+
+
 def assemble_rows(
     prepared: Prepared,
     terms: list[Term],
@@ -314,7 +320,8 @@ def assemble_rows(
             if term.run and term.run != segment.run:
                 yield from [{}] * term.size
             elif term.kind == "wind":
-                yield from wind_columns(segment, vehicle, groups, effects or [])
+                columns = wind_columns(segment, vehicle, groups, effects or [])
+                yield from at_knots(columns, np.array(term.values), segment.motion.time_s) if term.run else columns
             elif term.kind == "slope":
                 yield slope_column(term, segment, vehicle, groups)
             elif term.kind == "effect":

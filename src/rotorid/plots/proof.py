@@ -35,9 +35,13 @@ def targets(summary: pd.DataFrame) -> Figure:
 
 
 def confusion(table: pd.DataFrame) -> Figure:
-    """Share of cases of each true effect (rows) for what was said of them (columns)."""
+    """Share of cases of each true effect (rows) for what was said of them (columns); of one kind or several."""
+    if table.empty:
+        return nothing("No such cases in this proof.")
+    mixed = table["kind"].nunique() > 1
+    table = table.assign(truth=[f"{r.kind}: {r.truth}" if mixed else r.truth for r in table.itertuples()])
     truths = sorted(table["truth"].unique(), key=lambda t: (t in LAST_COLUMNS, t))
-    said = sorted(set(table["claimed"]) | set(truths), key=lambda t: (t in LAST_COLUMNS, t))
+    said = sorted(set(table["claimed"]) | (set() if mixed else set(truths)), key=lambda t: (t in LAST_COLUMNS, t))
     grid = np.zeros((len(truths), len(said)))
     for row in table.itertuples():
         grid[truths.index(row.truth), said.index(row.claimed)] = row.share
@@ -84,6 +88,9 @@ def oracle(cases: pd.DataFrame) -> Figure:
     known = cases[cases["held_out_after"].notna()]
     if known.empty:
         return nothing("No held-out error in this proof.")
+    known = known.assign(
+        family=[r.family if r.kind == "flight" else f"{r.kind} {r.family}" for r in known.itertuples()]
+    )
     families = list(dict.fromkeys(known["family"]))
     fig, ax = style.figure(2.9)
     rng = np.random.default_rng(0)
@@ -96,7 +103,7 @@ def oracle(cases: pd.DataFrame) -> Figure:
     ax.axhline(1, color="black", lw=0.7)
     ax.axhline(1.05, color="black", lw=0.7, ls=":")
     ax.set_yscale("log")
-    ax.set_xticks(range(len(families)), [plain(f) for f in families])
+    ax.set_xticks(range(len(families)), [plain(f) for f in families], rotation=45, ha="right")
     ax.set_ylabel("held-out error / true model's")
     ax.legend(loc="upper right", ncols=3)
     return fig

@@ -8,12 +8,13 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from rotorid.mismatch.deliver import judge
+from rotorid.mismatch.deliver import analysis_of, verdict_of
 from rotorid.recordings import read_set
 
 
 def judge_folder(sets: Path, out: Path, progress: Callable[[str], None]) -> None:
-    """Judge every set below `sets`: `out/<set>.json` each, and `out/seconds.json` with the time each took.
+    """Judge every set below `sets`: `out/<set>.json` each, and `out/seconds.json` with the time each took and how
+    many samples a row of its errors is the mean of.
 
     A set on which the stage stops gets `{"failed": reason}`: that counts against it, and the others go on.
     """
@@ -24,11 +25,16 @@ def judge_folder(sets: Path, out: Path, progress: Callable[[str], None]) -> None
         try:
             recordings = read_set(folder)
             flown_s = sum(float(run.time_s[-1] - run.time_s[0]) for run in recordings.runs)
-            text = judge(recordings).text()
+            analysis = analysis_of(recordings)
+            averaged, text = analysis.samples_per_row, verdict_of(analysis).text()
         except Exception as error:  # any fault of the stage is a result here
             traceback.print_exc()
-            flown_s, text = None, json.dumps({"failed": f"{type(error).__name__}: {error}"}) + "\n"
+            flown_s, averaged, text = None, 1, json.dumps({"failed": f"{type(error).__name__}: {error}"}) + "\n"
         (out / f"{folder.name}.json").write_text(text, encoding="utf-8")
-        seconds[folder.name] = {"seconds": round(time.perf_counter() - start, 3), "flown_s": flown_s}
+        seconds[folder.name] = {
+            "seconds": round(time.perf_counter() - start, 3),
+            "flown_s": flown_s,
+            "samples_per_row": averaged,
+        }
         progress(f"{folder.name}: {seconds[folder.name]['seconds']:.1f} s")
     (out / "seconds.json").write_text(json.dumps(seconds, indent=1) + "\n", encoding="utf-8")

@@ -1,7 +1,7 @@
 """Which concealed cases a proof takes, in which batches, and about how long that lasts. Light: read at every start.
 
 The list of all cases is `tests/concealed/cases.tsv` (`case`, `set`, the recording set's name that says nothing). The
-first part of a case's name is its family, the last number in it its seed.
+first part of a case's name is its family (of an instrument the first two: `stand-clean`), its last number the seed.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from pathlib import Path
 
 BUILD_S, JUDGE_S, PEERS_S, START_S = 6.0, 8.0, 3.0, 4.0
 """Usual seconds of one core: to fly and record a case, to judge it, to ask the peers, to start a job."""
+INSTRUMENT_S = 2.5
+"""The same to record and judge a case of a stand or a bench, of which no peer is asked."""
+INSTRUMENTS = ("stand", "bench")
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,14 @@ class Entry:
 
     @property
     def family(self) -> str:
-        """Kind of case: `single`, `clean`, ..."""
-        return self.case.split("/")[0]
+        """Kind of case: `single`, `clean`, `stand-clean`, ..."""
+        first, second, *_ = self.case.split("/")
+        return f"{first}-{second}" if first in INSTRUMENTS else first
+
+    @property
+    def is_flight(self) -> bool:
+        """Whether the case is of a vehicle that flies."""
+        return self.case.split("/")[0] not in INSTRUMENTS
 
     @property
     def seed(self) -> int:
@@ -57,11 +66,11 @@ def batches(entries: Sequence[Entry], size: int) -> dict[str, list[Entry]]:
     return out
 
 
-def estimate_s(missing_cases: int, missing_batches: int, peers: bool, cores: int = 2) -> float:
-    """About how many seconds a proof lasts."""
-    each = BUILD_S + JUDGE_S + (PEERS_S if peers else 0.0)
-    jobs = (3 if peers else 2) * START_S
-    return (missing_cases * each + missing_batches * jobs) / cores
+def estimate_s(missing: Sequence[Sequence[Entry]], peers: bool, cores: int = 2) -> float:
+    """About how many seconds the missing batches last."""
+    flight = BUILD_S + JUDGE_S + (PEERS_S if peers else 0.0)
+    each = sum(flight if entry.is_flight else INSTRUMENT_S for own in missing for entry in own)
+    return (each + len(missing) * (3 if peers else 2) * START_S) / cores
 
 
 def announcement(chosen: Mapping[str, Sequence[Entry]], done: Sequence[str], peers: bool) -> str:
@@ -69,7 +78,7 @@ def announcement(chosen: Mapping[str, Sequence[Entry]], done: Sequence[str], pee
     missing = [name for name in chosen if name not in done]
     cases = sum(len(own) for own in chosen.values())
     left = sum(len(chosen[name]) for name in missing)
-    minutes = estimate_s(left, len(missing), peers) / 60
+    minutes = estimate_s([chosen[name] for name in missing], peers) / 60
     return (
         f"Proof: {cases} concealed cases in {len(chosen)} batches, {cases - left} judged before; "
         f"about {minutes:.0f} minutes on two cores"

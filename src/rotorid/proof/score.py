@@ -168,14 +168,23 @@ def kind_and_rest(case: str) -> tuple[str, str]:
     return (first, rest) if first in ("stand", "bench") else ("flight", case)
 
 
-def oracle_rms(answer: Mapping[str, Any], held_out: Sequence[str]) -> dict[str, float]:
-    """Rms that the true model leaves on the held-out runs, force (N) and moment (N m) channels; runs weigh alike."""
+def oracle_rms(answer: Mapping[str, Any], held_out: Sequence[str], samples_per_row: int = 1) -> dict[str, float]:
+    """Rms that the true model leaves on the held-out runs, force (N) and moment (N m) channels; runs weigh alike.
+
+    Flights are compared through a low-pass (`noise_rms`); stands and benches as they were read, or as means of
+    `samples_per_row` samples (`noise_rms_of_means`).
+    """
+
+    def noise(channel: Mapping[str, Any]) -> float | None:
+        means = channel.get("noise_rms_of_means")
+        return channel.get("noise_rms") if means is None else means.get(str(samples_per_row))
+
     known = answer.get("oracle", {}).get("runs", {})
     runs = [known[run] for run in held_out if run in known]
     channels = (
-        [c for c in runs[0] if c.split("_")[0] in ("force", "moment") and "noise_rms" in runs[0][c]] if runs else []
+        [c for c in runs[0] if c.split("_")[0] in ("force", "moment") and noise(runs[0][c]) is not None] if runs else []
     )
-    return {c: math.sqrt(sum(run[c]["noise_rms"] ** 2 for run in runs) / len(runs)) for c in channels}
+    return {c: math.sqrt(sum(noise(run[c]) ** 2 for run in runs) / len(runs)) for c in channels}
 
 
 def held_out_ratio(verdict: Mapping[str, Any], oracle: Mapping[str, float], stage: str) -> float | None:
@@ -198,7 +207,7 @@ def regime_right(verdict: Mapping[str, Any], effects: Sequence[str]) -> bool | N
     return bool(stated & allowed)
 
 
-def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
+def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any], samples_per_row: int = 1) -> dict[str, Any]:
     """All scores of one verdict.
 
     Parameters
@@ -207,9 +216,11 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[st
         `verdict.json`, or `{"failed": "reason"}` of a stage that stopped: it claims nothing and is right in nothing.
     answer
         The sealed answer.
+    samples_per_row
+        How many samples a row of the verdict's errors is the mean of.
     """
     failed = "failed" in verdict
-    oracle = oracle_rms(answer, verdict.get("runs", {}).get("held_out", ()))
+    oracle = oracle_rms(answer, verdict.get("runs", {}).get("held_out", ()), samples_per_row)
     claims = claims_of(verdict)
     same = equivalents(answer)
     wrong = set(answer["wrong_parameters"])

@@ -24,6 +24,11 @@ def strength(score: Score) -> str:
     return parts[2] if score["family"] == "single" else ""
 
 
+def family(score: Score) -> str:
+    """Family of a case, of an instrument with its kind: `clean`, `stand clean`."""
+    return score["family"] if score["kind"] == "flight" else f"{score['kind']} {score['family']}"
+
+
 def _is_clean(s: Score) -> bool:
     return s["family"] == "clean" or s["case"].startswith("rotorpy/clean/")
 
@@ -94,9 +99,13 @@ GROUND_ROWS = (
     "wrong_physics",
     "coverage",
     "oracle",
+    "single_strong",
+    "single_weak",
+    "wrong_found",
     "failed",
 )
-"""Targets that hold for stands and benches as for flights."""
+"""Rows that stands and benches have as flights do."""
+KINDS = ("flight", "stand", "bench")
 
 
 def summary(scores: Sequence[Score]) -> list[dict[str, Any]]:
@@ -105,7 +114,7 @@ def summary(scores: Sequence[Score]) -> list[dict[str, Any]]:
     Flights first; then, where there are any, the rows that stands and benches share with them.
     """
     rows = rows_of([s for s in scores if s["kind"] == "flight"])
-    for kind in ("stand", "bench"):
+    for kind in KINDS[1:]:
         own = [s for s in scores if s["kind"] == kind]
         if own:
             picked = [row for row in rows_of(own) if row["id"] in GROUND_ROWS]
@@ -261,12 +270,12 @@ def _fitting(scores: Sequence[Score]) -> list[Score]:
 
 
 def confusion(scores: Sequence[Score]) -> list[dict[str, Any]]:
-    """`truth`, `claimed`, `share`, `cases`: what is said of single effects of moderate and strong size, and of none.
+    """What is said of single effects of moderate and strong size, and of none: kind, truth, claimed, share, cases.
 
     One case adds one in all: to its strongest claim's id if that claim holds the truth, or else spread to what was
     claimed. Without a claim it counts as `nothing` or, where only a value was called wrong, as `a value`.
     """
-    counts: dict[str, dict[str, int]] = {}
+    counts: dict[tuple[str, str], dict[str, int]] = {}
     for s in scores:
         if strength(s) in WELL_SIZED:
             truth = s["primary"]
@@ -277,11 +286,11 @@ def confusion(scores: Sequence[Score]) -> list[dict[str, Any]]:
         else:
             continue
         said = said_of(s)
-        row = counts.setdefault(truth, {})
+        row = counts.setdefault((s["kind"], truth), {})
         row[said] = row.get(said, 0) + 1
     return [
-        {"truth": truth, "claimed": said, "share": n / sum(row.values()), "cases": sum(row.values())}
-        for truth, row in sorted(counts.items())
+        {"kind": kind, "truth": truth, "claimed": said, "share": n / sum(row.values()), "cases": sum(row.values())}
+        for (kind, truth), row in sorted(counts.items())
         for said, n in sorted(row.items())
     ]
 
@@ -317,9 +326,9 @@ def by_effect(scores: Sequence[Score]) -> list[dict[str, Any]]:
     """One row a single effect: how often it was named at each size, and what was said instead."""
     out = []
     singles = _family(scores, "single")
-    for effect in sorted({s["primary"] for s in singles}):
-        own = [s for s in singles if s["primary"] == effect]
-        row: dict[str, Any] = {"effect": effect}
+    for kind, effect in sorted({(s["kind"], s["primary"]) for s in singles}):
+        own = [s for s in singles if (s["kind"], s["primary"]) == (kind, effect)]
+        row: dict[str, Any] = {"kind": kind, "effect": effect}
         for size in ("strong", "moderate", "weak"):
             found = [s["named"] for s in own if strength(s) == size]
             row[size] = f"{sum(found)}/{len(found)}"
@@ -338,7 +347,7 @@ def case_rows(scores: Sequence[Score]) -> list[dict[str, Any]]:
     """One row a case, lists as text."""
     out = []
     for s in scores:
-        row = {}
+        row: dict[str, Any] = {}
         for key, value in s.items():
             if key in ("parameters",):
                 continue

@@ -15,10 +15,10 @@ from rotorid.proof.score import score_case
 
 OURS = "rotorid"
 COLUMNS = {
-    "confusion": ["truth", "claimed", "share", "cases"],
+    "confusion": ["kind", "truth", "claimed", "share", "cases"],
     "power": ["effect", "size_over_noise", "detected", "low_95", "high_95", "cases"],
     "parameters": ["case", "effect", "symbol", "true", "estimate", "relative_error", "covered"],
-    "effects": ["effect", "strong", "moderate", "weak", "instead"],
+    "effects": ["kind", "effect", "strong", "moderate", "weak", "instead"],
 }
 """Headings of tables that may have no row."""
 SIGNIFICANT = "%.6g"
@@ -41,10 +41,10 @@ def write_tables(
     seconds: dict[str, Any] = {}
     for folder in verdicts:
         seconds |= read_json(folder / "seconds.json")
-    scores = [score_case(said[name], answer) for name, answer in truth.items()]
+    scores = [score_case(said[name], answer, seconds[name]["samples_per_row"]) for name, answer in truth.items()]
     for s in scores:
         s["seconds"], s["flown_s"] = seconds[s["set"]]["seconds"], seconds[s["set"]]["flown_s"]
-    by_method = {OURS: scores, **peer_scores(peers, truth)}
+    by_method = {OURS: [s for s in scores if s["kind"] == "flight"], **peer_scores(peers, truth)}
     rows = table.peer_rows(by_method)
     summary = table.summary(scores)
     summary.append(better_row(rows))
@@ -93,11 +93,13 @@ def better_row(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def state(scores: Sequence[Mapping[str, Any]], summary: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Numbers that the chapter's prose needs."""
     asked = [row for row in summary if row["holds"] is not None]
-    timed = [s for s in scores if s["flown_s"]]
+    own = [table.family(s) for s in scores]
+    timed = [s for s in scores if s["flown_s"] and s["kind"] == "flight"]
     per_minute = [60 * s["seconds"] / s["flown_s"] for s in timed]
     return {
         "cases": len(scores),
-        "families": {f: sum(s["family"] == f for s in scores) for f in sorted({s["family"] for s in scores})},
+        "kinds": {kind: sum(s["kind"] == kind for s in scores) for kind in table.KINDS},
+        "families": {f: own.count(f) for f in sorted(set(own))},
         "targets": len(asked),
         "met": sum(bool(row["holds"]) for row in asked),
         "missed": [row["what"] for row in asked if not row["holds"]],

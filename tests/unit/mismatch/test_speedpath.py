@@ -110,9 +110,20 @@ def test_a_limit_that_is_reached_in_one_second_of_twenty_is_found():
     command[700:720] = 1650.0
     speed = np.minimum(command, 1450.0) + 10.0 * np.random.default_rng(8).standard_normal(command.shape)
     motion = replace(segment.motion, rotor_speed=speed)
-    result = searched(replace(segment, motion=motion, command=command))
+    flown = [replace(segment, motion=motion, command=command)]
+    result = SpeedSearch(MeasuredSpeed(flown, 1650.0, None), candidate_forms(flown)).run()
     assert [k for k, _ in result.fit.chain] == ["command_saturation"]
-    assert result.fit.values[0] == pytest.approx(1450.0 / FULL, rel=0.01)
+    assert result.fit.values[0] == pytest.approx(1450.0 / 1650.0, rel=0.01)
+
+
+def test_a_lag_beside_a_delay_is_also_stated_as_the_lag_alone_that_others_fit():
+    """A lag of 40 ms behind a delay of 20 ms: alone, the lag must make up for most of both."""
+    both = searched(recorded(7, delay=("of the command", (0.02,)), motor_lag=("one constant", (0.04,))))
+    assert sorted(k for k, _ in both.fit.chain) == ["delay", "motor_lag"]
+    assert both.fit.of("motor_lag")[1].mean() == pytest.approx(0.04, abs=0.004)
+    assert [k for k, _ in both.lag_alone.chain] == ["motor_lag"]
+    assert 0.05 < both.lag_alone.values[0] < 0.08
+    assert searched(recorded(8, motor_lag=("one constant", (0.04,)))).lag_alone is None
 
 
 def test_without_a_voltmeter_no_power_of_the_voltage_is_tried():

@@ -2,6 +2,9 @@
 
 from pathlib import Path
 
+import pytest
+import yaml
+
 from rotorid.proof import plan
 from tests.concealed.build import index_text
 
@@ -23,6 +26,35 @@ def test_seeds_and_patterns_choose() -> None:
     entries = [plan.Entry(f"{f}/x/{k}", f"set-{f}{k}") for f in ("single", "clean") for k in range(3)]
     assert [e.case for e in plan.choose(entries, {"single": 2}, ["*"])] == ["single/x/0", "single/x/1"]
     assert [e.case for e in plan.choose(entries, {"single": 3, "clean": 3}, ["clean/*/2"])] == ["clean/x/2"]
+
+
+def test_an_instruments_family_is_its_kind_and_the_kind_of_case() -> None:
+    entries = [
+        plan.Entry(f"{case}/{k}", f"set-{k}") for case in ("stand/clean", "bench/single/creep/weak") for k in (0, 1)
+    ]
+    chosen = plan.choose(entries, {"stand-clean": 2, "bench-single": 1, "clean": 9, "single": 9}, ["*"])
+    assert [e.case for e in chosen] == ["stand/clean/0", "stand/clean/1", "bench/single/creep/weak/0"]
+    assert list(plan.batches(chosen, 8)) == ["stand-clean-000", "bench-single-000"]
+
+
+@pytest.mark.parametrize("part", ["config.yaml", "tests/configs/proof_hour.yaml"])
+def test_every_family_of_the_list_is_asked_for(part: str) -> None:
+    seeds = yaml.safe_load((ROOT / part).read_text())["proof"]["seeds"]
+    assert set(seeds) == {e.family for e in plan.read_index(INDEX)}
+
+
+def test_the_small_proof_holds_stands_and_benches() -> None:
+    patterns = yaml.safe_load((ROOT / "tests/configs/small.yaml").read_text())["proof"]["cases"]
+    seeds = yaml.safe_load((ROOT / "config.yaml").read_text())["proof"]["seeds"]
+    chosen = {e.family for e in plan.choose(plan.read_index(INDEX), seeds, patterns)}
+    assert {"stand-single", "stand-clean", "bench-single"} <= chosen
+
+
+def test_time_is_foretold_by_kind() -> None:
+    stand, flight = plan.Entry("stand/clean/0", "a"), plan.Entry("clean/0", "b")
+    jobs = 2 * plan.START_S
+    assert plan.estimate_s([[stand, stand]], peers=False, cores=1) == 2 * plan.INSTRUMENT_S + jobs
+    assert plan.estimate_s([[flight]], peers=False, cores=1) == plan.BUILD_S + plan.JUDGE_S + jobs
 
 
 def test_more_seeds_leave_full_batches_as_they_were() -> None:

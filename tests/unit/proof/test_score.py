@@ -7,7 +7,7 @@ import pytest
 
 from rotorid.proof import table
 from rotorid.proof.intervals import bootstrap_mean, wilson
-from rotorid.proof.score import f1_of_times, score_case
+from rotorid.proof.score import f1_of_times, oracle_rms, score_case
 from rotorid.proof.spelling import translated
 from rotorid.proof.units import same_unit
 
@@ -85,6 +85,15 @@ def test_a_class_wider_than_the_data_demand_is_inside_but_not_named() -> None:
     assert s["inside"] and not s["named"] and not s["ambiguity_right"] and s["false_count"] == 0
     s = score_case(verdict(both), answer(hidden("rotor_drag", equivalent=["frame_drag"])))
     assert s["inside"] and s["named"] and s["ambiguity_right"] and not s["separable"]
+
+
+def test_a_stands_error_is_held_against_the_noise_of_as_many_samples() -> None:
+    means = {"1": 0.2, "4": 0.1}
+    truth = answer(hidden("creep"), case="stand/single/creep/strong/0")
+    truth["oracle"] = {"runs": {"b": {"force_z": {"noise_rms": 7.0, "noise_rms_of_means": means}}}}
+    assert oracle_rms(truth, ["b"]) == pytest.approx({"force_z": 0.2})
+    assert oracle_rms(truth, ["b"], samples_per_row=4) == pytest.approx({"force_z": 0.1})
+    assert oracle_rms(truth, ["b"], samples_per_row=5) == {}
 
 
 def test_what_cannot_be_told_apart_may_be_listed_in_groups() -> None:

@@ -89,6 +89,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         next_separates=separates,
         next_sigma=sigma,
         force_source="sensor",
+        samples_per_row=setup.average,
         instrument=setup.instrument,
         loadings=model.loadings,
         notes=(*remarks, *notes_of(setup)),

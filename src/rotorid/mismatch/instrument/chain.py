@@ -493,8 +493,28 @@ def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]
         fit = problem.fit(chain, best_start(problem, chain, best, pair))
         if fit.cost < best.cost + ALIKE:
             out.append(pair[0])
+    out += [k for k in rest_in_other_forms(problem, best, rest, forms) if k not in out]
     if not problem.measured:
         out += reading_alternatives(problem, best, rest, key)
+    return out
+
+
+def rest_in_other_forms(problem: Problem, best: ChainFit, rest: Chain, forms) -> list[str]:
+    """Ids of a chain that lacks one form which explain as well without it, if one of them takes another form.
+
+    A curve of the throttle that is not quite of the right form leaves what another effect then explains.
+    """
+    most, out = sum(len(f.parameters) for _, f in best.chain), []
+    for key, current in rest:
+        for pair in forms:
+            if pair[0] != key or pair[1] is current or key in out:
+                continue
+            chain = ordered(tuple(pair if k == key else (k, f) for k, f in rest))
+            if sum(len(f.parameters) for _, f in chain) > most:
+                continue
+            fit = problem.fit(chain, best_start(problem, chain, best, pair))
+            if fit.cost < best.cost + ALIKE:
+                out.append(key)
     return out
 
 

@@ -67,6 +67,19 @@ class ReadingSearch(Search):
                 return False
         return super().physical(term, beta, error)
 
+    def judge(self, key, active, base, jackknife=False):
+        """As for flights, and nothing that makes the reading smoothed and early at once.
+
+        A low-pass delays. Smoothing without delay is what takes the noise out of measured rotor speeds: it makes the
+        load quieter and says nothing of the reading.
+        """
+        judged = super().judge(key, active, base, jackknife)
+        terms = {self.terms[k].effect: self.terms[k] for k in (*active, key)}
+        early = "delay" in terms and terms["delay"].values and terms["delay"].values[0] < 0
+        if early and "amplifier_filter" in terms and self.terms[key].effect in ("delay", "amplifier_filter"):
+            return replace(judged, physical=False)
+        return judged
+
     def candidates(self, active):
         if len(active) >= MOST_AT_ONCE:
             return []

@@ -1,4 +1,4 @@
-"""Every peer asked about every set of a folder."""
+"""Every peer asked about every flight of a folder; of stands and benches they have no columns."""
 
 from __future__ import annotations
 
@@ -23,12 +23,15 @@ if find_spec("pysindy"):  # a development dependency: where it is missing this p
 
 
 def ask_folder(sets: Path, out: Path, progress: Callable[[str], None]) -> None:
-    """Write `out/<set>.json`: peer to its verdict, or to the reason why it stopped."""
+    """Write `out/<set>.json` of each flight: peer to its verdict, or to the reason why it stopped."""
     out.mkdir(parents=True, exist_ok=True)
     for folder in sorted(path for path in sets.iterdir() if path.is_dir()):
         said = {}
         try:
-            problem, stopped = problem_of(read_set(folder)), ""
+            recordings = read_set(folder)
+            if recordings.vehicle.kind != "flight":
+                continue
+            problem, stopped = problem_of(recordings), ""
         except Exception as error:  # a set that no peer can read is a result
             traceback.print_exc()
             problem, stopped = None, f"{type(error).__name__}: {error}"
