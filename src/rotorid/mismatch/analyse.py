@@ -81,7 +81,10 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     if found is not None and not measured and [k for k, _ in found[0].fit.chain] == ["throttle_curve"]:
         # A curve alters differences between rotors too: unequal rotors at one throttle look like one.
         plain = refined_model(prepared, prepared.segments, prepared.noisy_segments)
-        if cost_of(plain, model.regression.filters) < cost_of(model, model.regression.filters) + curve_cost(found[0]):
+        # A thrust curve in its place is the same column over again, with the torque's share left to a wrong value.
+        renamed = any(plain.search.terms[k].effect == "thrust_curve" for k in plain.selection.active)
+        limit = cost_of(model, model.regression.filters) + curve_cost(found[0])
+        if not renamed and cost_of(plain, model.regression.filters) < limit:
             segments, noisy, model = prepared.segments, prepared.noisy_segments, plain
             found = (nothing_between(found[0]), *found[1:])
 

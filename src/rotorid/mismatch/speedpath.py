@@ -308,7 +308,10 @@ class SpeedSearch:
         self.problem.learn_noise(fit.chain, fit.values, fit.shift_s)
 
     def size(self, fit: SpeedFit, key: str) -> float:
-        """Change that an id makes to the whitened residual's own noise, strongest tenth of the seconds."""
+        """Change that an id makes in units of the residual's own noise, strongest tenth of the seconds.
+
+        Of a limit, which acts where it is reached alone, the strongest second.
+        """
         kept = tuple((k, f) for k, f in fit.chain if k != key)
         where = fit.slice_of(key)
         values = np.delete(fit.values, np.arange(where.start, where.stop))
@@ -316,12 +319,13 @@ class SpeedSearch:
         without = self.problem.raw(kept, values, fit.shift_s)
         noise = np.sqrt(np.mean([np.mean(w**2, axis=0) for w in with_it], axis=0))
         per = max(2, int(self.problem.rate_hz))
+        quantile = 1.0 if fit.of(key)[0].stage == LIMIT_STAGE else 0.9
         best = 0.0
         for a, b in zip(with_it, without, strict=True):
             count = len(a) // per
             if count:
                 local = np.sqrt(((b - a)[: count * per].reshape(count, per, -1) ** 2).mean(axis=1))
-                best = max(best, float(np.quantile(local / np.maximum(noise, 1e-12), 0.9, axis=0).max()))
+                best = max(best, float(np.quantile(local / np.maximum(noise, 1e-12), quantile, axis=0).max()))
         return best
 
     def judge(self, base: SpeedFit, fit: SpeedFit, key: str) -> tuple[float, float, float]:
@@ -428,8 +432,10 @@ class SpeedSearch:
                 if other != key or form is fit.of(key)[0]:
                     continue
                 tried = self.problem.with_covariance(self.best_fit((*base.chain, (key, form)), base, form))
-                better = self.judge(base, tried, key)[1] > self.judge(base, best, key)[1]
-                if better and self.responds(tried):
+                # By one inflation for both: its own would charge a form for what it alone explains.
+                saved = (best.cost - tried.cost) / max(best.inflation, tried.inflation)
+                more = len(tried.values) - len(best.values)
+                if saved > COST_PER_PARAMETER * more and self.responds(tried):
                     best = tried
             fit = best
         return fit

@@ -103,6 +103,19 @@ def test_a_delay_is_no_lag():
     assert result.fit.values[0] + result.fit.shift_s == pytest.approx(0.045, abs=0.001)
 
 
+def test_a_limit_that_is_reached_in_one_second_of_twenty_is_found():
+    """A burst of 0.2 s in 20 s goes 200 rad/s beyond the limit: twenty times the noise, in one second alone."""
+    segment = recorded(7)
+    command = np.minimum(segment.command, 1450.0)
+    command[700:720] = 1650.0
+    speed = np.minimum(command, 1450.0) + 10.0 * np.random.default_rng(8).standard_normal(command.shape)
+    motion = replace(segment.motion, rotor_speed=speed)
+    flown = [replace(segment, motion=motion, command=command)]
+    result = SpeedSearch(MeasuredSpeed(flown, 1650.0, None), candidate_forms(flown)).run()
+    assert [k for k, _ in result.fit.chain] == ["command_saturation"]
+    assert result.fit.values[0] == pytest.approx(1450.0 / 1650.0, rel=0.01)
+
+
 def test_a_lag_beside_a_delay_is_also_stated_as_the_lag_alone_that_others_fit():
     """A lag of 40 ms behind a delay of 20 ms: alone, the lag must make up for most of both."""
     both = searched(recorded(7, delay=("of the command", (0.02,)), motor_lag=("one constant", (0.04,))))
