@@ -110,3 +110,19 @@ def test_the_channels_of_a_finding_are_those_it_is_strongest_in():
     rows = Rows("a", np.arange(100) / RATE_HZ, np.zeros((100, 12)), x)
     noise = np.array([0.1, 0.1, 0.1, 0.001, 0.001, 0.001, *[np.nan] * 6])
     assert main_channels([rows], np.array([0]), np.array([1.0]), noise) == [0, 4]
+
+
+def test_a_value_that_only_the_fitted_runs_need_is_not_called_wrong():
+    """A torque coefficient 12 % off in the fitted run and right in the one held out is no property of the vehicle."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for name, off in (("a", 0.12), ("b", 0.0)):
+        x = columns(4000, rng)
+        y = np.full((4000, 12), np.nan)
+        for channel in (2, 5):
+            y[:, channel] = x[:, channel] @ np.array([0.0, off, 0.0, 0.0]) + coloured(4000, NOISE, rng, pole=0.0)
+        rows.append(Rows(name, np.arange(4000) / RATE_HZ, y, x))
+    terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
+    made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: run == "a", 1.0, RATE_HZ)
+    search = Search(made, lambda key, b: np.ones(12))
+    assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
