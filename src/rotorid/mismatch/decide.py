@@ -12,7 +12,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
-from rotorid.mismatch.select import SMALLEST_SIZE, Search, Selection
+from rotorid.mismatch.select import EXPECTED_HELD_OUT, SMALLEST_SIZE, Search, Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 COST_PER_VALUE = 12.0
@@ -153,6 +153,24 @@ def wrench_findings(
     return findings
 
 
+def fails_held_out(
+    regression: Regression, always: list[str], named: list[str], key: str, loose: dict[str, float]
+) -> bool:
+    """Whether a changed value that should help on the held-out blocks does harm there: it belongs to the runs fitted.
+
+    As for effects, the outermost eighths of the blocks do not count.
+    """
+    mask = regression.held_out
+    if mask.sum() < 4:
+        return False
+    with_it = regression.fit(always + named, loose=loose)
+    without = regression.fit(always + [k for k in named if k != key], loose=loose)
+    gains = np.sort((without.residual_square - with_it.residual_square)[mask])
+    cut = max(1, len(gains) // 8)
+    gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
+    return gain < 0 and regression.expected_gain(with_it, without, mask) > EXPECTED_HELD_OUT
+
+
 def wrong_values(
     regression: Regression,
     search: Search,
@@ -166,8 +184,9 @@ def wrong_values(
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
     counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
     sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
-    side (`reverse`: measured moments as regressors) agrees, and where it matters: SMALLEST_CHANGE, and a size in
-    units of the noise (`size_of(key, relative change)`). `moving` is False on a stand, where a mass only weighs.
+    side (`reverse`: measured moments as regressors) agrees, where it survives on the held-out part, and where it
+    matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is False
+    on a stand, where a mass only weighs.
     """
     nuisance = [t.key for t in regression.terms if t.kind in ("nuisance", "wind")]
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
@@ -203,7 +222,8 @@ def wrong_values(
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned = abs(change) > 0.98 * regression.limit[regression.start[key]]
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or pinned or not agrees or not matters:
+            fails = fails_held_out(regression, always, named, key, loose)
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or pinned or fails or not agrees or not matters:
                 doubtful[key] = abs(change) / sd
         if not doubtful:
             break

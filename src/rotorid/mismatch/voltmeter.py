@@ -28,7 +28,9 @@ def without_noise(segments: list[Segment]) -> list[Segment]:
         return segments
     slow, quick, loads = [], [], []
     for s in segments:
-        size = min(s.motion.size, int(SLOW_S * s.rate_hz) | 1)
+        size = min(s.motion.size - 1, int(SLOW_S * s.rate_hz)) | 1
+        if size > s.motion.size:  # an even number of samples holds no odd mean of them all
+            size -= 2
         slow.append(running_mean(s.motion.voltage, size))
         quick.append(s.motion.voltage - slow[-1])
         columns = relaxed((s.command**3).sum(axis=1), s.dt_s)

@@ -119,3 +119,19 @@ def test_the_coefficient_of_a_mass_is_its_share_of_the_true_one():
     assert (change, sd) == (pytest.approx(1 / 9), pytest.approx(0.009 / 0.81))
     assert relative_change("inertia_xx", 0.1, 0.009) == (change, sd)
     assert relative_change("thrust", 0.1, 0.009) == (0.1, 0.009)
+
+
+def test_a_value_that_only_the_fitted_runs_need_is_not_called_wrong():
+    """A torque coefficient 12 % off in the fitted run and right in the one held out is no property of the vehicle."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for name, off in (("a", 0.12), ("b", 0.0)):
+        x = columns(4000, rng)
+        y = np.full((4000, 12), np.nan)
+        for channel in (2, 5):
+            y[:, channel] = x[:, channel] @ np.array([0.0, off, 0.0, 0.0]) + coloured(4000, NOISE, rng, pole=0.0)
+        rows.append(Rows(name, np.arange(4000) / RATE_HZ, y, x))
+    terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
+    made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: run == "a", 1.0, RATE_HZ)
+    search = Search(made, lambda key, b: np.ones(12))
+    assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
