@@ -454,6 +454,9 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
         values, deviation = best.theta[where], sd[where]
         p = p_value(values - np.array(form.neutral), covariance[where, where], count)
         others = alternatives(problem, best, key, forms)
+        if key == "throttle_curve" and problem.other_supply() and "battery_sag" not in dict(best.chain):
+            # The voltage falls with the load, so a curve may be sag; the runs held out cannot judge it at theirs.
+            others.append("battery_sag")
         findings.append(
             Finding(
                 id=key,
