@@ -16,12 +16,9 @@ def main(studies: list[str], flights: str, table: str, coefficients: str) -> Non
     """Gather the results of `studies`; `flights` holds NeuroBEM's own errors."""
     results = real.read_results([Path(p) for p in studies])
     rows = pd.DataFrame([r["row"] for r in results], columns=real.ROW_COLUMNS)
-    own = pd.read_csv(flights)
-    reference = own[own["model"] == "neurobem"].set_index("flight") if len(own) else own
+    own = real.neurobem_errors(pd.read_csv(flights).to_dict("records"))
     for group in ("force", "moment"):
-        rows[f"{group}_neurobem"] = [
-            reference.loc[held, group] if len(own) and held in reference.index else None for held in rows["held_out"]
-        ]
+        rows[f"{group}_neurobem"] = [own.get((held, group)) for held in rows["held_out"]]
     rows.to_csv(table, index=False, float_format="%.6g")
     found = [c for r in results for c in r["compared"]]
     pd.DataFrame(found, columns=real.COMPARED_COLUMNS).to_csv(coefficients, index=False, float_format="%.6g")

@@ -36,7 +36,8 @@ def forms(vehicle):
         )
 
     b = each("b", "rad/s", -5.0, 5.0, "bias about", 0.001)
-    s = each("s", "1", -0.9, 2.0, "scale error about", 0.005)
+    # Data sheets allow 3 %; beyond a fifth it is another unit or another axis (mistakes), not a scale.
+    s = each("s", "1", -0.2, 0.2, "scale error about", 0.005)
     t = each("theta", "rad", -0.5, 0.5, "turn of the sensor about", 0.003)
     return (
         Form("bias", "Ω_m = Ω + b", b, bias, needs[:2], excited_by=("always",)),

@@ -5,6 +5,9 @@ import numpy as np
 from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs
 from rotorid.effects.scale import scale
 
+SQUARE = "Δc_2"
+"""Symbol of a squared term's excess over the coefficient believed."""
+
 
 def linear_term(motion, vehicle, values):
     """T_i += c_1 ω_i."""
@@ -26,6 +29,16 @@ def cubic_term(motion, vehicle, values):
     return lift_at_hubs(values[0] * motion.rotor_speed**3, vehicle)
 
 
+def linear_and_square(motion, vehicle, values):
+    """T_i += c_1 ω_i + Δc_2 ω_i²."""
+    return lift_at_hubs(values[0] * motion.rotor_speed + values[1] * motion.rotor_speed**2, vehicle)
+
+
+def constant_and_square(motion, vehicle, values):
+    """T_i += c_0 + Δc_2 ω_i²."""
+    return lift_at_hubs(values[0] + values[1] * motion.rotor_speed**2, vehicle)
+
+
 def forms(vehicle):
     needs = ("rotor_speed",)
     size = scale(vehicle)
@@ -33,6 +46,8 @@ def forms(vehicle):
     c0 = Parameter("c_0", "N", -thrust, thrust, meaning="thrust beyond the square at any speed")
     c1 = Parameter("c_1", "N s/rad", -thrust / speed, thrust / speed, meaning="thrust beyond the square per speed")
     c3 = Parameter("c_3", "N s3/rad3", -thrust / speed**3, thrust / speed**3, meaning="cubic thrust")
+    # A curve far from a square takes its squared term far from the coefficient believed, beyond any trust in it.
+    c2 = Parameter(SQUARE, "N s2/rad2", -thrust / speed**2, thrust / speed**2, meaning="squared term beyond C_F")
     always = ("always",)
     return (
         Form("linear term", "T_i = C_F ω_i² + c_1 ω_i", (c1,), linear_term, needs),
@@ -43,6 +58,23 @@ def forms(vehicle):
             (c0, c1),
             linear_and_constant,
             needs,
+            excited_by=always,
+        ),
+        Form(
+            "linear term and its own square",
+            "T_i = (C_F + Δc_2) ω_i² + c_1 ω_i",
+            (c1, c2),
+            linear_and_square,
+            needs,
+            must_show=(0, 1),
+        ),
+        Form(
+            "constant term and its own square",
+            "T_i = (C_F + Δc_2) ω_i² + c_0",
+            (c0, c2),
+            constant_and_square,
+            needs,
+            must_show=(0, 1),
             excited_by=always,
         ),
         Form("cubic term", "T_i = C_F ω_i² + c_3 ω_i³", (c3,), cubic_term, needs),

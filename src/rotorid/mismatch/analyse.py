@@ -13,29 +13,30 @@ import numpy as np
 from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Form
+from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence, leftover
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.gusts import gust_finding, with_gusts
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term, residual
+from rotorid.mismatch.rows import CHANNELS, MOMENT_GAIN, PARAMETER_NAMES, RUN_SCALE, Term, residual
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
-from rotorid.mismatch.speedpath import SpeedResult, commanded_path, nothing_between
+from rotorid.mismatch.speedpath import SpeedFit, SpeedResult, commanded_path, nothing_between
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import (
     WrenchModel,
     after_residual,
     chosen,
-    in_wind,
     nonlinear_intervals,
     path_segments,
     refine_nonlinear,
     reverse_regression,
     speed_path,
-    with_gusts,
     with_wind,
     wrench_model,
 )
@@ -47,6 +48,10 @@ RUN_SPREAD = 0.007
 """Relative spread of the thrust coefficient between runs below which one number serves all."""
 RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
+GAIN_TRUST = 1.0
+"""Relative one-sigma of a gain of the moments that nothing else bounds."""
+PINNED = 0.98
+"""Share of its limit at which a believed value counts as held there."""
 UNITS = {"force": "N", "moment": "N m"}
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 
@@ -80,9 +85,11 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
             segments, noisy, model = prepared.segments, prepared.noisy_segments, plain
             found = (nothing_between(found[0]), *found[1:])
 
+    segments, noisy = model.segments, model.noisy_segments
     if model.wind is not None:
         findings.append(wind_finding(model))
-        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
+    if model.gusts:
+        findings.append(gust_finding(model.gusts))
     if found is None:
         reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
     else:
@@ -123,8 +130,12 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         plain_values = wrong_values(model.regression, model.search, nothing, None, size)
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
-    notes += run_scale_notes(model)
+    notes += run_scale_notes(model) + moment_gain_notes(model)
+    if found is not None and found[0].lag_alone is not None:
+        notes.append(lag_alone_note(found[0].lag_alone))
     traces = make_traces(prepared, model, found, measured, plain_values, values)
+    findings, told = with_square_term(findings, told, model)
+    told = without_weight_of_payload(findings, told)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
     findings = together(findings)
@@ -162,7 +173,10 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     if thrust_differs(model):
         terms = with_run_scales(terms, prepared)
         model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
-    for _ in range(2 if any(model.search.terms[k].form.nonlinear for k in model.selection.active) else 0):
+    if axes := disowned_axes(model):
+        terms = [*terms, *(Term(f"{MOMENT_GAIN}{a}", "nuisance", prior_sd=(GAIN_TRUST,)) for a in axes)]
+        model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
+    for _ in range(2 if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
         again = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
@@ -172,9 +186,13 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
             break
     model = with_wind(prepared, model, segments, noisy, terms)
     if model.wind is not None:
-        segments, noisy = in_wind(segments, model.wind), in_wind(noisy, model.wind)
         terms = [t for t in model.terms if not t.run]
-    return with_gusts(prepared, model, segments, noisy, terms)
+    return with_gusts(prepared, model, terms)
+
+
+def changes_its_columns(form: Form) -> bool:
+    """Whether a form's columns hang on what the model holds: nonlinear parameters, or the accelerations predicted."""
+    return bool(form.nonlinear) or not {"angular_acceleration", "specific_force"}.isdisjoint(form.requires)
 
 
 def thrust_differs(model: WrenchModel) -> bool:
@@ -186,6 +204,47 @@ def thrust_differs(model: WrenchModel) -> bool:
     spread, p = regression.between_runs(fit, "thrust")
     runs = len(np.unique(regression.run[regression.training]))
     return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
+
+
+def disowned_axes(model: WrenchModel) -> str:
+    """Axes about which the rotors' moment is off by more than any wrong value: out of `xyz`.
+
+    A value that only moments know (arm, torque coefficient) stands at its limit there. Rotor speeds and body rates
+    then do not belong to each other (late, smoothed, faulty), and what they say in common about thrust, mass and
+    arm would spoil the forces: those moments get a gain of their own.
+    """
+    regression = model.regression
+    fit = regression.fit(model.search.always + model.selection.active)
+    axes = ""
+    for key, about in (("arm", "xy"), ("torque", "z")):
+        if key in model.search.terms:
+            column = regression.start[key]
+            if abs(fit.beta[fit.columns == column][0]) > PINNED * regression.limit[column]:
+                axes += about
+    return axes
+
+
+def moment_gain_notes(model: WrenchModel) -> list[str]:
+    """What was done about moments that do not follow from the rotor speeds."""
+    terms = [t for t in model.regression.terms if t.key.startswith(MOMENT_GAIN)]
+    if not terms:
+        return []
+    fit = model.regression.fit(model.search.always + model.selection.active)
+    found = [fit.beta[fit.columns == model.regression.start[t.key]][0] for t in terms]
+    parts = ", ".join(f"{t.key[-1]} {100 * (1 + b):.0f} %" for t, b in zip(terms, found, strict=True))
+    return [
+        "The moments do not follow from the rotor speeds within any plausible arm or torque coefficient, so they say "
+        f"nothing about thrust and mass here; what is left of the predicted ones: {parts}."
+    ]
+
+
+def lag_alone_note(fit: SpeedFit) -> str:
+    """The lag as others state it, who fit neither a delay nor a throttle curve beside it."""
+    tau, reach = float(fit.values[0]), 1.96 * float(np.sqrt(fit.covariance[0, 0]))
+    return (
+        "The lateness of the rotors is shared by a lag and what was found beside it; a lag alone would be "
+        f"{1000 * tau:.0f} ms ({1000 * (tau - reach):.0f} to {1000 * (tau + reach):.0f} ms)."
+    )
 
 
 def run_scale_notes(model: WrenchModel) -> list[str]:
@@ -315,6 +374,36 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     return out
 
 
+def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:
+    """Beside a thrust curve the coefficient of its square is the curve's own parameter c_2, and no wrong value.
+
+    C_F and what the curve adds to it trade off against each other; their sum is what the recording knows.
+    """
+    curve = next((f for f in findings if f.id == "thrust_curve" and f.status in ("established", "ambiguous")), None)
+    key = next((k for k in model.selection.active if model.search.terms[k].effect == "thrust_curve"), None)
+    if curve is None or key is None:
+        return findings, values
+    fit, coefficient = model.selection.fit, believed_value(model.prepared.vehicle, "thrust")
+    share = np.zeros(len(fit.columns))
+    share[fit.columns == model.regression.start["thrust"]] = coefficient
+    symbols = [curve.form.parameters[i].symbol for i in curve.form.linear]
+    if SQUARE in symbols:
+        share[fit.columns == model.regression.start[key] + symbols.index(SQUARE)] = 1.0
+    elif "thrust" not in values:
+        return findings, values
+    value, sd = coefficient + share @ fit.beta, np.sqrt(share @ fit.covariance @ share)
+    square = Estimate("c_2", float(value), "N s2/rad2", float(value - 1.96 * sd), float(value + 1.96 * sd))
+    told = replace(curve, parameters=(*(p for p in curve.parameters if p.symbol != SQUARE), square))
+    return [told if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
+
+
+def without_weight_of_payload(findings: list[Finding], values: dict) -> dict:
+    """Values without the mass (or the thrust, its ratio to it) where a payload that would change it may be at work."""
+    if not any("payload" in f.alternatives for f in findings):
+        return values
+    return {k: v for k, v in values.items() if k not in ("mass", "thrust")}
+
+
 def only_throttle(recordings: RecordingSet) -> bool:
     """Whether rotor speeds are known from the throttle and a believed full speed alone."""
     count = recordings.vehicle.rotor_count
@@ -422,9 +511,9 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
     return vehicle.model_copy(update=change)
 
 
-def offsets_of(model: WrenchModel) -> list[str]:
-    """Nuisance terms that every fit carries."""
-    return [t.key for t in model.regression.terms if t.kind in ("nuisance", "wind")]
+def always_of(model: WrenchModel, *kinds: str) -> list[str]:
+    """Terms of some kinds, which every fit carries."""
+    return [t.key for t in model.regression.terms if t.kind in kinds]
 
 
 def make_traces(
@@ -436,8 +525,8 @@ def make_traces(
     """
     regression = model.regression
     loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
-    plain = regression.fit(offsets_of(model) + list(plain_values), loose=loose)
-    full = regression.fit(offsets_of(model) + list(values) + model.selection.active, loose=loose)
+    plain = regression.fit(always_of(model, "nuisance") + list(plain_values), loose=loose)
+    full = regression.fit(always_of(model, "nuisance", "wind") + list(values) + model.selection.active, loose=loose)
     named = np.where(model.unnamed(full.columns), 0.0, full.beta)
     out = []
     for r, segment in zip(model.rows, prepared.segments, strict=True):
@@ -467,7 +556,7 @@ def make_traces(
 
 def noise_floors(prepared: Prepared, model: WrenchModel, found, measured: bool) -> dict[str, float]:
     """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain."""
-    out = {CHANNELS[c]: float(model.noise[c]) for c in range(6) if np.isfinite(model.noise[c])}
+    out = {CHANNELS[c]: float(model.floor[c]) for c in range(6) if np.isfinite(model.floor[c])}
     if found is not None and measured and found[0].noise_rad_s is not None:
         gain = float(np.sqrt((prepared.thinner.kernel**2).sum()))
         for i in range(prepared.vehicle.rotor_count):

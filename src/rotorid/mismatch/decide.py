@@ -27,6 +27,8 @@ VALUE_Z = 3.5
 """A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""
 SMALLEST_CHANGE = 0.015
 """A relative change below this is no wrong value: no laboratory knows its numbers better."""
+BEST_KNOWN = 0.004
+"""Relative one-sigma that no believed value is taken to be better known than, while others are called wrong."""
 BOOTSTRAPS = 400
 
 
@@ -173,11 +175,16 @@ def wrong_values(
     count = int(regression.training.sum())
 
     def penalised(keys: list[str]) -> float:
-        fit = regression.fit(always + keys, loose=loose)
+        # The others give by a fraction of a percent, or a third value would be called wrong to make up for it.
+        room = {k: loose[k] if k in keys else min(BEST_KNOWN, sd) for k, sd in trust.items()}
+        fit = regression.fit([*always, *trust], loose=room)
         cost = 0.0
-        for key in keys:
-            beta, _ = coefficients(regression, fit, key)
-            cost += COST_PER_VALUE + min((beta[0] / trust[key]) ** 2, MOST_DISTRUST)
+        for key in trust:
+            change = coefficients(regression, fit, key)[0][0]
+            if key in keys:
+                cost += COST_PER_VALUE + min((change / trust[key]) ** 2, MOST_DISTRUST)
+            else:
+                cost += (change / room[key]) ** 2
         return fit.gain - cost
 
     subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]

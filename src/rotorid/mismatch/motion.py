@@ -15,6 +15,7 @@ from rotorid.signal import kernels
 LONGEST_BRIDGED_SAMPLES = 6
 """A hole of up to this many of a column's own periods is interpolated; a longer one splits the run."""
 SHORTEST_SEGMENT_S = 2.0
+EVEN_SHARE = 0.85
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ def own_rate_hz(time_s: np.ndarray, values: np.ndarray) -> float:
 def fresh_samples(values: np.ndarray) -> np.ndarray:
     """Mask of samples that carry a new value, shape (n,): present, and not a repeat of a held reading.
 
-    Repeats count as held only where they are the rule (over 40 % of the samples): a constant column is no
-    sample-and-hold.
+    Repeats count as held only where they are the rule (over 40 % of the samples) and come as evenly as a slower
+    sensor's do: a constant column is no sample-and-hold, nor is a coarsely quantised one, whose repeats come by chance.
     """
     values = values.reshape(len(values), -1)
     present = np.isfinite(values).all(axis=1)
@@ -81,10 +82,20 @@ def fresh_samples(values: np.ndarray) -> np.ndarray:
     changed = np.ones(len(index), bool)
     changed[1:] = np.any(np.diff(values[index], axis=0) != 0.0, axis=1)
     share = changed.mean()
-    if 0.02 < share < 0.6:
+    if 0.02 < share < 0.6 and evenly_spaced(np.flatnonzero(changed)):
         present = np.zeros(len(values), bool)
         present[index[changed]] = True
     return present
+
+
+def evenly_spaced(index: np.ndarray) -> bool:
+    """Whether the gaps between rising indices are nearly all one length, give or take a sample.
+
+    Where each sample repeats by chance with a probability above 0.4, fewer than EVEN_SHARE of the (geometrically
+    distributed) gaps lie within one sample of their median.
+    """
+    gaps = np.diff(index)
+    return bool(np.mean(np.abs(gaps - np.median(gaps)) <= 1) >= EVEN_SHARE)
 
 
 def _resample(time_s, values, grid_s, smooth):

@@ -30,6 +30,7 @@ from rotorid.mismatch.rows import (
     measured_moment as moment_of,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.voltmeter import without_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
@@ -225,8 +226,8 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
     for run in recordings.runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng)
-    noisy = representative(noisy) if len(noisy) == len(segments) else []
-    segments = representative(segments)
+    noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
+    segments = representative(without_noise(segments))
     prepared = Prepared(recordings, vehicle, split, segments, noisy, Thinner(rate_hz, cutoff), noise, [])
     terms, reasons = make_terms(vehicle, segments, prepared.groups)
     return replace(prepared, terms=terms, not_testable=reasons)
@@ -286,6 +287,12 @@ def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[di
     return columns
 
 
+def at_knots(columns: list[dict[str, np.ndarray]], knots_s: np.ndarray, time_s: np.ndarray):
+    """Columns (north, east) of a wind that is a line from knot to knot, of each knot in turn; nothing outside."""
+    hats = [np.interp(time_s, knots_s, unit, left=0.0, right=0.0)[:, None] for unit in np.eye(len(knots_s))]
+    return [{group: part * hat for group, part in column.items()} for column in columns for hat in hats]
+
+
 def assemble_rows(
     prepared: Prepared,
     terms: list[Term],
@@ -313,7 +320,8 @@ def assemble_rows(
             if term.run and term.run != segment.run:
                 yield from [{}] * term.size
             elif term.kind == "wind":
-                yield from wind_columns(segment, vehicle, groups, effects or [])
+                columns = wind_columns(segment, vehicle, groups, effects or [])
+                yield from at_knots(columns, np.array(term.values), segment.motion.time_s) if term.run else columns
             elif term.kind == "slope":
                 yield slope_column(term, segment, vehicle, groups)
             elif term.kind == "effect":

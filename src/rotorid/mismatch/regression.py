@@ -343,6 +343,8 @@ def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
     if not len(gram):
         return bias
     scale = inverse_root(np.diag(gram))
+    if (np.diag(bias) * scale**2).sum() <= MOST_ATTENUATION * 1e-9:
+        return bias  # less than the limit in any direction that is kept below
     values, vectors = np.linalg.eigh(gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram)))
     values = np.maximum(values, 1e-9)
     back = vectors / np.sqrt(values)

@@ -57,6 +57,11 @@ class Term:
     slope_of: int | None = None
     """For the slope of a nonlinear parameter: its index in the form."""
 
+    @property
+    def once(self) -> str:
+        """What can be in a model only once: an effect in one of its forms, or what acts in one window of one run."""
+        return self.key if self.run else self.effect
+
 
 def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Thrust force, thrust moment and reaction torque of the believed rotors, each (n, 3), N and N m."""
@@ -216,9 +221,14 @@ def value_columns(
 
 
 def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict[str, np.ndarray]:
-    """Column of a nuisance as channel contributions: a time offset of one second between two sensors, or a
-    relative change of the thrust in one run."""
+    """Column of a nuisance as channel contributions: a time offset of one second between two sensors, a relative
+    change of the thrust in one run, or a gain of the rotors' moment about one axis."""
     motion = segment.motion
+    if key.startswith(MOMENT_GAIN):
+        if "moment" not in groups:
+            return {}
+        _, arm, torque = baseline_wrench(motion, vehicle)
+        return {"moment": (arm + torque) * (np.arange(3) == "xyz".index(key[-1]))}
     if key.startswith(RUN_SCALE):
         return value_columns("thrust", segment, vehicle, groups, {})
     if key == "offset:rotors-accelerometer" and "force" in groups:
@@ -235,6 +245,7 @@ def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict
 
 
 RUN_SCALE = "thrust of "
+MOMENT_GAIN = "gain of the moment about "
 OFFSETS = (
     "offset:rotors-accelerometer",
     "offset:rotors-gyroscope",

@@ -10,7 +10,7 @@ from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression, quadr
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
 
-ENTER_P = 1e-4
+ENTER_P = 5e-5
 """A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
 KEEP_P = 1e-4
 FINAL_P = 1e-3
@@ -40,6 +40,8 @@ EXPECTED_HELD_OUT = 25.0
 """Whitened squares that an effect should explain on the held-out runs before its failing there counts."""
 MOST_STRAIN = 4.0
 """Standard deviations of trust that an effect may push a believed value to."""
+NEAR_LIMIT = 0.98
+"""Share of the furthest that a believed value may move at which it counts as held there."""
 UNSTEADY_P = 1e-6
 UNSTEADY_SHARE = 0.4
 """A coefficient that spreads by more than this share of itself between runs is no constant of the vehicle."""
@@ -80,15 +82,17 @@ class Selection:
 class Search:
     """Forward search with replacement of forms, backward checks and pair moves."""
 
-    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None):
+    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None, harms=None):
         """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
 
         `known_sizes`, same shape, are of effects that are in the model already (between command and rotor speed).
+        `harms(key, with_it, without)` says whether a term makes one of its channels worse on the held-out rows.
         """
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.sizes_of = sizes_of
+        self.harms = harms
         self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
@@ -127,9 +131,10 @@ class Search:
             if term.kind != "value":
                 continue
             column = self.regression.start[term.key]
+            most = min(MOST_STRAIN * term.prior_sd[0], NEAR_LIMIT * self.regression.limit[column])
             with_it = abs(fit.beta[fit.columns == column][0])
             without = abs(base.beta[base.columns == column][0])
-            if with_it > MOST_STRAIN * term.prior_sd[0] and with_it > without + term.prior_sd[0]:
+            if with_it > most and with_it > without + term.prior_sd[0]:
                 return True
         return False
 
@@ -154,12 +159,12 @@ class Search:
 
     def gains(self, active: list[str]) -> list[tuple[float, Term]]:
         """Every term whose id is not in the model yet with what it would explain less what its parameters cost."""
-        taken = {self.terms[k].effect for k in active}
+        taken = {self.terms[k].once for k in active}
         base = self.regression.explained(self.always + active)
         return [
             (self.regression.explained([*self.always, *active, t.key]) - base - COST_PER_PARAMETER * t.size, t)
             for t in self.terms.values()
-            if t.kind == "effect" and t.effect not in taken
+            if t.kind == "effect" and t.once not in taken
         ]
 
     def candidates(self, active: list[str]) -> list[Candidate]:
@@ -213,39 +218,51 @@ class Search:
         return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
-        """A model with one id in another's place, if it is worth more: the first to enter may be an imitation."""
-        taken = {self.terms[k].effect for k in active} | set(dropped)
+        """A model with one id in another's place, if it is worth more: the first to enter may be an imitation.
+
+        The newcomer must hold by itself: what it displaces is not looked at again, and would be lost with it.
+        """
+        taken = {self.terms[k].once for k in active} | set(dropped)
         least = self.worth(active) + COST_PER_PARAMETER / 2
         trials = []
         for gone in active:
             if self.terms[gone].run:
                 continue
             for other in self.terms.values():
-                if other.kind == "effect" and not other.run and other.effect not in taken:
+                if other.kind == "effect" and not other.run and other.once not in taken:
                     trial = [other.key if k == gone else k for k in active]
-                    trials.append((self.worth(trial), trial))
+                    trials.append((self.worth(trial), other.key, trial))
         trials = sorted((t for t in trials if t[0] > least), key=lambda t: -t[0])
-        return next((trial for _, trial in trials[:MOST_TRIALS] if self._all_physical(trial)), None)
+        return next(
+            (
+                trial
+                for _, new, trial in trials[:MOST_TRIALS]
+                if self._all_physical(trial) and self.failing(new, trial)[0] is None
+            ),
+            None,
+        )
 
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
+    def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
+        """Why a term of the model does not hold beside the others (None where it does), and its score."""
+        judged = self.judge(key, active, self.without(key, active))
+        size = self.weight(key, judged.beta, active)
+        reason = None
+        if judged.p_value > KEEP_P:
+            reason = f"p = {judged.p_value:.2g} beside the others"
+        elif not judged.physical:
+            reason = "its coefficients are outside physical bounds"
+        elif size < SMALLEST_SIZE:
+            reason = f"its size is {size:.2g} of the noise"
+        return reason, judged.score
+
     def weak(self, active: list[str]) -> tuple[str, str] | None:
         """The worst term of the model that fails a test, with the reason; None if all hold."""
-        worst = None
-        for key in active:
-            judged = self.judge(key, active, self.without(key, active))
-            size = self.weight(key, judged.beta, active)
-            reason = None
-            if judged.p_value > KEEP_P:
-                reason = f"p = {judged.p_value:.2g} beside the others"
-            elif not judged.physical:
-                reason = "its coefficients are outside physical bounds"
-            elif size < SMALLEST_SIZE:
-                reason = f"its size is {size:.2g} of the noise"
-            if reason and (worst is None or judged.score < worst[2]):
-                worst = (key, reason, judged.score)
-        return None if worst is None else worst[:2]
+        found = [(key, *self.failing(key, active)) for key in active]
+        weak = [(score, key, reason) for key, reason, score in found if reason]
+        return min(weak)[1:] if weak else None
 
     def run(self, active: list[str] | None = None) -> Selection:
         """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
@@ -260,11 +277,13 @@ class Search:
                 break
             key, reason = found
             active = [k for k in active if k != key]
-            refuted[self.terms[key].effect] = reason
+            refuted[self.terms[key].once] = reason
             trail.append(f"- {key}: {reason}")
         fit, final = self._jackknifed(active, dropped, trail)
         kept = {self.terms[k].effect for k in active}
-        return Selection(active, fit, final, trail, {e: r for e, r in dropped.items() if e not in kept})
+        # What acts in one window of one run was dropped under its key.
+        reasons = {self.terms[name].effect if name in self.terms else name: r for name, r in dropped.items()}
+        return Selection(active, fit, final, trail, {e: r for e, r in reasons.items() if e not in kept})
 
     def _grown(self, active: list[str], dropped: dict[str, str], trail: list[str]) -> list[str]:
         """The model grown, its forms replaced and its weak terms taken out; `dropped` and `trail` are filled."""
@@ -280,19 +299,19 @@ class Search:
             if (simpler := self.simpler(active)) is not None:
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
                 for key in active:
-                    if self.terms[key].effect not in {self.terms[k].effect for k in simpler}:
-                        dropped[self.terms[key].effect] = "the others explain as much in other forms"
+                    if self.terms[key].once not in {self.terms[k].once for k in simpler}:
+                        dropped[self.terms[key].once] = "the others explain as much in other forms"
                 active = simpler
             exchanged = None if added else self.swapped(active, dropped)
             if exchanged is not None:
                 trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
                 for gone in set(active) - set(exchanged):
-                    dropped[self.terms[gone].effect] = "another explains more in its place"
+                    dropped[self.terms[gone].once] = "another explains more in its place"
                 active = exchanged
             while (weak := self.weak(active)) is not None:
                 key, reason = weak
                 active = [k for k in active if k != key]
-                dropped[self.terms[key].effect] = reason
+                dropped[self.terms[key].once] = reason
                 trail.append(f"- {key}: {reason}")
             if not added and exchanged is None:
                 break
@@ -304,7 +323,7 @@ class Search:
             return None
         # A cause without a name is looked at only where none with a name is left to enter.
         for candidate in sorted(self.candidates(active), key=lambda c: not c.named):
-            effect = self.terms[candidate.key].effect
+            effect = self.terms[candidate.key].once
             if candidate.score <= 0:
                 continue
             if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
@@ -332,11 +351,15 @@ class Search:
             if doubtful is None or final[doubtful] <= FINAL_P:
                 return fit, final
             active.remove(doubtful)
-            dropped[self.terms[doubtful].effect] = f"p = {final[doubtful]:.2g} where each block has its say"
+            dropped[self.terms[doubtful].once] = f"p = {final[doubtful]:.2g} where each block has its say"
             trail.append(f"- {doubtful}: fails the jackknife")
 
     def failed_held_out(self, active: list[str]) -> str | None:
-        """The term that should help on the held-out blocks and does the most harm there instead."""
+        """The term that should help on the held-out blocks and does the most harm there instead.
+
+        What helps over all but spoils a channel of its own is refused as well: a tilt that costs the lateral force
+        what it gains in a moment is no tilt.
+        """
         mask = self.regression.held_out
         if mask.sum() < 4 or not active:
             return None
@@ -351,7 +374,11 @@ class Search:
             # A gust in a held-out run must not decide about everything else: the outermost blocks do not count.
             cut = max(1, len(gains) // 8)
             gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
-            if expected > EXPECTED_HELD_OUT and gain < worst:
+            if expected <= EXPECTED_HELD_OUT:
+                continue
+            if gain >= 0 and self.harms is not None and self.harms(key, with_it, without):
+                gain = -1e-9
+            if gain < worst:
                 worst, found = gain, key
         return found
 
@@ -378,8 +405,8 @@ class Search:
         base = self.regression.explained(self.always + active)
         best: dict[str, tuple[float, Term]] = {}
         for gain, term in self.gains(active):
-            if term.effect not in dropped and (term.effect not in best or gain > best[term.effect][0]):
-                best[term.effect] = (gain, term)
+            if term.once not in dropped and (term.once not in best or gain > best[term.once][0]):
+                best[term.once] = (gain, term)
         pool = sorted(best.values(), key=lambda c: -c[0])[:most]
         winner, top = None, 0.0
         for i, (one_gain, one) in enumerate(pool):

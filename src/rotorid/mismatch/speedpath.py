@@ -75,6 +75,8 @@ class SpeedResult:
     dropped: dict[str, str] = field(default_factory=dict)
     noise_rad_s: float | None = None
     """One-sigma of the rotor speed residual, where speeds are measured."""
+    lag_alone: SpeedFit | None = None
+    """Where a lag shares its lateness with a delay or a curve: the lag as it would be with neither beside it."""
 
 
 def commanded_path(
@@ -387,7 +389,15 @@ class SpeedSearch:
         if isinstance(self.problem, MeasuredSpeed):
             parts = self.problem.raw(current.chain, current.values, current.shift_s)
             noise = float(np.sqrt(np.mean([np.mean(p**2) for p in parts])))
-        return SpeedResult(current, p_values, alternatives, sizes, dropped, noise)
+        return SpeedResult(current, p_values, alternatives, sizes, dropped, noise, self._lag_alone(current))
+
+    def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
+        """A lag of one constant and nothing beside it: what most publications fit."""
+        if not {"motor_lag"} < {k for k, _ in fit.chain} & {"motor_lag", "delay", "throttle_curve"}:
+            return None
+        form = next(f for k, f in self.forms if k == "motor_lag")
+        start = fit.of("motor_lag")[1].mean()
+        return self.problem.with_covariance(self.problem.fit((("motor_lag", form),), np.array([start])))
 
     def responds(self, fit: SpeedFit) -> bool:
         """Whether rotors still follow their commands: a flat curve would explain any difference between them."""

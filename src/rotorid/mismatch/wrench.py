@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter, welch
 
 from rotorid.effects.contract import Form
-from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
+    Fit,
     Regression,
     autoregression,
     build,
     full_fit_residuals,
 )
 from rotorid.mismatch.rows import Rows, Term, residual
-from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.select import FINAL_P, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
     SpeedResult,
@@ -37,6 +37,17 @@ NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is told from motion."""
 MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
+MEMORY_GRID = 37
+"""Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
+
+
+MOST_INFLATION = 2.0
+"""A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
+LEAST_ACTION = 1.0
+"""Size of a term in a channel, in units of its noise, from which it can do harm there."""
+LEAST_BLOCKS = 16
+HARM_Z = 5.0
+"""Standard errors beyond which a channel is worse off on the held-out rows."""
 
 
 @dataclass
@@ -50,10 +61,17 @@ class WrenchModel:
     search: Search
     selection: Selection
     noise: np.ndarray
-    """Noise of each of the twelve channels in the band of the rows."""
+    """Noise of each of the twelve channels in the band of the rows, as the search took it."""
+    floor: np.ndarray
+    """What is left of each channel where the whole catalogue is free to explain."""
     wind: np.ndarray | None = None
     """Steady wind north and east, m/s, that drag and lift are built on; None for still air."""
     wind_sd: np.ndarray | None = None
+    gusts: tuple = ()
+    """Gusts (`gusts.Gust`) that drag and lift are built on."""
+    segments: list[Segment] = field(default_factory=list)
+    """What the rows are made of: rotor speeds as the chain has them, moving air where it moves."""
+    noisy_segments: list[Segment] = field(default_factory=list)
 
     def unnamed(self, columns: np.ndarray) -> np.ndarray:
         """Mask of the columns that belong to empirical terms, which no finding may count as its own."""
@@ -92,6 +110,38 @@ def wrench_model(
         rows, noisy = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, _ = full_fit_residuals(rows, precision)
+    model = searched(prepared, terms, rows, noisy, left, start, segments, known_sizes)
+    # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
+    # thrust and a deaf gyroscope): such a channel would weigh as if it were exact, and pull at all values.
+    remains = after_residual(model)
+    fitted = [p for p, r in zip(remains, rows, strict=True) if r.run in prepared.split.training]
+    inflated = inflated_channels(fitted, model.noise)
+    if inflated.any():
+        left = [np.where(inflated, own, full) for own, full in zip(remains, left, strict=True)]
+        active = model.selection.active
+        again = searched(prepared, terms, rows, noisy, left, active, segments, known_sizes)
+        model = replace(again, floor=model.floor)
+    return replace(model, segments=segments, noisy_segments=noisy_segments)
+
+
+def inflated_channels(remains: list[np.ndarray], noise: np.ndarray) -> np.ndarray:
+    """Mask of the channels in which residuals (n, 12) are by far larger than their noise (12,)."""
+    rms = np.sqrt(sum((p**2).sum(axis=0) for p in remains) / max(1, sum(len(p) for p in remains)))
+    with np.errstate(invalid="ignore"):
+        return rms > MOST_INFLATION * noise
+
+
+def searched(
+    prepared: Prepared,
+    terms: list[Term],
+    rows: list[Rows],
+    noisy: list[Rows] | None,
+    left: list[np.ndarray],
+    start: list[str] | None,
+    segments: list[Segment],
+    known_sizes: np.ndarray | None,
+) -> WrenchModel:
+    """The search with residuals `left` (n, 12) of every stretch taken for the noise."""
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
     floor = channel_floor()
     filters = {c: autoregression([r[:, c] for r in left], floor[c]) for c in present}
@@ -113,8 +163,40 @@ def wrench_model(
         cols, coefficients = regression.beyond(values, key, beta) if key not in values else (own, beta)
         return local_sizes(rows, cols, coefficients, noise, per, 1.0 if short else 0.9)
 
-    search = Search(regression, sizes_of, known_sizes)
-    return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise)
+    rule = training_rule(prepared.split, segments)
+    held = [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in rows]
+
+    def harms(key: str, with_it: Fit, without: Fit) -> bool:
+        return spoils_a_channel(rows, held, regression.columns([key]), with_it, without, noise, per)
+
+    search = Search(regression, sizes_of, known_sizes, harms)
+    return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise, noise)
+
+
+def spoils_a_channel(
+    rows: list[Rows], held: list[np.ndarray], cols: np.ndarray, with_it: Fit, without: Fit, noise: np.ndarray, per: int
+) -> bool:
+    """Whether a term leaves more of a channel that it acts on than there is without it, held out and beyond doubt.
+
+    Squares are compared by blocks of `per` rows without their outermost eighths, as for the whole.
+    """
+    fits = [(with_it.columns, with_it.beta), (without.columns, without.beta)]
+    own = with_it.beta[[list(with_it.columns).index(c) for c in cols]]
+    changes, acts = [], np.zeros(12, bool)
+    for r, mask in zip(rows, held, strict=True):
+        if mask.sum() < 2 * per:
+            continue
+        parts = np.array_split(np.flatnonzero(mask), mask.sum() // per)
+        after, before = ((r.y - r.x[:, :, c] @ b) ** 2 for c, b in fits)
+        changes += [(before[p] - after[p]).mean(axis=0) for p in parts]
+        acts |= np.sqrt(((r.x[mask][:, :, cols] @ own) ** 2).mean(axis=0)) > LEAST_ACTION * noise
+    if len(changes) < LEAST_BLOCKS:
+        return False
+    gains = np.sort(np.array(changes)[:, acts], axis=0)
+    cut = len(gains) // 8
+    gains = gains[cut : len(gains) - cut]
+    doubt = gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
+    return bool((gains.mean(axis=0) < -HARM_Z * np.maximum(doubt, 1e-300)).any())
 
 
 def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float):
@@ -250,15 +332,24 @@ def refine_nonlinear(prepared: Prepared, model: WrenchModel, segments) -> dict[s
 def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: int, segments) -> float:
     """The value of one nonlinear parameter that leaves the least, searched within a factor of six of its start."""
     parameter, start = term.form.parameters[index], values[index]
+    training = [s for s in segments if s.run in prepared.split.training]
+    fixed = assemble_rows(prepared, others, training, chosen(model))
 
     def cost(log_factor: float) -> float:
         trial = values.copy()
         trial[index] = start * np.exp(log_factor)
         moved = replace(term, values=tuple(trial))
-        return profile_cost(prepared, model, [*others, moved], segments, fixed_gain=not term.form.linear)
+        own = assemble_rows(prepared, [moved], training, chosen(model))
+        rows = [replace(a, x=np.concatenate([a.x, b.x], axis=2)) for a, b in zip(fixed, own, strict=True)]
+        return profile_cost(model, [*others, moved], rows, fixed_gain=not term.form.linear)
 
     low = np.log(max(parameter.low, start / 6, 1e-9) / start)
     high = np.log(min(parameter.high, start * 6) / start)
+    if term.form.memory and len(parameter.starts) > 1:
+        # What rings has several minima over its frequency: the search starts about the best of a grid.
+        grid = np.linspace(low, high, MEMORY_GRID)
+        best = int(np.argmin([cost(factor) for factor in grid]))
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, MEMORY_GRID - 1)]
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
     return float(start * np.exp(found.x))
 
@@ -309,10 +400,8 @@ def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dic
     return out
 
 
-def profile_cost(prepared: Prepared, model: WrenchModel, terms: list[Term], segments, fixed_gain: bool) -> float:
-    """Whitened training squares with the linear coefficients of `terms` free (the last at gain one if asked)."""
-    training = [s for s in segments if s.run in prepared.split.training]
-    rows = assemble_rows(prepared, terms, training, chosen(model))
+def profile_cost(model: WrenchModel, terms: list[Term], rows: list[Rows], fixed_gain: bool) -> float:
+    """Whitened squares of rows with the linear coefficients of `terms` free (the last at gain one if asked)."""
     size = rows[0].x.shape[2]
     gram, cross, square = np.zeros((size, size)), np.zeros(size), 0.0
     for r in rows:
@@ -391,6 +480,8 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
         effects = updated
         if np.abs(step).max() < 0.01:
             break
+    if regression.wald(fit, regression.columns(["wind"]), int(regression.training.sum())) > FINAL_P:
+        return model  # a wind that the fit through the drag does not see is none
     sd = np.sqrt(np.diag(fit.covariance)[-2:])
     again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
     drags = ("rotor_drag", "frame_drag")
@@ -420,22 +511,6 @@ def after_residual(model: WrenchModel) -> list[np.ndarray]:
     """Residual rows with the selected effects, (n, 12) per segment."""
     full = model.regression.fit(model.search.always + model.selection.active)
     return [r.y - r.x[:, :, full.columns] @ full.beta for r in model.rows]
-
-
-def with_gusts(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
-    """The model with gusts in the windows that its residual shows; the same model where there are none."""
-    if "force" not in prepared.groups or any(s.motion.rotation is None for s in segments):
-        return model
-    gusts = []
-    for rows, left, segment in zip(model.rows, after_residual(model), segments, strict=True):
-        index = np.searchsorted(segment.motion.time_s, rows.time_s).clip(0, segment.motion.size - 1)
-        found = windows(left[:, :3], segment.motion.rotation[index], rows.time_s)
-        gusts += gust_terms(segment.run, found)
-    if not gusts:
-        return model
-    again = wrench_model(prepared, terms + gusts, chosen(model), model.selection.active, segments, noisy)
-    again.wind, again.wind_sd = model.wind, model.wind_sd
-    return again
 
 
 def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:

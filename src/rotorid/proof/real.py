@@ -105,6 +105,19 @@ def row_of(verdict: Mapping[str, Any], wanted: Study) -> dict[str, Any]:
     return row
 
 
+def neurobem_errors(flights: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], float]:
+    """NeuroBEM's own error by flight and group, as `rms_over_axes` states ours: the root of the summed squares.
+
+    `flights` are the lines of `results/neurobem/flights.csv`, whose own totals are means over the axes instead.
+    """
+    return {
+        (flight["flight"], group): math.sqrt(sum(float(flight[f"{group}_{axis}"]) ** 2 for axis in "xyz"))
+        for flight in flights
+        if flight["model"] == "neurobem"
+        for group in ("force", "moment")
+    }
+
+
 def read_results(paths: Sequence[Path]) -> list[dict[str, Any]]:
     """Results of studies that could be made."""
     found = [json.loads(path.read_text(encoding="utf-8")) for path in paths]

@@ -31,8 +31,10 @@ from rotorid.vehicle.attitude import (
 from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
 from rotorid.vehicle.integrate import rk4_step
 
-MEMORY_ROUNDS = 4
-"""Flights simulated in a row where an effect has a memory of its own; each takes its wrench from the last."""
+MEMORY_ROUNDS = 12
+"""Flights simulated in a row, at most, where an effect has a memory of its own; each takes its wrench from the last."""
+MEMORY_SETTLED = 1e-7
+"""Change of that wrench, as a share of its largest, at which it has settled."""
 
 
 class Controller(Protocol):
@@ -177,8 +179,18 @@ def simulate(
         readings = rng.normal(0.0, noise.attitude_rad, readings.shape)
     flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v)
     trace = flight.fly(_fresh(controller), pushes, readings)
+    # A load as heavy as the vehicle would make plain repetition diverge: Aitken's relaxation (Küttler and Wall,
+    # Computational Mechanics 43, 2008) takes the step from how the last one turned out.
+    added, last, share = np.zeros_like(pushes), None, 1.0
     for _ in range(MEMORY_ROUNDS if slow else 0):
-        added = _wrench_of_memory(trace, vehicle, slow, flight)
+        wrench = _wrench_of_memory(trace, vehicle, slow, flight)
+        gap = wrench - added
+        if np.abs(gap).max() <= MEMORY_SETTLED * np.abs(wrench).max():
+            break
+        if last is not None:
+            change = gap - last
+            share *= -float((last * change).sum() / (change**2).sum())
+        added, last = added + share * gap, gap
         flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v)
         trace = flight.fly(_fresh(controller), pushes + added, readings)
     return trace

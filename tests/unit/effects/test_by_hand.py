@@ -52,7 +52,7 @@ FORCE_AND_MOMENT = [
         *("payload", "rigid", [0.1, 0.005, 0.0], dict(specific_force=row(0, 0, -G))),
         *((0, 0, 0.1 * G), (0, -0.005 * G, 0)),
     ),
-    ("payload", "slung", [0.1, 0.5], dict(specific_force=row(0, 0, -G)), (0, 0, 0.1 * G), None),
+    ("payload", "slung", [0.1, 0.5, 0.05], dict(specific_force=row(0, 0, -G)), (0, 0, 0.1 * G), None),
     ("rotational_damping", "linear", [1e-3, 2e-3, 0], dict(angular_velocity=row(3, -1, 5)), None, (-3e-3, 2e-3, 0)),
     ("rotational_damping", "quadratic", [1e-3, 1e-3, 0], dict(angular_velocity=row(3, -2, 5)), None, (-9e-3, 4e-3, 0)),
     # rotor 1 (ccw) speeds up by 1000 rad/s²: the airframe turns clockwise
@@ -157,19 +157,57 @@ def test_a_vortex_ring_takes_most_at_the_hover_inflow():
         np.testing.assert_allclose(added.force, [[0, 0, 0.3 * left * 4 * T]], atol=1e-9)
 
 
-def test_a_slung_load_swings_at_its_own_frequency():
-    """A jump of 1 m/s² to the north: the angle overshoots about −1/g and swings with 2π √(L/g) = 2.006 s for 1 m."""
-    t = np.arange(2000) / 200.0
-    world = np.tile([1.0, 0, -G], (2000, 1))
-    zero = np.zeros((2000, 3))
-    level = np.tile(NORTH, (2000, 1, 1))
-    motion = still(2000, time_s=t, angular_velocity=zero, specific_force=world, rotation=level)
+def slung_pull(world):
+    """Force (n, 3), N, of 0.1 kg on 1 m below a level vehicle with specific force `world` (n, 3), at 200 Hz."""
+    size = len(world)
+    level = np.tile(NORTH, (size, 1, 1))
+    motion = still(
+        size,
+        time_s=np.arange(size) / 200.0,
+        angular_velocity=np.zeros((size, 3)),
+        specific_force=world,
+        rotation=level,
+    )
     slung = {f.name: f for f in catalogue()["payload"].forms(thesis_vehicle())}["slung"]
-    pull = slung.contribution(motion, thesis_vehicle(), np.array([0.1, 1.0])).force[:, 0]
-    peaks = [k for k in range(1, 1999) if pull[k] < pull[k - 1] and pull[k] <= pull[k + 1]]
-    assert np.diff(t[peaks]).mean() == pytest.approx(2.0061, rel=0.005)
+    return slung.contribution(motion, thesis_vehicle(), np.array([0.1, 1.0, 0.05])).force
+
+
+def test_a_slung_load_swings_at_its_own_frequency():
+    """A jump of 1 m/s² to the north after 3 s: the load swings about a slope of −1/g.
+
+    What hangs it is √(g² + 1) = 9.8606 m/s² then: 2π √(L/9.8606) (1 + 0.1016²/16) = 2.0022 s for 1 m.
+    """
+    world = np.tile([0.0, 0, -G], (2600, 1))
+    world[600:, 0] = 1.0
+    t, pull = np.arange(2600) / 200.0, slung_pull(world)[:, 0]
+    assert pull[:600] == pytest.approx(0.0, abs=1e-12)
+    peaks = [k for k in range(601, 2599) if pull[k] < pull[k - 1] and pull[k] <= pull[k + 1]]
+    assert np.diff(t[peaks]).mean() == pytest.approx(2.0022, rel=0.005)
     # Undamped it would swing from 0 to −2 m_p; ζ = 0.05 leaves 1 + exp(−π ζ) of it, and −m_p in the end.
     assert pull.min() == pytest.approx(-0.1 * (1 + np.exp(-0.05 * np.pi)), rel=0.01)
+
+
+def test_a_slung_load_swings_far_and_pulls_with_its_turning():
+    """Its pivot falls sideways at g: what hangs it jumps from (g, 0, 0) to (0, 0, g), and it swings through 90°.
+
+    At the bottom |n'|² = 2 g (1 − cos 90°)/L of a free swing: three times its weight, less what damping takes.
+    """
+    world = np.tile([-G, 0.0, 0.0], (1000, 1))
+    world[600:] = [0.0, 0.0, -G]
+    force = slung_pull(world)
+    assert force[590] == pytest.approx([0.1 * G, 0, 0], abs=1e-9)
+    # A quarter of a swing from 90° takes 1.854 √(L/g) = 0.592 s.
+    lowest = 600 + int(np.argmax(force[600:800, 2]))
+    assert (lowest - 600) / 200.0 == pytest.approx(0.592, abs=0.02)
+    # ζ = 0.05 takes 4 ζ ω ∫ |n'|² dt ≈ 4 ζ ∫ √(2 cos θ) dθ = 4 ζ · 1.6944 · ω² from |n'|² = 2 ω² by then.
+    assert force[lowest, 2] == pytest.approx(0.1 * G * (3 - 4 * 0.05 * 1.6944), rel=0.02)
+
+
+def test_a_cable_does_not_push():
+    """Falling faster than free leaves the cable slack: no force, though a rod would push 0.1 g up."""
+    world = np.tile([0.0, 0, -G], (1000, 1))
+    world[600:] = [0.0, 0.0, G]
+    assert slung_pull(world)[605:] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_bounds_follow_the_vehicle():

@@ -370,7 +370,10 @@ def fitted(function, form) -> tuple[np.ndarray, np.ndarray]:
     """Least squares of `function(values)`, in units of its noise: estimate and one-sigma."""
     low, high = (np.array([getattr(p, side) for p in form.parameters]) for side in ("low", "high"))
     count = max(len(p.starts) for p in form.parameters) or 1
-    starts = [np.array([p.starts[k] if p.starts else 0.0 for p in form.parameters]) for k in range(count)]
+    starts = [
+        np.array([p.starts[min(k, len(p.starts) - 1)] if p.starts else 0.0 for p in form.parameters])
+        for k in range(count)
+    ]
     best = min(starts, key=lambda v: np.sum(function(np.clip(v, low, high)) ** 2))
     inside = np.clip(best, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
     found = least_squares(

@@ -41,10 +41,29 @@ def smooth(rng: np.random.Generator, count: int, size: float, highest_hz: float)
     return size * values / values.std()
 
 
+def slowed(acceleration: np.ndarray, rotation: np.ndarray, wind: np.ndarray, drag: float) -> np.ndarray:
+    """Velocity (n, 3) of what accelerates (n, 3) and is slowed across its third axis; `drag` per sample."""
+    across = drag * (np.eye(3) - np.einsum("ni,nj->nij", rotation[:, :, 2], rotation[:, :, 2]))
+    gained = acceleration / DENSE_HZ + np.einsum("nij,nj->ni", across, wind)
+    velocity = np.zeros_like(acceleration)
+    for k in range(1, len(velocity)):
+        velocity[k] = velocity[k - 1] + gained[k] - across[k] @ velocity[k - 1]
+    return velocity
+
+
 class Flight:
     """True motion on a dense grid; `record` samples it as columns, each sensor at its own instants."""
 
-    def __init__(self, seed: int, duration_s: float = 25.0, drag: float = 0.0, excitation: float = 1.0):
+    def __init__(
+        self,
+        seed: int,
+        duration_s: float = 25.0,
+        drag: float = 0.0,
+        excitation: float = 1.0,
+        gust: tuple[float, float, float, float] | None = None,
+    ):
+        """`drag` is a deceleration across the rotors' axis per airspeed, 1/s; `gust` its start and stop, s, and the
+        wind north and east, m/s, that comes and goes within 0.3 s."""
         rng = np.random.default_rng(seed)
         self.vehicle = quad()
         count = int((duration_s + 2.0) * DENSE_HZ)
@@ -66,16 +85,19 @@ class Flight:
             axis=1,
         )
         thrust = self.vehicle.mass_kg * GRAVITY * (1 + smooth(rng, count, 0.08 * excitation, 3.0))
-        # Drag needs the velocity, which needs the drag: two rounds are enough for a weak one.
-        body = np.stack([np.zeros(count), np.zeros(count), -thrust / self.vehicle.mass_kg], axis=1)
-        force = body
-        for _ in range(3 if drag else 1):
-            acceleration = rotation.apply(force) + np.array([0.0, 0.0, GRAVITY])
-            acceleration -= acceleration.mean(axis=0)
+        wind = np.zeros((count, 3))
+        if gust is not None:
+            start, stop = gust[0] + 1.0, gust[1] + 1.0  # recordings begin one second in
+            wind[:, :2] = np.interp(t, [start, start + 0.3, stop - 0.3, stop], [0, 1, 1, 0])[:, None] * gust[2:]
+        force = np.stack([np.zeros(count), np.zeros(count), -thrust / self.vehicle.mass_kg], axis=1)
+        acceleration = rotation.apply(force) + np.array([0.0, 0.0, GRAVITY])
+        # With a drag the horizontal velocity stays bounded by itself.
+        acceleration -= acceleration.mean(axis=0) * ((0.0, 0.0, 1.0) if drag else 1.0)
+        if drag:
+            velocity = slowed(acceleration, rotation.as_matrix(), wind, drag / DENSE_HZ)
+        else:
             velocity = cumulative_trapezoid(acceleration, t, axis=0, initial=0.0)
             velocity -= velocity.mean(axis=0)
-            along = rotation.inv().apply(velocity)
-            force = body - drag * along * np.array([1.0, 1.0, 0.0])
         position = cumulative_trapezoid(velocity, t, axis=0, initial=0.0) + np.array([0.0, 0.0, -5.0])
         # The mean acceleration that was taken out returns as specific force, so that kinematics stay exact.
         exact = rotation.inv().apply(CubicSpline(t, velocity).derivative()(t) - np.array([0.0, 0.0, GRAVITY]))

@@ -191,25 +191,27 @@ def test_turning_senses(sound, turned):
 
 
 @pytest.mark.parametrize(
-    ("late_s", "sensors", "value"),
+    ("late_s", "sensors", "value", "word"),
     [
-        ({"rotors": 0.012}, ("rotor_speed_1_rad_s",), 0.012),
+        ({"rotors": 0.012}, ("rotor_speed_1_rad_s",), 0.012, "late"),
         (
             {"gyroscope": 0.0235, "accelerometer": 0.0235},
             ("specific_force_x_m_s2", "angular_velocity_x_rad_s"),
             0.0235,
+            "late",
         ),
-        ({"attitude": -0.02}, ("quaternion_w",), -0.02),
+        ({"attitude": -0.02}, ("quaternion_w",), 0.02, "early"),
     ],
     ids=["rotors", "imu", "attitude"],
 )
-def test_delays(late_s, sensors, value):
+def test_delays(late_s, sensors, value, word):
     fixed, findings, _ = find_mistakes(recorded(31, 32, late_s=late_s))
     finding = one(findings, "delay")
     assert set(finding.channels) == set(sensors)
     estimate = finding.parameters[0]
     assert estimate.low <= value <= estimate.high
     assert estimate.value == pytest.approx(value, abs=5e-4)
+    assert f" ms {word} against" in finding.sentence
     assert find_mistakes(fixed)[1] == ()
 
 

@@ -125,3 +125,27 @@ def test_a_pair_that_masks_each_other_is_found_together():
     x = [[c[0], c[0] + 0.35 * coloured(2400, 1.0, rng, pole=0.95)] for c in x]
     y = [n + 2.0 * (columns[0] - columns[1]) for n, columns in zip(noise, x, strict=True)]
     assert effects_of(search_of([term("one"), term("two")], y, x)) == ["one", "two"]
+
+
+def test_what_displaces_another_must_hold_by_itself():
+    """A near copy that explains more but does not matter may not take the place of the effect that is there."""
+    rng = np.random.default_rng(5)
+    noise, x = case(rng, 2)
+    for columns in x:
+        columns[1] = columns[0] + 0.5 * columns[1]
+    y = [n + 0.8 * columns[1] for n, columns in zip(noise, x, strict=True)]
+    search = search_of([term("there"), term("copy")], y, x)
+    assert search.swapped(["there/form"], {}) == ["copy/form"]
+    sizes = search.sizes_of
+    search.sizes_of = lambda key, beta: sizes(key, beta) * (0.01 if key == "copy/form" else 1.0)
+    assert search.swapped(["there/form"], {}) is None
+
+
+def test_what_spoils_a_channel_of_the_held_out_runs_is_refuted():
+    rng = np.random.default_rng(6)
+    noise, x = case(rng, 1)
+    y = [n + 0.8 * columns[0] for n, columns in zip(noise, x, strict=True)]
+    search = search_of([term("e")], y, x)
+    assert search.failed_held_out(["e/form"]) is None
+    search.harms = lambda key, with_it, without: True
+    assert search.failed_held_out(["e/form"]) == "e/form"

@@ -103,6 +103,16 @@ def test_a_delay_is_no_lag():
     assert result.fit.values[0] + result.fit.shift_s == pytest.approx(0.045, abs=0.001)
 
 
+def test_a_lag_beside_a_delay_is_also_stated_as_the_lag_alone_that_others_fit():
+    """A lag of 40 ms behind a delay of 20 ms: alone, the lag must make up for most of both."""
+    both = searched(recorded(7, delay=("of the command", (0.02,)), motor_lag=("one constant", (0.04,))))
+    assert sorted(k for k, _ in both.fit.chain) == ["delay", "motor_lag"]
+    assert both.fit.of("motor_lag")[1].mean() == pytest.approx(0.04, abs=0.004)
+    assert [k for k, _ in both.lag_alone.chain] == ["motor_lag"]
+    assert 0.05 < both.lag_alone.values[0] < 0.08
+    assert searched(recorded(8, motor_lag=("one constant", (0.04,)))).lag_alone is None
+
+
 def test_without_a_voltmeter_no_power_of_the_voltage_is_tried():
     names = {f.name for _, f in candidate_forms([recorded(6)])}
     assert "power of voltage" not in names and "drift in time" in names

@@ -50,3 +50,11 @@ def test_a_published_number_in_its_own_terms() -> None:
 def test_studies_have_names_of_their_own() -> None:
     names = [s.name for s in STUDIES]
     assert len(set(names)) == len(names)
+
+
+def test_errors_of_neurobem_are_totals_over_the_axes_as_ours_are():
+    """(0.3, 0.4, 1.2) N is 1.3 N in all, (3, 4, 0) mN m is 5 mN m; the rigid body's own line is another model's."""
+    line = {"flight": "a", "force_x": 0.3, "force_y": 0.4, "force_z": 1.2}
+    line |= {"moment_x": 0.003, "moment_y": 0.004, "moment_z": 0.0, "force": 0.75, "moment": 0.003}
+    own = real.neurobem_errors([line | {"model": "neurobem"}, line | {"model": "rigid_body", "force_z": 9.0}])
+    assert own == {("a", "force"): pytest.approx(1.3), ("a", "moment"): pytest.approx(0.005)}

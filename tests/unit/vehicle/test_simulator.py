@@ -455,13 +455,14 @@ def test_effects_of_the_vehicle_file_are_flown():
     np.testing.assert_allclose(known.rotor_speed[0, 50:], lagged.rotor_speed[0, 50:], rtol=3e-3)
 
 
-def test_a_slung_load_swings_in_the_simulator():
-    """The pendulum hangs still in hover and pulls the vehicle down by its weight."""
+@pytest.mark.parametrize("mass_kg", [0.1, 1.0])
+def test_a_slung_load_swings_in_the_simulator(mass_kg):
+    """The pendulum hangs still in hover and both fall by its weight: m_p g / (0.652 + m_p), also if it is heavier."""
     vehicle = thesis_vehicle()
     slung = next(f for f in catalogue()["payload"].forms(vehicle) if f.name == "slung")
     hold = Commands(np.array([0.0]), np.full((1, 4), np.sqrt(0.652 * 9.81 / (4 * CF))))
-    trace = simulate(vehicle, hold, 0.5, 0.005, effects=[(slung, [0.1, 0.5])])
-    assert trace.velocity[0, -1, 2] == pytest.approx(0.1 * 9.81 / 0.652 * 0.5, rel=1e-3)
+    trace = simulate(vehicle, hold, 0.5, 0.005, effects=[(slung, [mass_kg, 0.5, 0.05])])
+    assert trace.velocity[0, -1, 2] == pytest.approx(mass_kg * 9.81 / (0.652 + mass_kg) * 0.5, rel=1e-3)
 
 
 def test_a_controller_flies_the_same_twice():

@@ -508,7 +508,8 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
                     f"The stamps of {_listed(cluster)} are {1e3 * abs(amount):.1f} ms {word} against the other "
                     f"sensors': shifted."
                 ),
-                parameters=(Estimate("T_d", amount, "s", amount - 1.96 * sd, amount + 1.96 * sd),),
+                # A sensor whose stamps are early is seen as all others' delay: the id's parameter is a length of time.
+                parameters=(Estimate("T_d", abs(amount), "s", abs(amount) - 1.96 * sd, abs(amount) + 1.96 * sd),),
                 p_value=max(p for n, p in wrong if n in cluster),
                 channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in cluster),
             )

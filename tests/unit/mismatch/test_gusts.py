@@ -1,0 +1,60 @@
+"""A gust found as a wind, through the drag it is felt by."""
+
+import numpy as np
+import pytest
+
+from rotorid.mismatch.analyse import analyse
+from rotorid.mismatch.gusts import Gust, blowing, knots_of
+
+from .flights import recorded
+
+WINDOW_S, WIND_M_S, DRAG = (8.0, 12.0), np.array([4.0, -2.0]), 0.4
+
+
+@pytest.fixture(scope="module")
+def gusty():
+    return analyse(recorded(1, 2, 3, flight={"drag": DRAG, "excitation": 1.5, "gust": (*WINDOW_S, *WIND_M_S)}))
+
+
+def test_the_wind_of_a_gust_and_the_drag_beside_it(gusty):
+    """0.4 1/s times 0.652 kg is 0.261 N s/m; rotors turn at about 1070 rad/s, so k_d about 0.261 / 4280 = 6.1e-5."""
+    found = {f.id: f for f in gusty.findings if f.status == "established"}
+    assert set(found) == {"gust", "rotor_drag"}
+    for estimate, wind in zip(found["gust"].parameters, WIND_M_S, strict=True):
+        assert abs(estimate.value - wind) < 0.4
+    (drag,) = found["rotor_drag"].parameters
+    slowing = drag.value * (4280 if "independent" not in found["rotor_drag"].form.name else 1.0)
+    assert abs(slowing - 0.261) < 0.02
+
+
+def test_it_is_found_in_every_run_and_leaves_little(gusty):
+    """Runs that are held out too: a wind belongs to its run."""
+    (gust,) = [f for f in gusty.findings if f.id == "gust"]
+    assert {w[0] for w in gust.windows} == {"run00", "run01", "run02"}
+    for _, start, stop in gust.windows:
+        assert abs(start - WINDOW_S[0]) < 0.5 and abs(stop - WINDOW_S[1]) < 0.5
+    for trace in gusty.traces:
+        if trace.channel in ("force_x", "force_y"):
+            inside = (trace.time_s > 8.5) & (trace.time_s < 11.5)
+            assert trace.after[inside].std() < 0.35 * np.sqrt(np.mean(trace.before[inside] ** 2))
+
+
+def test_without_a_gust_none_is_told():
+    analysis = analyse(recorded(4, 5, flight={"drag": DRAG, "excitation": 1.5}))
+    assert "gust" not in {f.id for f in analysis.findings}
+
+
+def test_the_wind_between_knots_and_outside():
+    knots = knots_of(2.0, 4.0, 1.0)
+    np.testing.assert_allclose(knots, [2, 3, 4])
+    wind = np.array([[0.0, 1.0], [2.0, 1.0], [0.0, 1.0]])
+    np.testing.assert_allclose(blowing(knots, wind, np.array([1.9, 2.5, 3.5, 4.1])), [[0, 0], [1, 1], [1, 1], [0, 0]])
+
+
+def test_height_is_the_mean_over_the_strong_knots():
+    """Knots of 0, 3, 5, 0 m/s to the north: the strong ones are 3 and 5, their mean 4 ± √(0.1² + 0.1²)/2."""
+    wind = np.array([[0.0, 0.0], [3.0, 0.0], [5.0, 0.0], [0.0, 0.0]])
+    gust = Gust("run", np.arange(4.0), wind, 0.01 * np.eye(8), 0.0)
+    height, sd = gust.height()
+    np.testing.assert_allclose(height, [4.0, 0.0])
+    np.testing.assert_allclose(sd, 0.1 / np.sqrt(2))

@@ -1,0 +1,79 @@
+"""The model of force and moment: what spoils a channel, and what counts as its noise."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from rotorid.mismatch.analyse import disowned_axes
+from rotorid.mismatch.regression import Fit, build
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.wrench import inflated_channels, spoils_a_channel
+
+
+def fit_of(*beta: float) -> Fit:
+    """A fit of the first columns with given coefficients."""
+    size = len(beta)
+    return Fit(np.arange(size), np.array(beta), np.eye(size), np.zeros(1), 0.0)
+
+
+def two_channels(force: float, moment: float, size: int = 1600) -> Rows:
+    """A column in force_x and moment_x, and responses that hold it with these coefficients; noise of one sigma."""
+    rng = np.random.default_rng(0)
+    y, x = np.full((size, 12), np.nan), np.zeros((size, 12, 1))
+    for channel, coefficient in ((0, force), (3, moment)):
+        x[:, channel, 0] = 2 * rng.normal(size=size)
+        y[:, channel] = coefficient * x[:, channel, 0] + rng.normal(size=size)
+    return Rows("b", np.arange(size) / 40.0, y, x)
+
+
+def spoiled(rows: Rows, held: bool = True) -> bool:
+    mask = [np.full(len(rows.y), held)]
+    noise = np.where(np.isfinite(rows.y[0]), 1.0, np.nan)
+    return spoils_a_channel([rows], mask, np.array([0]), fit_of(1.0), fit_of(), noise, 40)
+
+
+def test_a_term_that_helps_everywhere_spoils_nothing():
+    assert not spoiled(two_channels(1.0, 1.0))
+
+
+def test_a_term_that_is_in_the_moment_alone_spoils_the_force():
+    """Taking off x where nothing of it is leaves 1 + 4 of a variance of 1."""
+    assert spoiled(two_channels(0.0, 1.0))
+
+
+def test_rows_that_were_fitted_say_nothing_about_harm():
+    assert not spoiled(two_channels(0.0, 1.0), held=False)
+
+
+def test_a_residual_far_above_its_noise_is_itself_the_noise():
+    rng = np.random.default_rng(1)
+    noise = np.full(12, np.nan)
+    noise[[0, 3]] = 0.1, 0.001
+    remains = np.full((500, 12), np.nan)
+    remains[:, 0], remains[:, 3] = 0.1 * rng.normal(size=500), 0.08 * rng.normal(size=500)
+    assert list(np.flatnonzero(inflated_channels([remains], noise))) == [3]
+
+
+def moments(gain: float) -> SimpleNamespace:
+    """A model of two values in which the measured roll moment is `gain` times what the rotors should make."""
+    rng = np.random.default_rng(2)
+    size = 2000
+    y, x = np.full((size, 12), np.nan), np.zeros((size, 12, 2))
+    x[:, 3, 0], x[:, 5, 1] = rng.normal(size=size), rng.normal(size=size)
+    y[:, 3] = (gain - 1) * x[:, 3, 0] + 0.1 * rng.normal(size=size)
+    y[:, 5] = 0.1 * rng.normal(size=size)
+    terms = [Term("arm", "value", prior_sd=(0.03,)), Term("torque", "value", prior_sd=(0.2,))]
+    rows = Rows("a", np.arange(size) / 40.0, y, x)
+    made = build([rows], terms, {c: np.array([10.0]) for c in (3, 5)}, lambda run, t: True, 1.0, 40.0)
+    search = Search(made, lambda key, b: np.ones(12))
+    return SimpleNamespace(regression=made, search=search, selection=Selection([], made.fit(["arm", "torque"])))
+
+
+def test_moments_beyond_any_arm_are_not_believed_and_a_wrong_arm_is():
+    """An arm of 3 % trust may be off by 15 %: 0.9 of the moment is a wrong arm, a fifth of it is none."""
+    assert disowned_axes(moments(1.0)) == ""
+    assert disowned_axes(moments(0.9)) == ""
+    assert disowned_axes(moments(0.2)) == "xy"
