@@ -375,6 +375,17 @@ def rotation(roll, pitch):
 TILTS = ((0.0, 0.0), (0.2618, 0.0), (0.0, -0.2618), (-0.5236, 0.0), (0.0, 0.5236), (0.0, 0.2618))
 
 # unit amounts: (parameters at amount 1, those that the size scales)
+UNIT_OF = {
+    "up": "s",
+    "down": "s",
+    "T": "s",
+    "t_c": "s",
+    "tau": "s",
+    "f_c": "Hz",
+    "f_n": "Hz",
+    "J_r": "kg m2",
+}
+"""Units of parameters that have one and mean the same for every channel; of the others 1, or not to be compared."""
 UNITS = {
     "zero_drift": ({"b": 0.02}, ("b",)),
     "tare_offset": ({"b": 0.02}, ("b",)),
@@ -517,7 +528,8 @@ def make(plan, seed):
                 "id": cause.id,
                 "form": cause.form,
                 "parameters": [
-                    {"symbol": s, "value": v, "unit": ""} for s, v in parameters(cause, factors[k], plan).items()
+                    {"symbol": s, "value": v, "unit": UNIT_OF.get(s, "")}
+                    for s, v in parameters(cause, factors[k], plan).items()
                 ],
                 "size_over_noise": ratio,
                 "main_channel": AXES[main].rsplit("_n", 1)[0].removesuffix("_m").removesuffix("_n"),

@@ -1,14 +1,14 @@
 """A load on one axis that another channel reads."""
 
 from rotorid.effects.contract import Effect, Form, Parameter
-from rotorid.effects.loading import AXES, UNITS, cross_channels
+from rotorid.effects.loading import AXES, UNITS, bracketed, cross_channels
 
 
 def _form(name, pairs):
     parameters = tuple(
         Parameter(
             f"C_{AXES[t]},{AXES[s]}",
-            "1" if UNITS[t] == UNITS[s] else f"{UNITS[t]}/({UNITS[s]})",
+            "1" if UNITS[t] == UNITS[s] else f"{UNITS[t]}/{bracketed(UNITS[s])}",
             meaning="reading on i per load on j",
         )
         for t, s in pairs

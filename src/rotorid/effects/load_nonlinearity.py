@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Effect, Form, Parameter
-from rotorid.effects.loading import AXES, UNITS, cross_channels
+from rotorid.effects.loading import AXES, UNITS, bracketed, cross_channels
 
 CURVE = "curvature of the characteristic"
 
@@ -12,9 +12,9 @@ def reading_forms(instrument):
     loaded = tuple(c for c in instrument.channels if c in instrument.loaded)
     forms = []
     shapes = (
-        ("square", "y = F + a_2 F²", "a_2", "1/({})", lambda x: x.load**2),
-        ("odd square", "y = F + a_2 F|F|", "a_2", "1/({})", lambda x: x.load * np.abs(x.load)),
-        ("cube", "y = F + a_3 F³", "a_3", "1/({})2", lambda x: x.load**3),
+        ("square", "y = F + a_2 F²", "a_2", "1/{}", lambda x: x.load**2),
+        ("odd square", "y = F + a_2 F|F|", "a_2", "1/{}", lambda x: x.load * np.abs(x.load)),
+        ("cube", "y = F + a_3 F³", "a_3", "1/{}2", lambda x: x.load**3),
     )
     groups = [(loaded, "")] + [((c,), f" of {AXES[c]}") for c in loaded if len(loaded) > 1 and c < 3]
     for group, suffix in groups:
@@ -22,10 +22,12 @@ def reading_forms(instrument):
             continue
         pairs = tuple((c, c) for c in group)
         for name, text, symbol, unit, signal in shapes:
-            own = tuple(Parameter(f"{symbol}_{AXES[c]}", unit.format(UNITS[c]), meaning=CURVE) for c in group)
+            own = tuple(
+                Parameter(f"{symbol}_{AXES[c]}", unit.format(bracketed(UNITS[c])), meaning=CURVE) for c in group
+            )
             forms.append(Form(name + suffix, text, own, cross_channels(pairs, signal)))
-        both = tuple(Parameter(f"a_2_{AXES[c]}", f"1/({UNITS[c]})", meaning=CURVE) for c in group) + tuple(
-            Parameter(f"a_3_{AXES[c]}", f"1/({UNITS[c]})2", meaning=CURVE) for c in group
+        both = tuple(Parameter(f"a_2_{AXES[c]}", f"1/{bracketed(UNITS[c])}", meaning=CURVE) for c in group) + tuple(
+            Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group
         )
         forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
     return tuple(forms)

@@ -142,6 +142,11 @@ def weight(motion: Motion, vehicle: Vehicle, arm_m: np.ndarray | None = None) ->
     return at_sensor(force, np.cross(arm, force), motion, vehicle)
 
 
+def bracketed(unit: str) -> str:
+    """A unit as it stands below a stroke: a product in brackets."""
+    return f"({unit})" if " " in unit else unit
+
+
 def one_per_channel(name: str, unit: str, channels: tuple[int, ...], **limits) -> tuple[Parameter, ...]:
     """A parameter for each channel, `name_Fx` …; `unit` takes the channel's unit in place of `{}`."""
     return tuple(Parameter(f"{name}_{AXES[c]}", unit.format(UNITS[c]), **limits) for c in channels)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import on_channels, one_per_channel
+from rotorid.effects.loading import AXES, on_channels, one_per_channel
 
 
 def warming(instrument):
@@ -45,7 +45,7 @@ def reading_forms(instrument):
         ),
         *(
             on_channels(
-                f"linear in time, {c}",
+                f"linear in time, {AXES[c]}",
                 linear,
                 "b",
                 "{}/min",

@@ -429,6 +429,8 @@ def _wrong(name: str, values: tuple[float, float, float, float]) -> str:
     believed, refitted, low, high = values
     words, unit = parameter_words(name)
     space = f" {unit}" if unit else ""
+    if not np.isfinite(believed):
+        return f"The {words} is {plus_minus(refitted, low, high)}{space}; nothing was believed about it."
     return f"The {words} is {plus_minus(refitted, low, high)}{space}, not the {number(believed, 4)}{space} believed."
 
 

@@ -29,8 +29,6 @@ def without_noise(segments: list[Segment]) -> list[Segment]:
     slow, quick, loads = [], [], []
     for s in segments:
         size = min(s.motion.size - 1, int(SLOW_S * s.rate_hz)) | 1
-        if size > s.motion.size:  # an even number of samples holds no odd mean of them all
-            size -= 2
         slow.append(running_mean(s.motion.voltage, size))
         quick.append(s.motion.voltage - slow[-1])
         columns = relaxed((s.command**3).sum(axis=1), s.dt_s)

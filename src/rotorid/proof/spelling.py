@@ -12,6 +12,8 @@ AIR_DENSITY_KG_M3 = 1.225
 """Of the air that the concealed recordings were flown in."""
 RENAMED = {
     ("flapping_moment", "k_f"): "k_flap",
+    ("motor_lag", "up"): "tau_up",
+    ("motor_lag", "down"): "tau_down",
     ("payload", "mass"): "m_p",
     ("payload", "length"): "L",
     ("accelerometer_error", "S_xx"): "s_x",

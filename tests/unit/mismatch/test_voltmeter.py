@@ -54,6 +54,13 @@ def test_a_voltage_that_time_and_load_make_is_left_as_it_is():
     assert np.abs(found.motion.voltage - true).max() < 1e-6
 
 
+@pytest.mark.parametrize("size", [176, 177])
+def test_a_stretch_shorter_than_the_slow_mean_keeps_its_length(size):
+    command, true = loaded(np.random.default_rng(6))
+    short = flown(true, command).part(0, size)
+    assert without_noise([short])[0].motion.voltage.shape == (size,)
+
+
 def test_without_commands_the_reading_stays():
     command, true = loaded(np.random.default_rng(5))
     bare = replace(flown(true, command), command=None)

@@ -74,6 +74,9 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
         if setup.steady_points and effect.id in TAKES_TIME:
             reasons[effect.id] = "the recordings are steady points: nothing that takes time shows in them"
             continue
+        if effect.id == "unequal_rotors" and not any(c >= 3 for c in setup.instrument.channels):
+            reasons[effect.id] = "only forces are read: what each rotor gives shows in the moments"
+            continue
         found, why = [], None
         for form in forms_of(effect, setup.instrument):
             if not effect.reading_forms:

@@ -1,0 +1,67 @@
+"""Believed values that only look wrong because an effect at work has a form that is too narrow.
+
+On a stand that was not zeroed with the vehicle on, the weight acts on the force along z and, at its lever arm, on the
+moments. A centre of mass that is also higher than believed then looks like another mass, whose force a tare offset
+takes away again: two wrong things in place of one. A value is called wrong only if it stays so with the effects at
+work in their richer forms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from rotorid.mismatch.instrument.model import ReadingModel
+from rotorid.mismatch.select import Selection
+
+MOST_MORE = 3
+"""Parameters that a richer form may have more."""
+MAY_LOSE = 20.0
+"""Whitened squares, less what parameters cost, that a model with one wrong value less may explain less."""
+
+Values = Mapping[str, tuple[float, float]]
+
+
+def without_needless(
+    model: ReadingModel, values_of: Callable[[Selection], Values]
+) -> tuple[ReadingModel, dict[str, tuple[float, float]]]:
+    """The model with richer forms where they make a wrong value needless, and the values that stay wrong.
+
+    Parameters
+    ----------
+    model
+        As the search left it.
+    values_of
+        The wrong values beside a selection: relative change and one-sigma.
+    """
+    values = dict(values_of(model.selection))
+    while values:
+        richer = [(s, v) for s in richer_forms(model) if len(v := values_of(s)) < len(values)]
+        if not richer:
+            break
+        selection, found = max(richer, key=lambda pair: model.search.worth(pair[0].active))
+        model, values = replace(model, selection=selection), dict(found)
+    return model, values
+
+
+def richer_forms(model: ReadingModel) -> list[Selection]:
+    """Selections in which one effect has another form with more parameters and explains about as much or more."""
+    search, active = model.search, model.selection.active
+    least, out = search.worth(active) - MAY_LOSE, []
+    for place, key in enumerate(active):
+        own = search.terms[key]
+        for term in search.terms.values():
+            if term.kind != "effect" or term.effect != own.effect:
+                continue
+            trial = [*active[:place], term.key, *active[place + 1 :]]
+            if own.size < term.size <= own.size + MOST_MORE and search.worth(trial) >= least:
+                out.append(selection_of(model, trial))
+    return out
+
+
+def selection_of(model: ReadingModel, active: list[str]) -> Selection:
+    """A selection of other terms, fitted and tested as the search does in the end."""
+    search = model.search
+    fit = search.regression.fit(search.always + active, jackknife=True)
+    p_values = {k: search.judge(k, active, search.without(k, active), jackknife=True).p_value for k in active}
+    return replace(model.selection, active=active, fit=fit, p_values=p_values)
