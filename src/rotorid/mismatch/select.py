@@ -276,7 +276,6 @@ class Search:
             active = [k for k in active if k != key]
             refuted[self.terms[key].effect] = reason
             trail.append(f"- {key}: {reason}")
-        active = self._heard_again(active, refuted, trail)
         fit, final = self._jackknifed(active, dropped, trail)
         kept = {self.terms[k].effect for k in active}
         return Selection(active, fit, final, trail, {e: r for e, r in dropped.items() if e not in kept})
@@ -337,22 +336,6 @@ class Search:
         if (unsteady := self.unsteady(active)) is not None:
             return unsteady, "it differs from run to run"
         return None
-
-    def _heard_again(self, active: list[str], refuted: dict[str, str], trail: list[str]) -> list[str]:
-        """The model with what was refuted only in the company of others that did not last themselves."""
-        for effect in list(refuted):
-            if len(active) >= MOST_EFFECTS or effect in {self.terms[k].effect for k in active}:
-                continue
-            base = self.regression.fit(self.always + active)
-            forms = [self.judge(t.key, active, base) for t in self.terms.values() if t.effect == effect and not t.run]
-            best = max((c for c in forms if c.physical), key=lambda c: c.score, default=None)
-            if best is None or not self._holds(best.key, [*active, best.key]):
-                continue
-            trial = [*active, best.key]
-            if self._refuted(trial) is None and self.weak(trial) is None:
-                active = trial
-                trail.append(f"+ {best.key}, heard again")
-        return active
 
     def _jackknifed(self, active: list[str], dropped: dict[str, str], trail: list[str]):
         """The final fit and p-values, after terms that hang on single blocks are taken out of `active`."""
