@@ -24,7 +24,7 @@ from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.rows import CHANNELS, MOMENT_GAIN, PARAMETER_NAMES, RUN_SCALE, Term, residual
+from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term, residual
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
 from rotorid.mismatch.speedpath import SpeedFit, SpeedResult, commanded_path, nothing_between
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -48,10 +48,6 @@ RUN_SPREAD = 0.007
 """Relative spread of the thrust coefficient between runs below which one number serves all."""
 RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
-GAIN_TRUST = 1.0
-"""Relative one-sigma of a gain of the moments that nothing else bounds."""
-PINNED = 0.98
-"""Share of its limit at which a believed value counts as held there."""
 UNITS = {"force": "N", "moment": "N m"}
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 
@@ -133,7 +129,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         plain_values = wrong_values(model.regression, model.search, nothing, None, size)
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
-    notes += run_scale_notes(model) + moment_gain_notes(model)
+    notes += run_scale_notes(model)
     if found is not None and found[0].lag_alone is not None:
         notes.append(lag_alone_note(found[0].lag_alone))
     traces = make_traces(prepared, model, found, measured, plain_values, values)
@@ -176,9 +172,6 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     if thrust_differs(model):
         terms = with_run_scales(terms, prepared)
         model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
-    if axes := disowned_axes(model):
-        terms = [*terms, *(Term(f"{MOMENT_GAIN}{a}", "nuisance", prior_sd=(GAIN_TRUST,)) for a in axes)]
-        model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
     for _ in range(2 if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
@@ -207,38 +200,6 @@ def thrust_differs(model: WrenchModel) -> bool:
     spread, p = regression.between_runs(fit, "thrust")
     runs = len(np.unique(regression.run[regression.training]))
     return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
-
-
-def disowned_axes(model: WrenchModel) -> str:
-    """Axes about which the rotors' moment is off by more than any wrong value: out of `xyz`.
-
-    A value that only moments know (arm, torque coefficient) stands at its limit there. Rotor speeds and body rates
-    then do not belong to each other (late, smoothed, faulty), and what they say in common about thrust, mass and
-    arm would spoil the forces: those moments get a gain of their own.
-    """
-    regression = model.regression
-    fit = regression.fit(model.search.always + model.selection.active)
-    axes = ""
-    for key, about in (("arm", "xy"), ("torque", "z")):
-        if key in model.search.terms:
-            column = regression.start[key]
-            if abs(fit.beta[fit.columns == column][0]) > PINNED * regression.limit[column]:
-                axes += about
-    return axes
-
-
-def moment_gain_notes(model: WrenchModel) -> list[str]:
-    """What was done about moments that do not follow from the rotor speeds."""
-    terms = [t for t in model.regression.terms if t.key.startswith(MOMENT_GAIN)]
-    if not terms:
-        return []
-    fit = model.regression.fit(model.search.always + model.selection.active)
-    found = [fit.beta[fit.columns == model.regression.start[t.key]][0] for t in terms]
-    parts = ", ".join(f"{t.key[-1]} {100 * (1 + b):.0f} %" for t, b in zip(terms, found, strict=True))
-    return [
-        "The moments do not follow from the rotor speeds within any plausible arm or torque coefficient, so they say "
-        f"nothing about thrust and mass here; what is left of the predicted ones: {parts}."
-    ]
 
 
 def lag_alone_note(fit: SpeedFit) -> str:

@@ -221,14 +221,9 @@ def value_columns(
 
 
 def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict[str, np.ndarray]:
-    """Column of a nuisance as channel contributions: a time offset of one second between two sensors, a relative
-    change of the thrust in one run, or a gain of the rotors' moment about one axis."""
+    """Column of a nuisance as channel contributions: a time offset of one second between two sensors, or a
+    relative change of the thrust in one run."""
     motion = segment.motion
-    if key.startswith(MOMENT_GAIN):
-        if "moment" not in groups:
-            return {}
-        _, arm, torque = baseline_wrench(motion, vehicle)
-        return {"moment": (arm + torque) * (np.arange(3) == "xyz".index(key[-1]))}
     if key.startswith(RUN_SCALE):
         return value_columns("thrust", segment, vehicle, groups, {})
     if key == "offset:rotors-accelerometer" and "force" in groups:
@@ -245,7 +240,6 @@ def offset_columns(key: str, segment: Segment, vehicle: Vehicle, groups) -> dict
 
 
 RUN_SCALE = "thrust of "
-MOMENT_GAIN = "gain of the moment about "
 OFFSETS = (
     "offset:rotors-accelerometer",
     "offset:rotors-gyroscope",

@@ -279,7 +279,6 @@ class Search:
             active = [k for k in active if k != key]
             refuted[self.terms[key].once] = reason
             trail.append(f"- {key}: {reason}")
-        active = self._heard_again(active, refuted, trail)
         fit, final = self._jackknifed(active, dropped, trail)
         kept = {self.terms[k].effect for k in active}
         # What acts in one window of one run was dropped under its key.
@@ -342,40 +341,6 @@ class Search:
         if (unsteady := self.unsteady(active)) is not None:
             return unsteady, "it differs from run to run"
         return None
-
-    def _heard_again(self, active: list[str], refuted: dict[str, str], trail: list[str]) -> list[str]:
-        """The model with what was refuted only in the company of others that did not last themselves.
-
-        An empirical term goes where a cause with a name, in its place, explains the held-out part better.
-        """
-        named = [k for k in active if self.terms[k].effect not in UNKNOWNS]
-        for effect in list(refuted):
-            for base in [active] if active == named else [active, named]:
-                trial = self._with(effect, base)
-                if trial is None or self._refuted(trial) is not None or self.weak(trial) is not None:
-                    continue
-                if base is active or self._left_held_out(trial) < self._left_held_out(active):
-                    trail.append(f"  {' and '.join(active)} → {' and '.join(trial)}, heard again")
-                    active = trial
-                    named = [k for k in active if self.terms[k].effect not in UNKNOWNS]
-                    break
-        return active
-
-    def _with(self, effect: str, active: list[str]) -> list[str] | None:
-        """The model and the best form of one more id; None where that does not hold."""
-        if len(active) >= MOST_EFFECTS or effect in {self.terms[k].effect for k in active}:
-            return None
-        base = self.regression.fit(self.always + active)
-        forms = [self.judge(t.key, active, base) for t in self.terms.values() if t.effect == effect and not t.run]
-        best = max((c for c in forms if c.physical), key=lambda c: c.score, default=None)
-        if best is None or not self._holds(best.key, [*active, best.key]):
-            return None
-        return [*active, best.key]
-
-    def _left_held_out(self, active: list[str]) -> float:
-        """Whitened squares that a model leaves on the held-out blocks."""
-        mask = self.regression.held_out
-        return float(self.regression.fit(self.always + active).residual_square[mask].sum())
 
     def _jackknifed(self, active: list[str], dropped: dict[str, str], trail: list[str]):
         """The final fit and p-values, after terms that hang on single blocks are taken out of `active`."""

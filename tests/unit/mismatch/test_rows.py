@@ -11,7 +11,6 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Contribution, Motion
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.rows import (
-    MOMENT_GAIN,
     Thinner,
     assemble,
     at_centre,
@@ -55,15 +54,6 @@ def test_the_baseline_of_unequal_rotors_by_hand():
     np.testing.assert_allclose(force, [[0, 0, -4 * CF * 1e6 - extra]], rtol=1e-12)
     np.testing.assert_allclose(arm, [[-extra * ARM, extra * ARM, 0]], rtol=1e-9)
     np.testing.assert_allclose(torque, [[0, 0, CQ * (1100.0**2 - 1000.0**2)]], rtol=1e-9)
-
-
-def test_a_gain_of_the_moment_is_the_predicted_moment_about_its_axis():
-    """The faster front right rotor again: roll −extra d, and nothing in pitch, yaw or force."""
-    motion = still(rotor_speed=np.array([[1100.0, 1000.0, 1000.0, 1000.0]]))
-    column = offset_columns(f"{MOMENT_GAIN}x", one(motion), thesis_vehicle(), ("force", "moment"))
-    assert list(column) == ["moment"]
-    np.testing.assert_allclose(column["moment"], [[-CF * (1100.0**2 - 1000.0**2) * ARM, 0, 0]], rtol=1e-9)
-    assert offset_columns(f"{MOMENT_GAIN}x", one(motion), thesis_vehicle(), ("force",)) == {}
 
 
 def test_the_hub_of_a_turning_vehicle_moves_by_v_plus_omega_cross_r():

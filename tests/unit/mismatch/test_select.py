@@ -149,14 +149,3 @@ def test_what_spoils_a_channel_of_the_held_out_runs_is_refuted():
     assert search.failed_held_out(["e/form"]) is None
     search.harms = lambda key, with_it, without: True
     assert search.failed_held_out(["e/form"]) == "e/form"
-
-
-def test_what_was_refuted_in_bad_company_is_heard_again_and_what_is_not_there_stays_out():
-    rng = np.random.default_rng(7)
-    noise, x = case(rng, 2)
-    y = [n + 0.8 * columns[0] for n, columns in zip(noise, x, strict=True)]
-    search = search_of([term("there"), term("absent")], y, x)
-    refuted = {"there": "it did not help on the held-out runs", "absent": "it differs from run to run"}
-    assert search._heard_again([], refuted, []) == ["there/form"]
-    search.harms = lambda key, with_it, without: True
-    assert search._heard_again([], refuted, []) == []

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
-from rotorid.mismatch.analyse import disowned_axes
-from rotorid.mismatch.regression import Fit, build
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.regression import Fit
+from rotorid.mismatch.rows import Rows
 from rotorid.mismatch.wrench import inflated_channels, spoils_a_channel
 
 
@@ -55,25 +51,3 @@ def test_a_residual_far_above_its_noise_is_itself_the_noise():
     remains = np.full((500, 12), np.nan)
     remains[:, 0], remains[:, 3] = 0.1 * rng.normal(size=500), 0.08 * rng.normal(size=500)
     assert list(np.flatnonzero(inflated_channels([remains], noise))) == [3]
-
-
-def moments(gain: float) -> SimpleNamespace:
-    """A model of two values in which the measured roll moment is `gain` times what the rotors should make."""
-    rng = np.random.default_rng(2)
-    size = 2000
-    y, x = np.full((size, 12), np.nan), np.zeros((size, 12, 2))
-    x[:, 3, 0], x[:, 5, 1] = rng.normal(size=size), rng.normal(size=size)
-    y[:, 3] = (gain - 1) * x[:, 3, 0] + 0.1 * rng.normal(size=size)
-    y[:, 5] = 0.1 * rng.normal(size=size)
-    terms = [Term("arm", "value", prior_sd=(0.03,)), Term("torque", "value", prior_sd=(0.2,))]
-    rows = Rows("a", np.arange(size) / 40.0, y, x)
-    made = build([rows], terms, {c: np.array([10.0]) for c in (3, 5)}, lambda run, t: True, 1.0, 40.0)
-    search = Search(made, lambda key, b: np.ones(12))
-    return SimpleNamespace(regression=made, search=search, selection=Selection([], made.fit(["arm", "torque"])))
-
-
-def test_moments_beyond_any_arm_are_not_believed_and_a_wrong_arm_is():
-    """An arm of 3 % trust may be off by 15 %: 0.9 of the moment is a wrong arm, a fifth of it is none."""
-    assert disowned_axes(moments(1.0)) == ""
-    assert disowned_axes(moments(0.9)) == ""
-    assert disowned_axes(moments(0.2)) == "xy"
