@@ -56,6 +56,7 @@ def main(
         "matrix_largest_n": matrix_largest_n,
         "matrix": matrix.as_dict(fitted),
         "equations_matrix": distances.matrix.tolist(),
+        "lateral_as_vertical": static.lateral_as_vertical(fitted, lines, distances),
         "methods": static.methods_compared(table),
     }
     Path(comparison).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

@@ -14,7 +14,7 @@ from scipy.stats import t as student_t
 
 from rotorid.bench.loadcell import LineFit, fit_line
 from rotorid.bench.matrix import Calibration, calibrate
-from rotorid.bench.reconstruct import GF_N, Geometry, cell_forces, cell_variance, force_covariance, forces
+from rotorid.bench.reconstruct import GF_N, PULLED, Geometry, cell_forces, cell_variance, force_covariance, forces
 from rotorid.errors import InputError
 from rotorid.io.tables import by_recording
 
@@ -73,6 +73,22 @@ def by_matrix(means: Means, calibration: Calibration) -> tuple[np.ndarray, np.nd
     force = calibration.force(means.values)
     noise_v = np.sqrt(means.variance.mean(axis=0))
     return force, np.sqrt(np.diagonal(calibration.force_covariance(force, noise_v), axis1=1, axis2=2))
+
+
+def lateral_as_vertical(calibration: Calibration, lines: list[LineFit], geometry: Geometry) -> dict[str, dict]:
+    """What eq. 2.8 makes of one newton along x or y alone, N: `force_z_n`, and of it the absolute values' part.
+
+    The cells answer as the matrix has measured it, so it is the equation that turns a lateral load into a vertical one.
+    `absolute_n` is −(|F1| + |F3| + |F5|); it does not change sign with the load.
+    """
+    slopes = np.array([line.a1 for line in lines]) * 1e5 * GF_N
+    cells = (slopes[:, None] * calibration.response_v_n[:, :2]).T
+    along_z = forces(cells, geometry)[:, 2]
+    absolute = -np.abs(cells[:, PULLED]).sum(axis=1)
+    return {
+        axis: {"force_z_n": float(f), "absolute_n": float(a)}
+        for axis, f, a in zip("xy", along_z, absolute, strict=True)
+    }
 
 
 def matrix_of(means: Means, largest_n: float, repeats: set[int] | None = None) -> Calibration:

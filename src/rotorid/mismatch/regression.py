@@ -241,15 +241,18 @@ class Regression:
             scores = cross - own @ beta
             robust = inverse @ (scores.T @ scores) @ inverse
             estimates.append(beta)
-            variances.append(np.maximum(np.diag(robust), np.diag(inverse)))
+            # A coefficient that a run does not excite says nothing there: a height of mass on a level mount.
+            every = np.diagonal(self.gram[self.training][:, cols][:, :, cols], axis1=1, axis2=2).sum(axis=0)
+            silent = np.diag(total) < 1e-3 * every
+            variances.append(np.where(silent, np.inf, np.maximum(np.diag(robust), np.diag(inverse))))
         if len(estimates) < 2:
             return np.zeros(len(cols)), 1.0
         b, v = np.array(estimates), np.maximum(np.array(variances), 1e-300)
         w = 1.0 / v
-        mean = (w * b).sum(axis=0) / w.sum(axis=0)
+        mean = (w * b).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-300)
         q = (w * (b - mean) ** 2).sum(axis=0)
-        degrees = len(b) - 1
-        scale = w.sum(axis=0) - (w**2).sum(axis=0) / w.sum(axis=0)
+        degrees = np.maximum((w > 0).sum(axis=0) - 1, 1)
+        scale = w.sum(axis=0) - (w**2).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-300)
         spread = np.maximum(0.0, (q - degrees) / np.maximum(scale, 1e-300))
         p = float(min(1.0, len(cols) * chi2.sf(q, degrees).min()))
         return spread / len(b), p

@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from rotorid.mismatch.findings import Analysis, Finding, Trace
+from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.words import (
     capital,
@@ -404,9 +404,20 @@ def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
 def _parameters(finding: Finding) -> str:
     shown = [
         f"{e.symbol} = {plus_minus(e.value, e.low, e.high)}{' ' + e.unit if e.unit not in ('', '-', '1') else ''}"
-        for e in finding.parameters[:3]
+        for e in surest(finding.parameters)
     ]
     return listed(shown)
+
+
+def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
+    """The parameters that are furthest from zero beside their intervals, in their order."""
+
+    def beyond(e: Estimate) -> float:
+        width = e.high - e.low
+        return abs(e.value) / max(width, 1e-12 * abs(e.value), 1e-300) if np.isfinite(width) else 0.0
+
+    kept = sorted(range(len(parameters)), key=lambda k: -beyond(parameters[k]))[:most]
+    return [parameters[k] for k in sorted(kept)]
 
 
 def _left_out(finding: Finding, first: bool) -> str:
@@ -422,7 +433,9 @@ def _either(finding: Finding, analysis: Analysis) -> str:
     names = [effect_words(i) for i in dict.fromkeys((finding.id, *finding.alternatives))]
     text = f"{capital('either ' if len(names) > 1 else '')}{listed(names, 'or')} was left out"
     text += "; this recording cannot tell which" if len(names) > 1 else "; this recording cannot settle it"
-    return f"{text}, but this would: {analysis.next_manoeuvre.rstrip('.')}." if analysis.next_manoeuvre else f"{text}."
+    # The next experiment is made for one class; it need not help with another.
+    helps = analysis.next_manoeuvre and (not analysis.next_separates or finding.id in analysis.next_separates)
+    return f"{text}, but this would: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
 
 
 def _wrong(name: str, values: tuple[float, float, float, float]) -> str:

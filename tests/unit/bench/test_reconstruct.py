@@ -1,6 +1,7 @@
 """Eqs 2.3 to 2.9 with tables 2.2 and 2.3, against numbers done by hand."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from rotorid.bench.reconstruct import (
     moments,
     read_geometry,
 )
+from rotorid.bench.static import lateral_as_vertical
 from rotorid.errors import InputError
 
 TABLE = Path(__file__).parents[3] / "raw" / "thesis" / "table_2_3.csv"
@@ -63,6 +65,16 @@ def test_cells_1_3_5_count_with_their_absolute_value_along_z() -> None:
     assert pushed == pytest.approx([0.1884444, -0.1087984, -1.0], rel=1e-6)
     lowered = forces(np.array([[0, 0, 0, -1.0, 0, 0]]), GEOMETRY)[0]
     assert lowered[2] == pytest.approx(1.4142136)
+
+
+def test_a_lateral_load_becomes_vertical_by_absolute_values() -> None:
+    answer = np.zeros((6, 3))  # V/N; lines of 1 N/V
+    answer[[0, 2, 4], 0] = -0.5, 0.5, 0.25  # along x cells 1, 3 and 5 are bent, with signs
+    answer[1, 1] = 1.0  # along y cell 2 alone, which pulls at 45 degrees
+    line = SimpleNamespace(a0=3.0, a1=1 / (1e5 * GF_N))
+    found = lateral_as_vertical(SimpleNamespace(response_v_n=answer), [line] * 6, GEOMETRY)
+    assert found["x"] == pytest.approx({"force_z_n": -1.25, "absolute_n": -1.25})
+    assert found["y"] == pytest.approx({"force_z_n": -np.sqrt(2), "absolute_n": 0.0})
 
 
 def test_the_matrix_of_eq_2_9_is_the_same_as_the_equations() -> None:

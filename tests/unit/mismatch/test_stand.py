@@ -5,11 +5,12 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.loading import bracketed
+from rotorid.mismatch.findings import Estimate
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.chain import find_chain
 from rotorid.mismatch.instrument.columns import make_terms
 from rotorid.mismatch.instrument.setup import set_up
-from rotorid.mismatch.verdict import _wrong
+from rotorid.mismatch.verdict import _wrong, surest
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 HUBS = ((0.09, 0.09, "ccw"), (0.09, -0.09, "cw"), (-0.09, -0.09, "ccw"), (-0.09, 0.09, "cw"))
@@ -124,6 +125,12 @@ def test_which_rotor_is_stronger_cannot_be_seen_without_moments() -> None:
 def test_a_value_of_which_nothing_was_believed_is_said_so() -> None:
     text = _wrong("rotor_speed_limits_rad_s", (float("nan"), 2000.0, 1990.0, 2010.0))
     assert text.endswith("nothing was believed about it.") and "unknown" not in text
+
+
+def test_a_sentence_names_the_surest_numbers() -> None:
+    wide, sharp = Estimate("a", 1.0, "1", -9.0, 11.0), Estimate("b", 0.1, "1", 0.09, 0.11)
+    assert [e.symbol for e in surest((wide, sharp, wide, sharp, sharp))] == ["b", "b", "b"]
+    assert [e.symbol for e in surest((wide, sharp))] == ["a", "b"]
 
 
 def test_a_product_of_units_stands_in_brackets_below_a_stroke() -> None:

@@ -135,7 +135,8 @@ def flipped(recordings: RecordingSet, setup: Setup):
     named = list(dict.fromkeys(s.run for s in bad))
     everywhere = len(named) == len(recordings.runs)
     where = "in every run" if everywhere else f"in {', '.join(named)}"
-    text = f"{' and '.join(channels)} fall where the load rises, {where}: the sign is flipped; it was turned round"
+    verb = "falls" if len(channels) == 1 else "fall"
+    text = f"{' and '.join(channels)} {verb} where the load rises, {where}: the sign is flipped; it was turned round"
     others = ()
     if channels == ["moment_z"] and recordings.vehicle.kind == "stand" and everywhere:
         others = ("spin_direction",)

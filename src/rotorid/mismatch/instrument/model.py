@@ -37,6 +37,9 @@ LEAST_BLOCKS_OF_A_RUN = 5
 EXCITED_SHARE = 0.1
 MAIN_SHARE = 0.2
 ROUNDS = 3
+REFUTED = 12.0
+"""Whitened squares by which another effect may do worse on the runs held out before it is no alternative."""
+LEAST_HELD_OUT = 4
 MOST_AT_ONCE = 6
 """More causes than this at once are not told apart by six channels: what they leave is stated as unexplained."""
 MOST_OF_A_FORM = 6
@@ -182,6 +185,33 @@ class ReadingSearch(Search):
                 if wide and main and chi2_p(q, len(b) - 1) < UNSTEADY_P:
                     return key
         return None
+
+    def alternatives(self, key, active):
+        """Of what could stand in for a term by the runs fitted, what the runs held out do not refute.
+
+        A stand's runs differ in their tilt: those held out may be the ones that tell a weight's moment from a tare.
+        """
+        rest = [k for k in active if k != key]
+        own = self.held_out_gain([*rest, key])
+        found = super().alternatives(key, active)
+        if own is None:
+            return found
+        return [
+            effect
+            for effect in found
+            if max(self.held_out_gain([*rest, t.key]) for t in self.terms.values() if t.effect == effect)
+            > own - REFUTED
+        ]
+
+    def held_out_gain(self, active):
+        """What a model fitted on the training blocks explains on those held out, whitened squares; None without any."""
+        reg = self.regression
+        index = np.flatnonzero(reg.held_out)
+        if len(index) < LEAST_HELD_OUT:
+            return None
+        fit = reg.fit(self.always + active)
+        gram = reg.gram[np.ix_(index, fit.columns, fit.columns)].sum(axis=0)
+        return float(2 * reg.cross[np.ix_(index, fit.columns)].sum(axis=0) @ fit.beta - fit.beta @ gram @ fit.beta)
 
     def run(self, active=None) -> Selection:
         """Both rounds; the second starts from what the first found."""
