@@ -43,11 +43,13 @@ def forms(vehicle):
     needs = ("rotor_speed",)
     size = scale(vehicle)
     thrust, speed = size.thrust_n, size.hover_speed_rad_s
-    c0 = Parameter("c_0", "N", -thrust, thrust, meaning="thrust beyond the square at any speed")
+    # A rotor at rest does not carry half the vehicle.
+    c0 = Parameter("c_0", "N", -0.5 * thrust, 0.5 * thrust, meaning="thrust beyond the square at any speed")
     c1 = Parameter("c_1", "N s/rad", -thrust / speed, thrust / speed, meaning="thrust beyond the square per speed")
     c3 = Parameter("c_3", "N s3/rad3", -thrust / speed**3, thrust / speed**3, meaning="cubic thrust")
     # A curve far from a square takes its squared term far from the coefficient believed, beyond any trust in it.
-    c2 = Parameter(SQUARE, "N s2/rad2", -thrust / speed**2, thrust / speed**2, meaning="squared term beyond C_F")
+    # It stays positive: thrust rises with speed.
+    c2 = Parameter(SQUARE, "N s2/rad2", -0.8 * thrust / speed**2, thrust / speed**2, meaning="squared term beyond C_F")
     always = ("always",)
     return (
         Form("linear term", "T_i = C_F ω_i² + c_1 ω_i", (c1,), linear_term, needs),

@@ -42,6 +42,8 @@ RESTLESS_SHARE = 0.5
 """A wind that never rests must take away more than this share of the energy left in the horizontal force."""
 LASTING_S = 12.0
 """A wind that changes for longer has no one height: its root mean square is told."""
+MOST_EXTRAPOLATION = 1.05
+"""Speed in a window, beside the fastest that is fitted, up to which the drag is known."""
 GUST_P = 1e-6
 STEPS, ROUNDS = 4, 2
 """Gauss-Newton steps for the wind alone, and searches repeated in it."""
@@ -129,6 +131,7 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
         (s.run, windows(left[:, :3], rotation_at(s, rows), rows.time_s))
         for s, rows, left in zip(segments, model.rows, after_residual(model), strict=True)
     ]
+    found = [(run, [w for w in own if not beyond_fitted(model, run, *w[:2])]) for run, own in found]
     asked = [wind_term(run, knots_of(a, b, KNOT_S)) for run, own in found for a, b, _ in own]
     if feels_wind(model):
         known = asked or restless(model)
@@ -146,6 +149,23 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
         # A strong gust hides the drag through which it is felt; with the gust known as a force it shows.
         return in_moving_air(prepared, again, terms, asked) or again
     return again
+
+
+def beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -> bool:
+    """Whether a window of a run that is not fitted flies faster than all that is: drag extrapolated is no gust."""
+    fitted, inside = [0.0], [0.0]
+    rule = training_rule(model.prepared.split, model.segments)
+    for s in model.segments:
+        if s.motion.velocity is None:
+            continue
+        time_s, speed = s.motion.time_s, np.linalg.norm(s.motion.velocity, axis=1)
+        known = np.array([rule(s.run, t) is True for t in time_s[::20]]).repeat(20)[: len(time_s)]
+        if known.any():
+            fitted.append(float(np.quantile(speed[known], 0.999)))
+        window = (time_s >= start_s) & (time_s <= stop_s) & ~known
+        if s.run == run and window.any():
+            inside.append(float(speed[window].max()))
+    return max(inside) > MOST_EXTRAPOLATION * max(fitted)
 
 
 def feels_wind(model: WrenchModel) -> bool:
