@@ -48,7 +48,7 @@ def form_named(name: str) -> Form | None:
 EFFECT = Effect(
     id="gust",
     name="a gust",
-    sentence="a force in world axes comes and goes",
+    sentence="for a while the air itself moves",
     forms=lambda vehicle: (),
     form_named=form_named,
     source="a free force in world axes; catalogue F19",

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.bursts import KNOT_S, gust_terms, windows
+from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
@@ -34,8 +34,9 @@ from rotorid.mismatch.wrench import (
 )
 
 DRAGS = ("rotor_drag", "frame_drag")
-RESTLESS_KNOT_S = 1.0
-"""Distance of knots where the wind changes all the time."""
+KNOT_S, RESTLESS_KNOT_S = 0.3, 1.0
+"""Distance of knots in a window, where a gust may set in within a fraction of a second, and where the wind changes
+all the time."""
 MOST_KNOTS = 150
 """Knots of all restless runs together: beyond, the recording is too long to ask for a wind everywhere."""
 RESTLESS_SHARE = 0.5
@@ -67,13 +68,18 @@ class Gust:
         return self.run, float(self.knots_s[0]), float(self.knots_s[-1])
 
     def height(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean wind over the knots at which it blows with at least half its strength, and its one-sigma, (2,)."""
+        """Mean wind from the first to the last knot with half of its strength, and its one-sigma, (2,).
+
+        A gust flutters: how far its mean over so few knots tells its height is in the one-sigma too.
+        """
         strength = np.linalg.norm(self.wind_m_s, axis=1)
-        strong = strength >= 0.5 * strength.max()
-        share = strong / strong.sum()
+        strong = np.flatnonzero(strength >= 0.5 * strength.max())
+        inside = np.arange(strong[0], strong[-1] + 1)
+        share = np.isin(np.arange(len(strength)), inside) / len(inside)
         count = len(share)
-        sd = [np.sqrt(share @ self.covariance[a : a + count, a : a + count] @ share) for a in (0, count)]
-        return share @ self.wind_m_s, np.array(sd)
+        fitted = [share @ self.covariance[a : a + count, a : a + count] @ share for a in (0, count)]
+        flutter = self.wind_m_s[inside].var(axis=0) / len(inside)
+        return share @ self.wind_m_s, np.sqrt(np.array(fitted) + flutter)
 
     def unrest(self) -> tuple[np.ndarray, np.ndarray]:
         """Root mean square of the wind at the knots, and its one-sigma, (2,)."""

@@ -51,10 +51,11 @@ def test_the_wind_between_knots_and_outside():
     np.testing.assert_allclose(blowing(knots, wind, np.array([1.9, 2.5, 3.5, 4.1])), [[0, 0], [1, 1], [1, 1], [0, 0]])
 
 
-def test_height_is_the_mean_over_the_strong_knots():
-    """Knots of 0, 3, 5, 0 m/s to the north: the strong ones are 3 and 5, their mean 4 ± √(0.1² + 0.1²)/2."""
-    wind = np.array([[0.0, 0.0], [3.0, 0.0], [5.0, 0.0], [0.0, 0.0]])
-    gust = Gust("run", np.arange(4.0), wind, 0.01 * np.eye(8), 0.0)
+def test_height_is_the_mean_from_the_first_to_the_last_strong_knot():
+    """Knots of 0, 3, 1, 5, 0 m/s to the north: 3, 1 and 5 have a mean of 3 and a variance of 8/3; the mean's variance
+    is 0.01 / 3 from the fit and 8/3 / 3 from the flutter."""
+    wind = np.array([[0.0, 0.0], [3.0, 0.0], [1.0, 0.0], [5.0, 0.0], [0.0, 0.0]])
+    gust = Gust("run", np.arange(5.0), wind, 0.01 * np.eye(10), 0.0)
     height, sd = gust.height()
-    np.testing.assert_allclose(height, [4.0, 0.0])
-    np.testing.assert_allclose(sd, 0.1 / np.sqrt(2))
+    np.testing.assert_allclose(height, [3.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(sd, np.sqrt([0.01 / 3 + 8 / 9, 0.01 / 3]))
