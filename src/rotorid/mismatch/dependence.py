@@ -212,7 +212,9 @@ def leftover(prepared, model, segments, noisy, before, after, depends):
         gone = (outside if seen else 0.0) + (energy - flexible if diffuse else 0.0)
         gone = max(gone, moving)
         total_after += gone / flexible
-        gains.append(f"{name} from {np.sqrt((flexible + gone) / count):.3g} to {np.sqrt(flexible / count):.3g} {_unit(name)}")
+        gains.append(
+            f"{name} from {np.sqrt((flexible + gone) / count):.3g} to {np.sqrt(flexible / count):.3g} {_unit(name)}"
+        )
     if not channels or total_before <= 0:
         return 0.0, (), (), ""
     unknown = [model.search.terms[k].effect for k in model.selection.active]
