@@ -176,7 +176,7 @@ def fly(parameters: dict, airframe: Airframe, reference: manoeuvres.Reference, w
     keep = reference.time_s >= -1e-9
     out = np.array(rows)[keep]
     if np.linalg.norm(out[:, 0:3] * TURN - reference.position_m[keep], axis=1).max() > 15 or not np.isfinite(out).all():
-        raise RuntimeError("RotorPy's vehicle was lost")
+        raise manoeuvres.Lost("RotorPy's vehicle was lost")
     x, y, z, w = out[:, 6:10].T
     flips = np.cumprod(np.where((out[1:, 6:10] * out[:-1, 6:10]).sum(1) < 0, -1.0, 1.0))
     quaternion = np.stack([w, x, -y, -z], 1)
@@ -263,7 +263,7 @@ def make(plan: RotorpyPlan, seed: int):
         rng = np.random.default_rng([seed, 11, i])
         segments, altitude = programme(run.purpose, run.duration_s, airframe, rng, slow=True)
         reference = manoeuvres.build(segments, altitude, STEP_S, airframe.n, rng, warm_up_s=2.0, top_hz=5.0)
-        flight = fly(p, airframe, reference, wind)
+        flight = manoeuvres.flown(lambda r, w=wind: fly(p, airframe, r, w), reference)
         layout = sensors.Layout(plan.rate_hz, plan.groups)
         noise_rng = np.random.default_rng([seed, 13, i])
         ideal, written = sensors.record(

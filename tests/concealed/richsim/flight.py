@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import physics
-from .manoeuvres import Reference
+from .manoeuvres import Lost, Reference
 from .vehicles import Airframe
 
 
@@ -68,7 +68,7 @@ def fly(
 ) -> Flight:
     """Fly `reference` with physics `values`; wind (k, 3) world and ring noise (k, n) default to none.
 
-    Raises RuntimeError when the vehicle is lost, because a recording of a crash is not what was asked for.
+    Raises Lost when the vehicle is lost, because a recording of a crash is not what was asked for.
     """
     k, n = len(reference.time_s), airframe.n
     wind_m_s = np.zeros((k, 3)) if wind_m_s is None else wind_m_s
@@ -91,7 +91,7 @@ def fly(
     )
     lost = np.linalg.norm(out[:done, 0:3] - reference.position_m[:done], axis=1).max() > 15.0
     if done < k or lost:
-        raise RuntimeError(f"the vehicle was lost after {done * airframe.step_s:.1f} s of {k * airframe.step_s:.1f} s")
+        raise Lost(f"the vehicle was lost after {done * airframe.step_s:.1f} s of {k * airframe.step_s:.1f} s")
     keep = reference.time_s >= -1e-9
     out = out[keep]
     aux = out[:, size:]

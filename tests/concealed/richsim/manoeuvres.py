@@ -4,7 +4,7 @@ A flight is `Reference` arrays on the simulator's grid: position, velocity, acce
 and small additions to the attitude (roll, pitch, yaw; rad) and to the rotor speeds (relative).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,34 @@ class Reference:
     yaw_rad: np.ndarray  # (k,)
     attitude_rad: np.ndarray  # (k, 3)
     speed_fraction: np.ndarray  # (k, n)
+
+
+class Lost(RuntimeError):
+    """The controller did not hold the vehicle on its reference."""
+
+
+CALMER = (1.0, 0.6, 0.35)
+"""Sizes in which a reference is flown, one after the other, where the vehicle is lost in the larger one."""
+
+
+def calmer(reference: Reference, size: float) -> Reference:
+    """The same flight in a smaller size: places about its start, speeds, turns and excitation."""
+    start = reference.position_m[:1]
+    scaled = {
+        name: size * getattr(reference, name)
+        for name in ("velocity_m_s", "acceleration_m_s2", "yaw_rad", "attitude_rad", "speed_fraction")
+    }
+    return replace(reference, position_m=start + size * (reference.position_m - start), **scaled)
+
+
+def flown(fly, reference: Reference):
+    """`fly(reference)` in the largest size that the vehicle is not lost in."""
+    for size in CALMER[:-1]:
+        try:
+            return fly(reference if size == 1.0 else calmer(reference, size))
+        except Lost:
+            continue
+    return fly(calmer(reference, CALMER[-1]))
 
 
 @dataclass(frozen=True)

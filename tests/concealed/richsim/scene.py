@@ -87,7 +87,7 @@ def _fly(plan: Plan, airframe: Airframe, world: World, reference, i: int, seed: 
         ring /= ring.std()
     values = flying.tuned(world.values, plan.rate_hz)
     charge = 0.9 - world.discharge * (0.16 * i + 0.02 * _rng(seed, "charge", i).random())
-    return flying.fly(airframe, values, reference, wind, ring, charge)
+    return manoeuvres.flown(lambda r: flying.fly(airframe, values, r, wind, ring, charge), reference)
 
 
 def _edit(table: pd.DataFrame, edits, run_index: int, start_s: float, n: int) -> pd.DataFrame:
