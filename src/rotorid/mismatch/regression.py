@@ -33,6 +33,7 @@ MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
 MOST_REMEMBERED = 2000
+MOST_EXPLAINED = 200_000
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
 VALUE_LIMITS = (0.15, 0.4)
@@ -130,6 +131,7 @@ class Regression:
         for term in self.terms:
             if term.kind == "value":
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
+        self._explained: dict[tuple[str, ...], float] = {}
         self._fits: dict[tuple[tuple[str, ...], bool], Fit] = {}
 
     def _normal(self, cols: np.ndarray, mask: np.ndarray):
@@ -211,12 +213,31 @@ class Regression:
             beta[where] = left / (gram[where[0]] + self.precision[column])
 
     def explained(self, keys: Iterable[str]) -> float:
-        """Whitened squares that terms explain on the training blocks: the gain of `fit` without the rest of it."""
+        """Whitened squares that terms explain on the training blocks: the gain of `fit` without the rest of it.
+
+        Remembered whatever the order: exchanges and simplifications come back to the same sets again and again.
+        """
+        keys = tuple(sorted(keys))
+        if keys not in self._explained:
+            if len(self._explained) > MOST_EXPLAINED:
+                self._explained.clear()
+            self._explained[keys] = self._explains(keys)
+        return self._explained[keys]
+
+    def _explains(self, keys: tuple[str, ...]) -> float:
         cols = self.columns(keys)
         gram, cross, bias, bias_cross = self._normal(cols, self.training)
         normal = gram - bias + np.diag(self.precision[cols])
         beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
         return float(2 * cross @ beta - beta @ gram @ beta)
+
+    def gain_at(self, fit: Fit, own: np.ndarray, left_out: np.ndarray) -> float:
+        """Whitened squares that columns `own` explain on the training blocks with the coefficients of a fit of which
+        the columns `left_out` are taken away: negative where the two only cancel."""
+        gram, cross = self._total_gram[np.ix_(fit.columns, fit.columns)], self._total_cross[fit.columns]
+        rest = np.where(np.isin(fit.columns, np.concatenate([own, left_out])), 0.0, fit.beta)
+        part = np.where(np.isin(fit.columns, own), fit.beta, 0.0)
+        return float(2 * part @ (cross - gram @ rest) - part @ gram @ part)
 
     def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
         """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.effects.contract import Form, Parameter
@@ -149,3 +151,29 @@ def test_what_spoils_a_channel_of_the_held_out_runs_is_refuted():
     assert search.failed_held_out(["e/form"]) is None
     search.harms = lambda key, with_it, without: True
     assert search.failed_held_out(["e/form"]) == "e/form"
+
+
+def test_an_effect_that_only_cancels_a_cause_without_a_name_is_told():
+    """y = place − tilt with the two nearly one: alone the tilt would leave 1² of energy where there is 0.2²."""
+    rng = np.random.default_rng(7)
+    noise, x = case(rng, 2)
+    x = [[a, a + 0.2 * b] for a, b in x]
+    y = [0.1 * n + place - tilt for n, (tilt, place) in zip(noise, x, strict=True)]
+    search = search_of([term("tilt"), term("unknown_place")], y, x)
+    assert search.leaning(["tilt/form", "unknown_place/form"]) == "tilt/form"
+    assert search.leaning(["tilt/form"]) is None
+    helped = [0.1 * n + place + tilt for n, (tilt, place) in zip(noise, x, strict=True)]
+    assert (
+        search_of([term("tilt"), term("unknown_place")], helped, x).leaning(["tilt/form", "unknown_place/form"]) is None
+    )
+
+
+def test_what_columns_explain_with_others_left_out_is_computed_by_hand():
+    """y = 2 a with a fit that says 3 a − b and b left out: |y|² − |y − 3 a|² = 4 |a|² − |a|²."""
+    a, b = np.tile([1.0, 0.0], 20), np.tile([0.0, 1.0], 20)
+    rows = [rows_of(2 * a, a, b)]
+    regression = build(rows, [term("e0"), term("e1")], {0: np.array([1.0])}, lambda run, t: True, 1.0, RATE_HZ)
+    fit = regression.fit(["e0/form", "e1/form"])
+    shifted = replace(fit, beta=np.array([3.0, -1.0]))
+    used = regression.gram[regression.training][:, 0, 0].sum()
+    assert np.isclose(regression.gain_at(shifted, np.array([0]), np.array([1])), 3 * used)
