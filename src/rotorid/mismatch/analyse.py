@@ -7,6 +7,7 @@ each id: established, ambiguous, absorbed or not established.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,12 +20,14 @@ from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence, leftover
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.gusts import gust_finding, with_gusts
+from rotorid.mismatch.harmless import REASON as HARM
+from rotorid.mismatch.harmless import Values, believed_residuals, delivered_residuals, without_harm
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import Prepared, prepare, training_rule
 from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term, residual
+from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
 from rotorid.mismatch.speedpath import SpeedFit, SpeedResult, commanded_path, nothing_between
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -86,6 +89,14 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
             segments, noisy, model = prepared.segments, prepared.noisy_segments, plain
             found = (nothing_between(found[0]), *found[1:])
 
+    commanded = found is not None and not measured
+    model, values, harm = without_harm(prepared, model, values_called_wrong, commanded)
+    if harm and commanded and found[0].fit.chain:
+        # Fitted with every value free, a curve of the throttle may need values that nothing else bears out.
+        model = refined_model(prepared, prepared.segments, prepared.noisy_segments)
+        found = (nothing_between(found[0], HARM), *found[1:])
+        model, values, _ = without_harm(prepared, model, values_called_wrong, commanded)
+
     segments, noisy = model.segments, model.noisy_segments
     if model.wind is not None:
         findings.append(wind_finding(model))
@@ -109,26 +120,16 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         nonlinear_intervals(prepared, model, segments),
     )
 
-    def size(key: str, change: float) -> float:
-        return float(model.search.sizes_of(key, np.array([change])).max())
-
     if found is not None and not measured:
         findings = [throttle_or_thrust(f) for f in findings]
 
-    values = wrong_values(
-        model.regression,
-        model.search,
-        model.selection,
-        reverse_regression(prepared, model, segments),
-        size,
-    )
     told = speed_for_coefficients(values, prepared.vehicle) if only_throttle(recordings) else values
     findings = rectified(payload_or_offset(findings, values))
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
     if model.wind is None:
         nothing = Selection([], model.selection.fit)
-        plain_values = wrong_values(model.regression, model.search, nothing, None, size)
+        plain_values = wrong_values(model.regression, model.search, nothing, None, size_of_value(model))
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
     notes += run_scale_notes(model)
@@ -165,6 +166,21 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         force_source=segments[0].force_source,
         notes=tuple(notes),
     )
+
+
+def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:
+    """Function of a value and its relative change that gives the change's size in units of the noise."""
+
+    def size(key: str, change: float) -> float:
+        return float(model.search.sizes_of(key, np.array([change])).max())
+
+    return size
+
+
+def values_called_wrong(model: WrenchModel) -> Values:
+    """Believed values that the model's recordings contradict."""
+    reverse = reverse_regression(model.prepared, model, model.segments)
+    return wrong_values(model.regression, model.search, model.selection, reverse, size_of_value(model))
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
@@ -492,19 +508,11 @@ def make_traces(
     regression = model.regression
     loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
     plain = regression.fit(always_of(model, "nuisance") + list(plain_values), loose=loose)
-    full = regression.fit(always_of(model, "nuisance", "wind") + list(values) + model.selection.active, loose=loose)
-    named = np.where(model.unnamed(full.columns), 0.0, full.beta)
+    believed_left = believed_residuals(prepared, model, found is not None and not measured)
+    delivered = delivered_residuals(model, values, plain_values)
     out = []
-    for r, segment in zip(model.rows, prepared.segments, strict=True):
-        before = r.y
-        if found is not None and not measured:
-            groups = residual(segment, prepared.vehicle)
-            before = np.full_like(r.y, np.nan)
-            for index, group in enumerate(("force", "moment")):
-                if group in groups:
-                    before[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
+    for r, segment, before, after in zip(model.rows, prepared.segments, believed_left, delivered, strict=True):
         refitted = r.y - r.x[:, :, plain.columns] @ plain.beta
-        after = r.y - r.x[:, :, full.columns] @ named
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
                 unit = UNITS[CHANNELS[c].split("_")[0]]

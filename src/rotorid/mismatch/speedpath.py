@@ -95,10 +95,9 @@ def commanded_path(
     return path.speed
 
 
-def nothing_between(result: SpeedResult) -> SpeedResult:
-    """The result of a search that found nothing: rotors turn as commanded."""
+def nothing_between(result: SpeedResult, why: str = "the differences between the rotors explain as much"):
+    """The result (`SpeedResult`) of a search that found nothing, and why: rotors turn as commanded."""
     fit = SpeedFit((), np.zeros(0), 0.0, result.fit.cost, np.zeros((0, 0)))
-    why = "the differences between the rotors explain as much"
     return SpeedResult(fit, {}, {}, {}, {**result.dropped, **{k: why for k, _ in result.fit.chain}}, None)
 
 

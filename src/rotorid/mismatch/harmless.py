@@ -1,0 +1,132 @@
+"""Nothing is delivered that makes a channel worse on the held-out part than the believed vehicle leaves it.
+
+The search weighs all channels together, each by its noise: where a smooth moment seems to be known to a thousandth, it
+may buy a tilt of twenty degrees at the cost of the force. What is delivered is therefore looked at as its reader will:
+channel by channel, with the values that are called wrong and the named effects alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.mismatch.decide import WIDEST_TRUST
+from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.prepare import Prepared, training_rule
+from rotorid.mismatch.regression import Fit
+from rotorid.mismatch.rows import residual
+from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.wrench import WrenchModel
+
+HARM_RATIO = 1.1
+"""Held-out error beside the believed vehicle's from which a channel counts as worse."""
+HARM_Z = 5.0
+"""Standard errors over blocks of a second by which its squares must have grown, too."""
+LEAST_BLOCKS = 8
+CHANNELS_OF_WRENCH = 6
+REASON = "what is delivered with it is worse on the held-out runs than the believed vehicle"
+
+Values = dict[str, tuple[float, float]]
+
+
+def delivered_fit(model: WrenchModel, values: Values, also: Values | None = None) -> Fit:
+    """The fit of what is delivered: effects, wrong values (and those of `also` as free as they), nuisances."""
+    always = [t.key for t in model.regression.terms if t.kind in ("nuisance", "wind")]
+    loose = {k: WIDEST_TRUST for k in (*(also or {}), *values)}
+    return model.regression.fit(always + list(values) + model.selection.active, loose=loose)
+
+
+def delivered_residuals(model: WrenchModel, values: Values, also: Values | None = None) -> list[np.ndarray]:
+    """What wrong values and named effects leave of every stretch, (n, 12); empirical terms stay out."""
+    fit = delivered_fit(model, values, also)
+    named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
+    return [r.y - r.x[:, :, fit.columns] @ named for r in model.rows]
+
+
+def believed_residuals(prepared: Prepared, model: WrenchModel, commanded: bool) -> list[np.ndarray]:
+    """What the believed vehicle leaves of every stretch, (n, 12); if `commanded`, rotors turn as commanded."""
+    if not commanded:
+        return [r.y for r in model.rows]
+    out = []
+    for r, segment in zip(model.rows, prepared.segments, strict=True):
+        left, groups = np.full_like(r.y, np.nan), residual(segment, prepared.vehicle)
+        for index, group in enumerate(("force", "moment")):
+            if group in groups:
+                left[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
+        out.append(left)
+    return out
+
+
+def held_out_masks(prepared: Prepared, model: WrenchModel, segments: list[Segment]) -> list[np.ndarray]:
+    """Mask of the held-out rows of every stretch."""
+    rule = training_rule(prepared.split, segments)
+    return [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in model.rows]
+
+
+def growth(
+    before: list[np.ndarray], after: list[np.ndarray], held: list[np.ndarray], per: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ratio of the held-out errors after and before of each wrench channel, and its growth in standard errors.
+
+    Squares are compared by blocks of `per` rows; without LEAST_BLOCKS of them nothing is said (ratio 1, growth 0).
+    """
+    blocks = []
+    for b, a, mask in zip(before, after, held, strict=True):
+        rows = np.flatnonzero(mask)
+        if len(rows) >= per:
+            parts = np.array_split(rows, len(rows) // per)
+            squares = [x[:, :CHANNELS_OF_WRENCH] ** 2 for x in (b, a)]
+            blocks += [[s[p].mean(axis=0) for s in squares] for p in parts]
+    if len(blocks) < LEAST_BLOCKS:
+        return np.ones(CHANNELS_OF_WRENCH), np.zeros(CHANNELS_OF_WRENCH)
+    was, now = np.array(blocks).transpose(1, 0, 2)
+    change = now - was
+    doubt = change.std(axis=0, ddof=1) / np.sqrt(len(change))
+    ratio = np.sqrt(now.mean(axis=0) / np.maximum(was.mean(axis=0), 1e-300))
+    return np.nan_to_num(ratio, nan=1.0), np.nan_to_num(change.mean(axis=0) / np.maximum(doubt, 1e-300))
+
+
+def harmed(ratio: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Mask of the channels that are worse."""
+    return (ratio > HARM_RATIO) & (z > HARM_Z)
+
+
+def without(model: WrenchModel, key: str) -> WrenchModel:
+    """The model with one effect less, all else fitted anew."""
+    search, old = model.search, model.selection
+    active = [k for k in old.active if k != key]
+    fit = model.regression.fit(search.always + active, jackknife=True)
+    p_values = {k: model.regression.wald(fit, model.regression.columns([k]), search.blocks) for k in active}
+    reasons = {**old.not_established, search.terms[key].effect: REASON}
+    return replace(model, selection=replace(old, active=active, fit=fit, p_values=p_values, not_established=reasons))
+
+
+def without_harm(
+    prepared: Prepared, model: WrenchModel, values_of: Callable[[WrenchModel], Values], commanded: bool
+) -> tuple[WrenchModel, Values, bool]:
+    """The model less the effects that make a channel worse on the held-out part, its wrong values, and whether harm
+    is left (by the values, or by what lies between command and speed)."""
+    values = values_of(model)
+    before = believed_residuals(prepared, model, commanded)
+    held = held_out_masks(prepared, model, model.segments)
+    per = max(2, int(prepared.thinner.rate_hz))
+    while True:
+        ratio, z = growth(before, delivered_residuals(model, values), held, per)
+        worse = harmed(ratio, z)
+        if not worse.any():
+            return model, values, False
+        options = []
+        for key in model.selection.active:
+            term = model.search.terms[key]
+            if term.effect in UNKNOWNS or term.run:
+                continue
+            fewer = without(model, key)
+            left = growth(before, delivered_residuals(fewer, values), held, per)[0]
+            options.append((float(left[worse].sum()), key, fewer))
+        best = min(options, key=lambda o: o[0], default=None)
+        if best is None or best[0] >= ratio[worse].sum():
+            return model, values, True
+        model = best[2]
+        values = values_of(model)
