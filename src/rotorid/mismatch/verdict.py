@@ -453,6 +453,11 @@ def _better(main: str, channels: Mapping[str, Channel]) -> str:
     channel = channels[main]
     errors, where = _either_split(channel)
     noise = number(channel.noise_floor)
+    if errors.before is not None and errors.after is not None and errors.after >= errors.before:
+        return (
+            f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
+            f"{number(errors.after)} {channel.unit} after."
+        )
     return (
         f"With this the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
         f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."

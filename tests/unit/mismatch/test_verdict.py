@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,6 +70,14 @@ def test_numbers_that_are_not_finite_are_written_as_null():
 def test_the_word(findings, values, share, word):
     made = analysis(findings=findings, values=values, unexplained_share=share, dash=False)
     assert make_verdict(made, [], {}).verdict == word
+
+
+def test_an_error_that_did_not_get_smaller_is_not_sold_as_a_gain():
+    made = analysis(findings=[drag_finding()])
+    worse = replace(made, traces=tuple(replace(t, after=1.2 * t.before) for t in made.traces))
+    sentence = make_verdict(worse, [], {}).sentence
+    assert "is not smaller with this" in sentence and "goes from" not in sentence
+    assert "goes from" in make_verdict(made, [], {}).sentence
 
 
 def test_a_burst_that_nothing_explains_is_unexplained():
