@@ -25,7 +25,7 @@ from rotorid.recordings import RecordingSet, Run, Vehicle
 THROUGH_AIR = ("rotors", "commands", "throttle")
 LEAST_ALONE = 0.9
 TELLS_A_DRIFT = 0.95
-"""Share of the motion that the rotors must explain to tell a drift: disturbances come and go, so their lateness does."""
+"""Share of the motion the rotors must explain to tell a drift: disturbances come and go, and so does their lateness."""
 LEAST_EXPLAINED = 0.6
 P_LIMIT = 1e-6
 LEAST_LIKELIHOOD = 60.0
