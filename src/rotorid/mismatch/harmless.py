@@ -22,8 +22,9 @@ from rotorid.mismatch.wrench import WrenchModel
 
 HARM_RATIO = 1.1
 """Held-out error beside the believed vehicle's from which a channel counts as worse."""
-HARM_Z = 5.0
-"""Standard errors over blocks of a second by which its squares must have grown, too."""
+HARM_Z = 2.0
+"""Standard errors over blocks of a second by which its squares must have grown, too: the burden of proof is the
+effect's, and squares of a short flight are widely spread."""
 LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
 REASON = "what is delivered with it is worse on the held-out runs than the believed vehicle"
