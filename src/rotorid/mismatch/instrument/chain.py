@@ -46,6 +46,8 @@ LEAST_BLOCKS = 12
 MOST_BLOCKS = 400
 STEADY_BLOCKS = 40
 SHORT = 60
+FINER = 4
+"""Steps of a chain that takes time to one sample."""
 ALIKE = 12.0
 """Whitened squares within which another form explains as well."""
 
@@ -80,16 +82,34 @@ class ChainResult:
 
 
 def applied(loading: Loading, chain: Chain, values, full_speed: float, first_full: float, volts) -> np.ndarray:
-    """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed."""
-    speed = loading.command * (full_speed / first_full)
+    """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed.
+
+    Between samples a command is taken as a straight line: the chain runs on a clock FINER times faster. (A command
+    that holds until the next is then half a sample late: offsets in time below a sample are a nuisance anyway.)
+    """
+    timed = any(form.excited_by == "change" for _, form in chain)
+    finer = FINER if timed else 1
+    command, time_s = between(loading.command, finer), between(loading.time_s, finer)
+    voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
+    speed = command * (full_speed / first_full)
     at = 0
     for _, form in chain:
-        path = SpeedPath(speed, loading.time_s, full_speed, loading.motion.voltage, volts)
+        path = SpeedPath(speed, time_s, full_speed, voltage, volts)
         # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
         with np.errstate(invalid="ignore"):
             speed = np.nan_to_num(form.apply(path, np.asarray(values[at : at + len(form.parameters)])))
         at += len(form.parameters)
-    return speed
+    return speed[::finer]
+
+
+def between(values: np.ndarray, finer: int) -> np.ndarray:
+    """Samples (n,) or (n, k) with `finer` − 1 more on the straight line between any two."""
+    if finer == 1:
+        return values
+    places = np.arange((len(values) - 1) * finer + 1)
+    first = np.minimum(places // finer, len(values) - 2)
+    part = (places / finer - first).reshape(-1, *[1] * (values.ndim - 1))
+    return (1.0 - part) * values[first] + part * values[first + 1]
 
 
 class Problem:
@@ -451,12 +471,11 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
         tuple(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)) if problem.measured else ("force_z",)
     )
     findings = []
-    lags = any(k == "motor_lag" for k, _ in best.chain)
     dt_s = 1.0 / setup.instrument.rate_hz
     for key, form in best.chain:
         where = place_of(best.chain, key, problem.scaled)
-        if key == "delay" and abs(best.theta[where][0] + lags * dt_s) <= SUB_SAMPLE * dt_s:
-            continue  # the lag's own step of one sample taken back, or less than a sample: no finding
+        if key == "delay" and abs(best.theta[where][0]) <= SUB_SAMPLE * dt_s:
+            continue  # less than a sample: no finding
         values, deviation = best.theta[where], sd[where]
         p = p_value(values - np.array(form.neutral), covariance[where, where], count)
         others = alternatives(problem, best, key, forms)
