@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from scipy.linalg import expm
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from .write import Recording, plain
 
@@ -135,38 +134,40 @@ def throttles(purpose, t, k, rng):
 
 def lagged(x, tau_up, tau_down, dt):
     """First-order lag on (n, k) with a constant for each direction, exact for inputs that are linear over a step."""
+    if tau_up == tau_down:
+        stay, share = held(tau_up, dt)
+        # what the filter remembers of sample 0: input and state both stood at x[0]
+        later, _ = lfilter([1.0 - share, share - stay], [1.0, -stay], x[1:], axis=0, zi=share * x[:1])
+        return np.concatenate([x[:1], later])
     out = np.empty_like(x)
     state = x[0].copy()
     out[0] = state
     for i in range(1, len(x)):
         old, new = x[i - 1], x[i]
-        tau = np.where(0.5 * (old + new) > state, tau_up, tau_down)
-        ratio = dt / np.maximum(tau, 1e-6)
-        stay = np.exp(-ratio)
-        share = (1.0 - stay) / ratio
+        stay, share = held(np.where(0.5 * (old + new) > state, tau_up, tau_down), dt)
         state = stay * state + (share - stay) * old + (1.0 - share) * new
         out[i] = state
     return out
 
 
+def held(tau, dt):
+    """Share of a lag's state that is left after a step, and its mean over the step."""
+    ratio = dt / np.maximum(tau, 1e-6)
+    return np.exp(-ratio), (1.0 - np.exp(-ratio)) / ratio
+
+
 def oscillator(x, f_hz, zeta, dt):
     """y'' = ω²(x − y) − 2ζω y', (n, k), starting at rest on x[0]; exact for inputs that are linear over a step.
 
-    The state (y, y') and the input with its slope make a linear system, whose matrix exponential is the step.
+    The distance from the load obeys e'' + 2ζω e' + ω² e = x'' + 2ζω x'. With the pole p = ω(−ζ + i√(1−ζ²)) and the
+    complex lag z' = p z + x' it is e = Re(z) − (Re p / Im p) Im(z), zero at the start.
     """
     w = 2 * np.pi * f_hz
-    system = np.zeros((4, 4))  # y, y', x, x'
-    system[0, 1] = system[2, 3] = 1.0
-    system[1] = [-w * w, -2 * zeta * w, w * w, 0.0]
-    step = expm(system * dt)
-    y, v = x[0].copy(), np.zeros_like(x[0])
-    out = np.empty_like(x)
-    out[0] = y
-    for i in range(1, len(x)):
-        old, slope = x[i - 1], (x[i] - x[i - 1]) / dt
-        y, v = (step[r, 0] * y + step[r, 1] * v + step[r, 2] * old + step[r, 3] * slope for r in (0, 1))
-        out[i] = y
-    return out
+    pole = w * complex(-zeta, np.sqrt(1.0 - zeta * zeta))
+    turn = np.exp(pole * dt)
+    slope = np.diff(x, axis=0, prepend=x[:1]) / dt
+    z = lfilter([(turn - 1.0) / pole], [1.0, -turn], slope.astype(complex), axis=0)
+    return x - (z.real - pole.real / pole.imag * z.imag)
 
 
 def creep(x, amount, dt):

@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.creep import followed
-from rotorid.effects.loading import change_of_load
+from rotorid.effects.loading import change_of_load, unsmoothed
 from rotorid.effects.structural_resonance import resonance
 
 
@@ -17,6 +17,7 @@ def first_order(loading, vehicle, values):
 
 def followed_now(load, tau_s, dt_s):
     """The lag without the hold's delay of one sample: linear between samples."""
+    load = unsmoothed(load)
     late = followed(load, tau_s, dt_s)
     ratio = dt_s / max(tau_s, 1e-6)
     share = 1.0 - np.exp(-ratio)
@@ -28,7 +29,7 @@ def followed_now(load, tau_s, dt_s):
 
 
 def second_order(loading, vehicle, values):
-    """Butterworth of second order with cutoff f_c: as a structure with a damping ratio of √½, linear between samples."""
+    """Butterworth of second order with cutoff f_c: as a structure with a damping ratio of √½."""
     load = change_of_load(loading)
     return Contribution(reading=resonance(load, values[0], np.sqrt(0.5), loading.dt_s) - load)
 

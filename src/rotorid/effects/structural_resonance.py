@@ -4,14 +4,14 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import change_of_load
+from rotorid.effects.loading import change_of_load, unsmoothed
 
 
 def resonance(signal, frequency_hz, damping, dt_s):
-    """ω_n²/(s² + 2 ζ ω_n s + ω_n²) on (n, k), exact for inputs that are linear between samples, from rest."""
+    """ω_n²/(s² + 2 ζ ω_n s + ω_n²) on (n, k), from rest; the gain holds far up to half the rate."""
     w = 2 * np.pi * max(frequency_hz, 1e-3)
     b, a, _ = cont2discrete(([w * w], [1.0, 2 * max(damping, 1e-4) * w, w * w]), dt_s, method="foh")
-    return lfilter(b[0], a, signal, axis=0)
+    return lfilter(b[0], a, unsmoothed(signal), axis=0)
 
 
 def ringing(loading, vehicle, values):

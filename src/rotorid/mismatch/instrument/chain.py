@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.clock_skew import between_samples
 from rotorid.effects.contract import SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.findings import Estimate, Finding, Trace
@@ -84,8 +85,8 @@ class ChainResult:
 def applied(loading: Loading, chain: Chain, values, full_speed: float, first_full: float, volts) -> np.ndarray:
     """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed.
 
-    Between samples a command is taken as a straight line: the chain runs on a clock FINER times faster. (A command
-    that holds until the next is then half a sample late: offsets in time below a sample are a nuisance anyway.)
+    Between samples a command is taken as smooth: the chain runs on a clock FINER times faster. (A command that holds
+    until the next is then half a sample late: offsets in time below a sample are a nuisance anyway.)
     """
     timed = any(form.excited_by == "change" for _, form in chain)
     finer = FINER if timed else 1
@@ -103,13 +104,11 @@ def applied(loading: Loading, chain: Chain, values, full_speed: float, first_ful
 
 
 def between(values: np.ndarray, finer: int) -> np.ndarray:
-    """Samples (n,) or (n, k) with `finer` − 1 more on the straight line between any two."""
+    """Samples (n,) or (n, k) with `finer` − 1 more between any two."""
     if finer == 1:
         return values
-    places = np.arange((len(values) - 1) * finer + 1)
-    first = np.minimum(places // finer, len(values) - 2)
-    part = (places / finer - first).reshape(-1, *[1] * (values.ndim - 1))
-    return (1.0 - part) * values[first] + part * values[first + 1]
+    places = np.arange((len(values) - 1) * finer + 1) / finer
+    return between_samples(values.reshape(len(values), -1), places).reshape(len(places), *values.shape[1:])
 
 
 class Problem:
