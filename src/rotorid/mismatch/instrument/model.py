@@ -38,7 +38,7 @@ LEAST_BLOCKS_OF_A_RUN = 5
 EXCITED_SHARE = 0.1
 MAIN_SHARE = 0.2
 ROUNDS = 4
-SETTLED = 1e-4
+SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
 REFUTED = 12.0
 """Whitened squares by which another effect may do worse on the runs held out before it is no alternative."""
@@ -298,11 +298,13 @@ def whole_reading(terms: list[Term], active) -> list[tuple[Form, np.ndarray]]:
     return [(t.form, np.array(t.values, float)) for t in chosen]
 
 
-def reading_model(setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None) -> ReadingModel:
-    """Rows, regression and search, starting from what is `active`."""
+def reading_model(
+    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None
+) -> ReadingModel:
+    """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept."""
     loadings = setup.loadings if loadings is None else loadings
     rows = rows_of(setup, terms, loadings, whole_reading(terms, active))
-    noise, taps = noise_and_filters(setup, terms, rows)
+    noise, taps = noise_and_filters(setup, terms, rows) if filters is None else filters
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz)
@@ -427,16 +429,17 @@ def refined(model: ReadingModel) -> list[Term]:
 def fitted_model(setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None) -> ReadingModel:
     """Search and refinement in turn until the same terms with the same values come out.
 
-    What is noise is learnt anew each time: whitened by a ring or a lag that no column of the first round had, the
-    regression would be deaf at the very frequencies where the effect shows.
+    What is noise is learnt anew after the first refinement: whitened by a ring or a lag that no column had before it,
+    the regression would be deaf at the very frequencies where the effect shows.
     """
     model = reading_model(setup, terms, active, loadings)
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         before, start = model.selection.active, nonlinear_values(model)
         if not len(start):
             break
         terms = refined(model)
-        model = reading_model(setup, terms, before, loadings)
+        kept = (model.noise, model.regression.filters) if number else None
+        model = reading_model(setup, terms, before, loadings, kept)
         values = nonlinear_values(model)
         if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=SETTLED):
             break
