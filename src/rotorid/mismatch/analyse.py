@@ -50,6 +50,8 @@ RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
 UNITS = {"force": "N", "moment": "N m"}
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
+IN_QUESTION = {"payload": {"mass", "thrust"}, "throttle_curve": {"thrust", "torque", "speed"}}
+"""Values that an id would change by itself; thrust in a payload's is its ratio to the mass."""
 
 
 def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
@@ -134,7 +136,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         notes.append(lag_alone_note(found[0].lag_alone))
     traces = make_traces(prepared, model, found, measured, plain_values, values)
     findings, told = with_square_term(findings, told, model)
-    told = without_weight_of_payload(findings, told)
+    told = without_values_in_question(findings, told)
     before, after, depends = dependence(prepared, model, segments)
     share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
     findings = together(findings)
@@ -361,11 +363,11 @@ def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) 
     return [told if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
 
 
-def without_weight_of_payload(findings: list[Finding], values: dict) -> dict:
-    """Values without the mass (or the thrust, its ratio to it) where a payload that would change it may be at work."""
-    if not any("payload" in f.alternatives for f in findings):
-        return values
-    return {k: v for k, v in values.items() if k not in ("mass", "thrust")}
+def without_values_in_question(findings: list[Finding], values: dict) -> dict:
+    """Values less those that would be right, or others, if another member of an open class were at work."""
+    members = {i for f in findings if f.status == "ambiguous" for i in f.alternatives}
+    open_values = {key for i, keys in IN_QUESTION.items() if i in members for key in keys}
+    return {k: v for k, v in values.items() if k not in open_values}
 
 
 def only_throttle(recordings: RecordingSet) -> bool:

@@ -17,7 +17,7 @@ Three sources, in this order of trust:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2, f
 
 from rotorid.mismatch.findings import Analysis, Trace
+from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.shares import effort, segments_of, shares
@@ -49,7 +50,9 @@ LONGEST_GAP_S = 2.0
 THROUGHOUT = 0.7
 """Covering more than this share of the flight counts as being there throughout."""
 CONFINED = 0.4
-"""Covering less than this share of the flight counts as acting in part of it."""
+"""Being at work for less than this share of the flight counts as acting in part of it."""
+AT_WORK = 0.03
+"""Local size beside its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
 LOUDER = 4.0
 """Energy of a window beside the usual, below which louder noise is not called a mismatch."""
@@ -80,17 +83,19 @@ class Interval:
 def locate(analysis: Analysis) -> list[Location]:
     """Locations of the mismatch, in the order of channels, runs and time; empty where there is none."""
     segments = segments_of(analysis)
-    found = _stated(analysis)
+    stated = _stated(analysis)
+    found: list[Interval] = []
     if with_status(analysis, "established", "ambiguous", "absorbed") or analysis.values:
         partial, throughout = _explained(analysis, segments)
-        stated = {i.trace.channel for i in found}
-        found += [i for i in partial if i.trace.channel not in stated]
-        if not found:
+        spoken_for = {loc.channel for loc in stated}
+        found += [i for i in partial if i.trace.channel not in spoken_for]
+        if not found and not stated:
             found += throughout
     found += _unexplained(analysis, segments)
-    order = {(t.channel, t.run): k for k, t in enumerate(analysis.traces)}
-    found.sort(key=lambda i: (order[i.trace.channel, i.trace.run], i.start))
-    return _worded(analysis, _disjoint(found))
+    traces = list(dict.fromkeys((t.channel, t.run) for t in analysis.traces))
+    order = {key: k for k, key in enumerate(traces)}
+    located = stated + _worded(analysis, _disjoint(found, order))
+    return sorted(located, key=lambda loc: (order.get((loc.channel, loc.run), -1), loc.run, loc.start_s))
 
 
 def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]:
@@ -100,9 +105,6 @@ def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]
         key = (i.trace.channel, i.explained)
         if key not in regimes:
             regimes[key] = regime_of(analysis, *key)
-        signal = mismatch_of(i.trace, i.explained)
-        total = float(np.nansum(signal**2))
-        share = float(np.nansum(signal[i.start : i.stop] ** 2)) / total if total > 0 else 0.0
         out.append(
             Location(
                 run=i.trace.run,
@@ -110,11 +112,16 @@ def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]
                 start_s=_edge(analysis, i, i.start, 0),
                 stop_s=_edge(analysis, i, i.stop - 1, -1),
                 p_value=float(np.clip(i.p_value, SMALLEST_P, 1.0)),
-                energy_share=min(share, 1.0),
+                energy_share=_energy_share(mismatch_of(i.trace, i.explained), slice(i.start, i.stop)),
                 regime=regimes[key],
             )
         )
     return out
+
+
+def _energy_share(signal: np.ndarray, part: slice) -> float:
+    total = float(np.nansum(signal**2))
+    return min(float(np.nansum(signal[part] ** 2)) / total, 1.0) if total > 0 else 0.0
 
 
 def _edge(analysis: Analysis, interval: Interval, sample: int, end: int) -> float:
@@ -155,18 +162,36 @@ def _by_channel(analysis: Analysis) -> dict[str, list[Trace]]:
     return out
 
 
-def _stated(analysis: Analysis) -> list[Interval]:
-    """Windows that findings state, on the channels they show in."""
-    out = []
+def _stated(analysis: Analysis) -> list[Location]:
+    """Windows that findings state, on the channels they show in.
+
+    Samples that a sensor lost are left out of the residuals, so that a channel may have no residual there: then the
+    share of the channel's mismatch is that of the time stated in the run.
+    """
+    vehicle, regimes, out = analysis.recordings.vehicle, {}, []
     for finding in with_status(analysis, "established", "ambiguous"):
+        channels = dict.fromkeys(channel_of(name, vehicle) for name in finding.channels)
         for run, start_s, stop_s in finding.windows:
-            for trace in analysis.traces:
-                if trace.run != run or (finding.channels and trace.channel not in finding.channels):
-                    continue
-                first, last = np.searchsorted(trace.time_s, [start_s, stop_s])
-                last = min(max(last, first + 1) + 1, len(trace.time_s))
-                if first < len(trace.time_s):
-                    out.append(Interval(trace, int(min(first, last - 1)), int(last), finding.p_value, True))
+            stated_s = sum(b - a for r, a, b in finding.windows if r == run)
+            for channel in channels:
+                share = min((stop_s - start_s) / stated_s, 1.0) if stated_s > 0 else 1.0
+                for trace in analysis.traces:
+                    inside = slice(*np.searchsorted(trace.time_s, [start_s, stop_s]))
+                    if (trace.run, trace.channel) == (run, channel) and inside.stop > inside.start:
+                        share = _energy_share(mismatch_of(trace, True), inside)
+                if channel not in regimes:
+                    regimes[channel] = regime_of(analysis, channel, True)
+                out.append(
+                    Location(
+                        run=run,
+                        channel=channel,
+                        start_s=start_s,
+                        stop_s=stop_s,
+                        p_value=float(np.clip(finding.p_value, SMALLEST_P, 1.0)),
+                        energy_share=share,
+                        regime=regimes[channel],
+                    )
+                )
     return out
 
 
@@ -191,18 +216,24 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interv
                 throughout += _tested(channels[channel], [np.ones(len(m), bool) for m in masks], len(analysis.traces))
     for cause in causes:
         masks = {c: m for c, series in cause.items() if (m := _acting(channels[c], series)) is not None}
-        by_run: dict[str, list[np.ndarray]] = {}
-        for channel, parts in masks.items():
-            for trace, mask in zip(channels[channel], parts, strict=True):
-                by_run.setdefault(f"{trace.run} {trace.time_s[0]}", []).append(mask)
-        if not by_run:
+        if not masks:
             continue
-        anywhere = [np.any(m, axis=0) for m in by_run.values()]
-        share = float(np.concatenate(anywhere).mean())
+        confined = _share_at_work({c: (channels[c], cause[c]) for c in masks}) < CONFINED
         for channel, parts in masks.items():
             here = _tested(channels[channel], parts, len(analysis.traces))
-            (partial if share < CONFINED else throughout).extend(here)
+            (partial if confined else throughout).extend(here)
     return partial, throughout
+
+
+def _share_at_work(contributions: Mapping[str, tuple[Sequence[Trace], Sequence[np.ndarray]]]) -> float:
+    """Share of the flight in which a cause's contribution to any channel (traces and their series) is more than nil."""
+    by_run: dict[tuple[str, float], list[np.ndarray]] = {}
+    for traces, series in contributions.values():
+        levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
+        nil = AT_WORK * float(np.quantile(np.concatenate(levels), 0.99))
+        for trace, level in zip(traces, levels, strict=True):
+            by_run.setdefault((trace.run, float(trace.time_s[0])), []).append(level > nil)
+    return float(np.concatenate([np.any(m, axis=0) for m in by_run.values()]).mean())
 
 
 def _acting(traces: Sequence[Trace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
@@ -406,10 +437,10 @@ def _best_segment(gain: np.ndarray) -> tuple[int, int]:
     return start, max(stop, start + 1)
 
 
-def _disjoint(intervals: Sequence[Interval]) -> list[Interval]:
+def _disjoint(intervals: Sequence[Interval], order: Mapping[tuple[str, str], int]) -> list[Interval]:
     """Intervals sorted by trace and start, overlaps on one trace merged."""
     out: list[Interval] = []
-    for i in intervals:
+    for i in sorted(intervals, key=lambda i: (order[i.trace.channel, i.trace.run], i.start)):
         last = out[-1] if out else None
         if last is not None and last.trace is i.trace and i.start <= last.stop:
             stop, p = max(last.stop, i.stop), min(last.p_value, i.p_value)

@@ -480,7 +480,8 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
         effects = updated
         if np.abs(step).max() < 0.01:
             break
-    if regression.wald(fit, regression.columns(["wind"]), int(regression.training.sum())) > FINAL_P:
+    blown = replace(fit, beta=np.append(fit.beta[:-2], wind))  # the last step from it is all that the fit holds
+    if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > FINAL_P:
         return model  # a wind that the fit through the drag does not see is none
     sd = np.sqrt(np.diag(fit.covariance)[-2:])
     again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))

@@ -59,3 +59,13 @@ def test_height_is_the_mean_from_the_first_to_the_last_strong_knot():
     height, sd = gust.height()
     np.testing.assert_allclose(height, [3.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(sd, np.sqrt([0.01 / 3 + 8 / 9, 0.01 / 3]))
+
+
+def test_a_wind_that_blows_throughout_is_stated_as_a_velocity():
+    analysis = analyse(recorded(1, 2, 3, flight={"drag": DRAG, "excitation": 1.5, "gust": (-10.0, 60.0, 3.0, -1.5)}))
+    found = {f.id: f for f in analysis.findings if f.status == "established"}
+    assert set(found) == {"steady_wind", "rotor_drag"}
+    assert [p.symbol for p in found["steady_wind"].parameters] == ["w_north", "w_east"]
+    for estimate, wind in zip(found["steady_wind"].parameters, (3.0, -1.5), strict=True):
+        assert abs(estimate.value - wind) < 0.15
+        assert estimate.low < wind < estimate.high

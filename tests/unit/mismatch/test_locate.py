@@ -49,3 +49,20 @@ def test_a_wrong_value_is_wrong_throughout():
 def test_the_same_analysis_gives_the_same_locations():
     made = analysis(3, findings=[drag_finding()], bursts=[("a", "moment_x", 5, 7, 3.0)])
     assert locate(made) == locate(made)
+
+
+def test_samples_that_a_sensor_lost_are_located_where_no_residual_is_left():
+    dropout = drag_finding(
+        id="sensor_dropout",
+        form=None,
+        values=(),
+        channels=("rotor_speed_2_rad_s", "specific_force_y_m_s2"),
+        windows=(("b", 4.0, 5.5), ("b", 9.0, 9.5)),
+    )
+    found = locate(analysis(findings=[dropout]))
+    assert {(f.run, f.channel, f.start_s, f.stop_s) for f in found} == {
+        ("b", channel, start_s, stop_s)
+        for channel in ("rotor_speed_2", "force_y")
+        for start_s, stop_s in ((4.0, 5.5), (9.0, 9.5))
+    }
+    assert [f.energy_share for f in found if f.channel == "rotor_speed_2"] == pytest.approx([0.75, 0.25])

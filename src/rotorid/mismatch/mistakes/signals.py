@@ -32,6 +32,18 @@ def sensor_columns(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
     }
 
 
+def channel_of(column: str, vehicle: Vehicle) -> str:
+    """The verdict's channel in which a column's samples are compared; the column itself where none is."""
+    sensor = next((s for s, names in sensor_columns(vehicle).items() if column in names), None)
+    if sensor == "rotors":
+        return column.removesuffix("_rad_s")
+    if sensor == "accelerometer":
+        return "force_" + "xyz"[c.SPECIFIC_FORCE.index(column)]
+    if sensor == "gyroscope":
+        return "angular_velocity"
+    return sensor if sensor in ("attitude", "velocity", "position") else column
+
+
 @dataclass(frozen=True)
 class Signals:
     """Sensors of one run on an even grid; a sensor that the run lacks is not in `values`."""

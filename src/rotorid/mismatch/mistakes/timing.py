@@ -23,7 +23,7 @@ from rotorid.mismatch.motion import fresh_samples
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 THROUGH_AIR = ("rotors", "commands", "throttle")
-LEAST_ALONE = 0.9
+LEAST_ALONE, LEAST_ALONE_DRIFTING = 0.9, 0.95
 LEAST_EXPLAINED = 0.6
 P_LIMIT = 1e-6
 LEAST_LIKELIHOOD = 60.0
@@ -241,8 +241,10 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
 def differences(known: list, drifting: bool) -> list[Difference]:
     """Every difference of lateness that a comparison is good enough to tell."""
     found = [difference(*c, drifting=drifting) for c in known]
-    # What disturbs the vehicle makes its rotors answer late, which is no clock: there the rotors must explain all.
-    return [d for d in found if d.explained > (LEAST_ALONE if d.over in THROUGH_AIR else LEAST_EXPLAINED)]
+    # What disturbs the vehicle makes its rotors answer late, which is no clock: there the rotors must explain all,
+    # more so where a lateness that changes, as with disturbances that come and go, is told.
+    alone = LEAST_ALONE_DRIFTING if drifting else LEAST_ALONE
+    return [d for d in found if d.explained > (alone if d.over in THROUGH_AIR else LEAST_EXPLAINED)]
 
 
 def across(differences: list[Difference], wrong: list[str], key: int) -> tuple[float, float]:
