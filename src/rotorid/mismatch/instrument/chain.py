@@ -47,6 +47,7 @@ LEAST_BLOCKS = 12
 MOST_BLOCKS = 400
 STEADY_BLOCKS = 40
 SHORT = 60
+ROUNDS = 2
 FINER = 4
 """Steps of a chain that takes time to one sample."""
 ALIKE = 12.0
@@ -347,6 +348,23 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
     problem.learn((), problem.neutral(), coloured=False)
     best = problem.fit((), problem.neutral())
     dropped: dict[str, str] = {}
+    for _ in range(ROUNDS):
+        best = grown(problem, best, forms, dropped)
+        problem.learn(best.chain, best.theta)
+        best = problem.fit(best.chain, best.theta)
+        names = {key for key, _ in best.chain}
+        best = exchanged(problem, better_forms(problem, best, forms), forms)
+        new = {key for key, _ in best.chain} - names
+        if not new:
+            break
+        # What came in another's place is whitened by its own residual, and beside it others may be needed.
+        dropped = {key: reason for key, reason in dropped.items() if key not in new}
+    best = pruned(problem, better_forms(problem, best, forms), dropped)
+    return worded(problem, best, forms, dropped)
+
+
+def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainFit:
+    """The chain with forms added one by one as long as they explain more; why others did not enter in `dropped`."""
     for _ in range(MOST_FORMS):
         # Whitening by the residual of the richest chain seen: by a poor one's, everything would look like noise.
         problem.learn(best.chain, best.theta, coloured=bool(best.chain))
@@ -359,22 +377,35 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
             fit = problem.fit(chain, best_start(problem, chain, best, pair), QUICK_FIT)
             tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
         tried.sort(key=lambda t: -t[0])
-        grown = False
+        entered = False
         for score, pair, fit in tried[:MOST_TRIED]:
             if score <= 0:
                 break
             fit = problem.fit(fit.chain, fit.theta)
             reason = weakness(problem, fit, best, pair)
             if reason is None:
-                best, grown = fit, True
+                best, entered = fit, True
                 break
             dropped.setdefault(pair[0], reason)
-        if not grown:
+        if not entered:
             break
-    problem.learn(best.chain, best.theta)
-    best = problem.fit(best.chain, best.theta)
-    best = pruned(problem, better_forms(problem, best, forms), dropped)
-    return worded(problem, best, forms, dropped)
+    return best
+
+
+def exchanged(problem: Problem, best: ChainFit, forms) -> ChainFit:
+    """The chain with an id in another's place where that explains clearly more: what entered first need not be true."""
+    found, least = best, best.cost - ALIKE
+    taken = {key for key, _ in best.chain}
+    for key, current in best.chain:
+        for pair in forms:
+            if pair[0] in taken:
+                continue
+            chain = ordered(tuple(pair if k == key else (k, f) for k, f in best.chain))
+            fit = problem.fit(chain, best_start(problem, chain, best, pair))
+            cost = fit.cost + COST_PER_PARAMETER * max(0, len(pair[1].parameters) - len(current.parameters))
+            if cost < least:
+                found, least = fit, cost
+    return found
 
 
 def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | None:
