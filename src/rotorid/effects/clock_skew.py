@@ -33,14 +33,19 @@ def between_samples(values, steps):
     first = np.clip(np.floor(steps).astype(int) - 1, 0, max(last - 3, 0))
     if last < 3:
         return np.stack([np.interp(steps, np.arange(last + 1), column) for column in values.T], axis=1)
-    x = steps - first
-    weights = (
+    weights = weights_of_four(steps - first)
+    return sum(w[:, None] * values[first + i] for i, w in enumerate(weights))
+
+
+def weights_of_four(place):
+    """Lagrange's weights of samples 0, 1, 2 and 3 at a place among them."""
+    x = place
+    return (
         -(x - 1) * (x - 2) * (x - 3) / 6,
         x * (x - 2) * (x - 3) / 2,
         -x * (x - 1) * (x - 3) / 2,
         x * (x - 1) * (x - 2) / 6,
     )
-    return sum(w[:, None] * values[first + i] for i, w in enumerate(weights))
 
 
 def at_other_times(loading, late_s):

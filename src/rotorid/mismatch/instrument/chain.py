@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.clock_skew import between_samples
+from rotorid.effects.clock_skew import between_samples, weights_of_four
 from rotorid.effects.contract import SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.findings import Estimate, Finding, Trace
@@ -106,10 +106,17 @@ def applied(loading: Loading, chain: Chain, values, full_speed: float, first_ful
 
 def between(values: np.ndarray, finer: int) -> np.ndarray:
     """Samples (n,) or (n, k) with `finer` − 1 more between any two."""
-    if finer == 1:
-        return values
-    places = np.arange((len(values) - 1) * finer + 1) / finer
-    return between_samples(values.reshape(len(values), -1), places).reshape(len(places), *values.shape[1:])
+    if finer == 1 or len(values) < 4:
+        return np.repeat(values, finer, axis=0)[: (len(values) - 1) * finer + 1]
+    out = np.empty(((len(values) - 1) * finer + 1, *values.shape[1:]))
+    out[::finer] = values
+    for k in range(1, finer):
+        # As between_samples, with the same four weights in the whole interior.
+        ends = between_samples(values.reshape(len(values), -1), np.array([0.0, len(values) - 2]) + k / finer)
+        out[k], out[k - finer - 1] = ends[0].reshape(values.shape[1:]), ends[1].reshape(values.shape[1:])
+        weights = weights_of_four(1.0 + k / finer)
+        out[finer + k : -finer : finer] = sum(w * values[i : len(values) - 3 + i] for i, w in enumerate(weights))
+    return out
 
 
 class Problem:
@@ -353,7 +360,7 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
         problem.learn(best.chain, best.theta)
         best = problem.fit(best.chain, best.theta)
         names = {key for key, _ in best.chain}
-        best = exchanged(problem, better_forms(problem, best, forms), forms)
+        best = exchanged(problem, best, forms)
         new = {key for key, _ in best.chain} - names
         if not new:
             break
@@ -394,18 +401,22 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
 
 def exchanged(problem: Problem, best: ChainFit, forms) -> ChainFit:
     """The chain with an id in another's place where that explains clearly more: what entered first need not be true."""
-    found, least = best, best.cost - ALIKE
     taken = {key for key, _ in best.chain}
+    tried = []
     for key, current in best.chain:
         for pair in forms:
             if pair[0] in taken:
                 continue
             chain = ordered(tuple(pair if k == key else (k, f) for k, f in best.chain))
-            fit = problem.fit(chain, best_start(problem, chain, best, pair))
-            cost = fit.cost + COST_PER_PARAMETER * max(0, len(pair[1].parameters) - len(current.parameters))
-            if cost < least:
-                found, least = fit, cost
-    return found
+            fit = problem.fit(chain, best_start(problem, chain, best, pair), QUICK_FIT)
+            more = COST_PER_PARAMETER * max(0, len(pair[1].parameters) - len(current.parameters))
+            tried.append((fit.cost + more, fit))
+    cost, quick = min(tried, key=lambda t: t[0], default=(np.inf, best))
+    if cost >= best.cost - ALIKE:
+        return best
+    # Another form of what is there may do as well.
+    own = better_forms(problem, best, forms)
+    return problem.fit(quick.chain, quick.theta) if cost < own.cost - ALIKE else own
 
 
 def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | None:
