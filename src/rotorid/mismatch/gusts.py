@@ -140,10 +140,9 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
     found = [(run, [w for w in own if not beyond_fitted(model, run, *w[:2])]) for run, own in found]
     asked = [wind_term(run, knots_of(a, b, KNOT_S)) for run, own in found for a, b, _ in own]
     if feels_wind(model):
+        # A force that no wind makes through the drag is no gust: it stays unexplained.
         known = asked or restless(model)
-        again = in_moving_air(prepared, model, terms, known) if known else None
-        if again is not None:
-            return again
+        return (in_moving_air(prepared, model, terms, known) if known else None) or model
     forces = [t for run, own in found for t in gust_terms(run, own)]
     if not forces:
         return model
@@ -151,7 +150,7 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
         prepared, terms + forces, chosen(model), model.selection.active, segments, model.noisy_segments
     )
     again = replace(again, wind=model.wind, wind_sd=model.wind_sd)
-    if not feels_wind(model) and feels_wind(again):
+    if feels_wind(again):
         # A strong gust hides the drag through which it is felt; with the gust known as a force it shows.
         return in_moving_air(prepared, again, terms, asked) or again
     return again

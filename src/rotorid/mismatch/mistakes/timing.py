@@ -23,7 +23,9 @@ from rotorid.mismatch.motion import fresh_samples
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 THROUGH_AIR = ("rotors", "commands", "throttle")
-LEAST_ALONE, LEAST_ALONE_DRIFTING = 0.9, 0.95
+LEAST_ALONE = 0.9
+TELLS_A_DRIFT = 0.95
+"""Share of the motion the rotors must explain to tell a drift: disturbances come and go, and so does their lateness."""
 LEAST_EXPLAINED = 0.6
 P_LIMIT = 1e-6
 LEAST_LIKELIHOOD = 60.0
@@ -38,7 +40,8 @@ SMALL_LAGS = {
     "commands": "as motor controllers take; left as part of the motors' lag",
     "throttle": "as motor controllers take; left as part of the motors' lag",
 }
-RUN_AGREEMENT = 0.3
+RUN_AGREEMENT, RUN_SIGMAS = 0.1, 3.0
+"""Share of a drift, and one-sigmas of its own, that a run's drift may be off all runs'."""
 LARGEST_SKEW = 1.2e-2
 LONGEST_DRIFT_S = 0.4
 COARSE_SKEWS = 6
@@ -241,10 +244,8 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
 def differences(known: list, drifting: bool) -> list[Difference]:
     """Every difference of lateness that a comparison is good enough to tell."""
     found = [difference(*c, drifting=drifting) for c in known]
-    # What disturbs the vehicle makes its rotors answer late, which is no clock: there the rotors must explain all,
-    # more so where a lateness that changes, as with disturbances that come and go, is told.
-    alone = LEAST_ALONE_DRIFTING if drifting else LEAST_ALONE
-    return [d for d in found if d.explained > (alone if d.over in THROUGH_AIR else LEAST_EXPLAINED)]
+    # What disturbs the vehicle makes its rotors answer late, which is no clock: there the rotors must explain all.
+    return [d for d in found if d.explained > (LEAST_ALONE if d.over in THROUGH_AIR else LEAST_EXPLAINED)]
 
 
 def across(differences: list[Difference], wrong: list[str], key: int) -> tuple[float, float]:
@@ -268,7 +269,7 @@ def in_every_run(whole: Difference, comparison: tuple) -> bool:
             continue
         d = difference(late, over, own, found, motor_s, drifting=True)
         sd = float(np.sqrt(d.covariance[1, 1]))
-        agree.append(abs(d.growth - whole.growth) < 4 * sd + RUN_AGREEMENT * abs(whole.growth))
+        agree.append(abs(d.growth - whole.growth) < RUN_SIGMAS * sd + RUN_AGREEMENT * abs(whole.growth))
         shown.append(d.growth * whole.growth > 0 and abs(d.growth) > 3 * sd and d.gained > LEAST_LIKELIHOOD / 4)
     return bool(agree) and all(agree) and np.mean(shown) >= 0.6
 
@@ -393,6 +394,8 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     periods = own_period_s(signals)
     telling = []
     for d in found:
+        if d.over in THROUGH_AIR and d.explained < TELLS_A_DRIFT:
+            continue
         sd = float(np.sqrt(d.covariance[1, 1]))
         p = float(2 * student.sf(abs(d.growth) / max(sd, 1e-12), max(d.blocks - 2, 1)))
         drift = abs(d.growth) * longest
