@@ -76,10 +76,9 @@ def reading_forms(instrument):
     if len(loaded) == 1:
         for name, widths in (("two plays", ("narrow", "wide")), ("three plays", tuple(WIDTHS))):
             own = tuple(Parameter(f"h_{n}", UNITS[loaded[0]], meaning=HALF) for n in widths)
-            forms.append(Form(name, text, own, _plays(instrument, loaded, widths)))
+            forms.append(Form(name, text, own, _plays(instrument, loaded[0], widths)))
     else:
-        own = tuple(Parameter(f"h_{n}_{AXES[c]}", UNITS[c], meaning=HALF) for c in loaded for n in WIDTHS)
-        forms.append(Form("three plays", text, own, _plays(instrument, loaded, tuple(WIDTHS))))
+        # Not three for each channel: as many parameters would take in what other causes leave.
         groups = tuple(g for g in (tuple(c for c in loaded if c < 3), tuple(c for c in loaded if c >= 3)) if g)
         own = tuple(
             Parameter(f"h_{n}_{'F' if g[0] < 3 else 'M'}", UNITS[g[0]], meaning=HALF) for g in groups for n in WIDTHS
@@ -99,17 +98,13 @@ def _alike(instrument, loaded):
     return contribution
 
 
-def _plays(instrument, loaded, widths):
-    """Plays of several widths, each with its own height on each channel."""
+def _plays(instrument, channel, widths):
+    """Plays of several widths on one channel."""
     signals = [branches(instrument, WIDTHS[n]) for n in widths]
 
     def contribution(loading, vehicle, values):
         reading = np.zeros((loading.size, 6))
-        heights = np.reshape(values, (len(loaded), len(widths)))
-        for k, signal in enumerate(signals):
-            branch = signal(loading)
-            for c, height in zip(loaded, heights[:, k], strict=True):
-                reading[:, c] += height * branch[:, c]
+        reading[:, channel] = sum(v * s(loading)[:, channel] for v, s in zip(values, signals, strict=True))
         return Contribution(reading=reading)
 
     return contribution
