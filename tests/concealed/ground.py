@@ -2,8 +2,9 @@
 
 Loads are made on a clock ten times finer than the recording's and pass, in this order, through what is hidden in the
 load (rotors, battery, mount, structure) and what is hidden in the reading (sensor, amplifier, clock, steps). Nothing
-here comes from the catalogue under test; creep is a chain of two springs and dampers, hysteresis a sum of plays
-(Prandtl and Ishlinskii), ringing and filters are integrated in time.
+here comes from the catalogue under test; creep is one spring and damper or a chain of two, hysteresis a sum of plays
+(Prandtl and Ishlinskii), ringing and filters are integrated in time (steps of a tenth of a sample, each exact for
+loads that are linear over it, so that an answer's time constants are those of the equation and not of the integrator).
 
 Axes as in the contract: forward-right-down, thrust along -z; the reading is the wrench on the sensor.
 """
@@ -12,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from .write import Recording, plain
 
@@ -132,31 +133,48 @@ def throttles(purpose, t, k, rng):
 
 
 def lagged(x, tau_up, tau_down, dt):
-    """First-order lag on (n, k) with a constant for each direction, explicit small steps."""
+    """First-order lag on (n, k) with a constant for each direction, exact for inputs that are linear over a step."""
+    if tau_up == tau_down:
+        stay, share = held(tau_up, dt)
+        # what the filter remembers of sample 0: input and state both stood at x[0]
+        later, _ = lfilter([1.0 - share, share - stay], [1.0, -stay], x[1:], axis=0, zi=share * x[:1])
+        return np.concatenate([x[:1], later])
     out = np.empty_like(x)
     state = x[0].copy()
-    for i in range(len(x)):
-        tau = np.where(x[i] > state, tau_up, tau_down)
-        state = state + dt / np.maximum(tau, dt) * (x[i] - state)
+    out[0] = state
+    for i in range(1, len(x)):
+        old, new = x[i - 1], x[i]
+        stay, share = held(np.where(0.5 * (old + new) > state, tau_up, tau_down), dt)
+        state = stay * state + (share - stay) * old + (1.0 - share) * new
         out[i] = state
     return out
 
 
+def held(tau, dt):
+    """Share of a lag's state that is left after a step, and its mean over the step."""
+    ratio = dt / np.maximum(tau, 1e-6)
+    return np.exp(-ratio), (1.0 - np.exp(-ratio)) / ratio
+
+
 def oscillator(x, f_hz, zeta, dt):
-    """y'' = ω²(x − y) − 2ζω y', semi-implicit Euler, (n, k), starting at rest on x[0]."""
+    """y'' = ω²(x − y) − 2ζω y', (n, k), starting at rest on x[0]; exact for inputs that are linear over a step.
+
+    The distance from the load obeys e'' + 2ζω e' + ω² e = x'' + 2ζω x'. With the pole p = ω(−ζ + i√(1−ζ²)) and the
+    complex lag z' = p z + x' it is e = Re(z) − (Re p / Im p) Im(z), zero at the start.
+    """
     w = 2 * np.pi * f_hz
-    y, v = x[0].copy(), np.zeros_like(x[0])
-    out = np.empty_like(x)
-    for i in range(len(x)):
-        v = v + dt * (w * w * (x[i] - y) - 2 * zeta * w * v)
-        y = y + dt * v
-        out[i] = y
-    return out
+    pole = w * complex(-zeta, np.sqrt(1.0 - zeta * zeta))
+    turn = np.exp(pole * dt)
+    slope = np.diff(x, axis=0, prepend=x[:1]) / dt
+    z = lfilter([(turn - 1.0) / pole], [1.0, -turn], slope.astype(complex), axis=0)
+    return x - (z.real - pole.real / pole.imag * z.imag)
 
 
-def creep(x, share, t_c, dt):
-    """What two springs and dampers in a chain add: most with t_c, a fifth with 3 t_c."""
-    return share * (0.8 * lagged(x, t_c, t_c, dt) + 0.2 * lagged(x, 3 * t_c, 3 * t_c, dt))
+def creep(x, amount, dt):
+    """What springs and dampers in a chain add to (n, k): pairs of a share c and a time constant t."""
+    if "c" in amount:
+        return amount["c"] * lagged(x, amount["t_c"], amount["t_c"], dt)
+    return sum(amount[f"c_{i}"] * lagged(x, amount[f"t_{i}"], amount[f"t_{i}"], dt) for i in (1, 2))
 
 
 def prandtl_ishlinskii(x, amount, full):
@@ -211,13 +229,12 @@ def sense(plan, load, t, amounts):
                 tau = 1 / (2 * np.pi * amount["f_c"])
                 y = lagged(y, tau, tau, dt)
         elif cause.id == "creep":
-            change = load - load[0]
-            y = y + creep(change, amount["c"], amount["t_c"], dt)
+            y = y + creep(load - load[0], amount, dt)
         elif cause.id == "hysteresis":
+            # Widths and height of the loop belong to the sensor's range: they are the same in every run.
             for k in range(6):
-                span = np.abs(load[:, k] - load[0, k]).max()
-                if span > 0:
-                    y[:, k] += prandtl_ishlinskii(load[:, k] - load[0, k], amount["h"] * span, span)
+                if np.ptp(load[:, k]) > 0:
+                    y[:, k] += prandtl_ishlinskii(load[:, k] - load[0, k], amount["h"] * full[k], full[k])
         elif cause.id == "load_nonlinearity":
             for k in range(6):
                 span = full[k]
@@ -323,7 +340,8 @@ def stand_run(plan, purpose, tilt, amounts, rng):
         thrust, torque = thrust * gains, torque * gains
     if "wall_interference" in found:
         a = found["wall_interference"][1]
-        thrust = thrust - a["c"] * lagged(thrust, a["tau"], a["tau"], dt)
+        # Air that was thrown out comes back as inflow: it takes thrust from a disc that turns, none from one at rest.
+        thrust = thrust * (1 - a["c"] * lagged(speed, a["tau"], a["tau"], dt) / np.maximum(speed, 1e-9))
     height = 0.06 + 0.5 * float(rng.random()) + np.zeros(len(t))
     if "height" in plan.columns:
         height = staircase(t, rng.uniform(0.1, 0.5, 5), 1.0)
@@ -380,6 +398,8 @@ UNIT_OF = {
     "down": "s",
     "T": "s",
     "t_c": "s",
+    "t_1": "s",
+    "t_2": "s",
     "tau": "s",
     "f_c": "Hz",
     "f_n": "Hz",
@@ -422,6 +442,9 @@ def parameters(cause, factor, plan):
     out = {k: v * (factor if k in scaled else 1.0) for k, v in values.items()}
     if cause.id == "creep":
         out["t_c"] = out["t_c"] * plan.seconds
+        if cause.form == "chain":  # most with t_c, a fifth with 3 t_c
+            c, t = out["c"], out["t_c"]
+            out = {"c_1": 0.8 * c, "t_1": t, "c_2": 0.2 * c, "t_2": 3 * t}
     if cause.id == "amplifier_filter":
         out["f_c"] = out["f_c"] / factor
     if cause.id == "structural_resonance":

@@ -10,7 +10,7 @@ from .ground import Cause, GroundPlan
 BENCH = {
     "zero_drift": ({}, ("", "settling"), None),
     "tare_offset": ({}, ("",), None),
-    "creep": ({"runs": ("hold", "updown", "hold")}, ("",), None),
+    "creep": ({"runs": ("hold", "updown", "hold")}, ("", "chain"), None),
     "hysteresis": ({"runs": ("updown", "ramps", "updown")}, ("",), None),
     "load_nonlinearity": ({"runs": ("updown", "ramps", "random")}, ("", "cubic"), None),
     "crosstalk": ({"runs": ("mixed", "updown", "mixed")}, ("",), None),
@@ -26,7 +26,7 @@ FULL = {"runs": MANY, "columns": ("speed",)}
 STAND = {
     "zero_drift": (FULL, ("", "settling"), None),
     "tare_offset": (FULL, ("",), None),
-    "creep": ({**FULL, "runs": ("updown", "stairs", "updown", "stairs"), "seconds": 60.0}, ("",), None),
+    "creep": ({**FULL, "runs": ("updown", "stairs", "updown", "stairs"), "seconds": 60.0}, ("", "chain"), None),
     "hysteresis": ({**FULL, "runs": ("updown", "stairs", "updown", "stairs")}, ("",), None),
     "load_nonlinearity": ({**FULL, "rotors": 1, "tared": True}, ("",), None),
     "crosstalk": (FULL, ("", "z"), None),

@@ -1,11 +1,12 @@
 """A low-pass of the amplifier, common to all channels."""
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
+from scipy.signal import lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.creep import followed
-from rotorid.effects.loading import change_of_load
+from rotorid.effects.loading import change_of_load, unsmoothed
+from rotorid.effects.structural_resonance import resonance
 
 
 def first_order(loading, vehicle, values):
@@ -16,6 +17,7 @@ def first_order(loading, vehicle, values):
 
 def followed_now(load, tau_s, dt_s):
     """The lag without the hold's delay of one sample: linear between samples."""
+    load = unsmoothed(load)
     late = followed(load, tau_s, dt_s)
     ratio = dt_s / max(tau_s, 1e-6)
     share = 1.0 - np.exp(-ratio)
@@ -27,12 +29,9 @@ def followed_now(load, tau_s, dt_s):
 
 
 def second_order(loading, vehicle, values):
-    """Butterworth of second order with cutoff f_c."""
+    """Butterworth of second order with cutoff f_c: as a structure with a damping ratio of √½."""
     load = change_of_load(loading)
-    w = 2 * np.pi * min(max(values[0], 1e-3), 0.45 / loading.dt_s)
-    w = 2 / loading.dt_s * np.tan(w * loading.dt_s / 2)
-    b, a = bilinear([w * w], [1.0, np.sqrt(2) * w, w * w], 1.0 / loading.dt_s)
-    return Contribution(reading=lfilter(b, a, load, axis=0) - load)
+    return Contribution(reading=resonance(load, values[0], np.sqrt(0.5), loading.dt_s) - load)
 
 
 def reading_forms(instrument):

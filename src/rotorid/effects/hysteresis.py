@@ -8,7 +8,9 @@ from rotorid.effects.loading import AXES, UNITS, change_of_load, cross_channels,
 
 HALF = "half the height of the loop"
 NARROW, WIDE = 0.02, 0.15
+MIDDLE = (NARROW * WIDE) ** 0.5
 """Half widths of the play as shares of the largest load."""
+WIDTHS = {"narrow": NARROW, "middle": MIDDLE, "wide": WIDE}
 
 
 @njit(cache=True)
@@ -72,8 +74,16 @@ def reading_forms(instrument):
     shares = tuple(Parameter(f"h_{n}", "1", meaning=HALF + " by the largest load") for n in ("narrow", "wide"))
     forms.append(Form("two plays, alike on all channels", text, shares, _alike(instrument, loaded)))
     if len(loaded) == 1:
-        own = tuple(Parameter(f"h_{n}", UNITS[loaded[0]], meaning=HALF) for n in ("narrow", "wide"))
-        forms.append(Form("two plays", text, own, _two_plays(instrument, loaded[0])))
+        for name, widths in (("two plays", ("narrow", "wide")), ("three plays", tuple(WIDTHS))):
+            own = tuple(Parameter(f"h_{n}", UNITS[loaded[0]], meaning=HALF) for n in widths)
+            forms.append(Form(name, text, own, _plays(instrument, loaded[0], widths)))
+    else:
+        # Not three for each channel: as many parameters would take in what other causes leave.
+        groups = tuple(g for g in (tuple(c for c in loaded if c < 3), tuple(c for c in loaded if c >= 3)) if g)
+        own = tuple(
+            Parameter(f"h_{n}_{'F' if g[0] < 3 else 'M'}", UNITS[g[0]], meaning=HALF) for g in groups for n in WIDTHS
+        )
+        forms.append(Form("three plays, alike on forces and on moments", text, own, _of_a_range(instrument, groups)))
     return tuple(forms)
 
 
@@ -88,12 +98,29 @@ def _alike(instrument, loaded):
     return contribution
 
 
-def _two_plays(instrument, channel):
-    signals = [branches(instrument, share) for share in (NARROW, WIDE)]
+def _plays(instrument, channel, widths):
+    """Plays of several widths on one channel."""
+    signals = [branches(instrument, WIDTHS[n]) for n in widths]
 
     def contribution(loading, vehicle, values):
         reading = np.zeros((loading.size, 6))
         reading[:, channel] = sum(v * s(loading)[:, channel] for v, s in zip(values, signals, strict=True))
+        return Contribution(reading=reading)
+
+    return contribution
+
+
+def _of_a_range(instrument, groups):
+    """Plays of a sensor whose forces have one range, and its moments another: the same widths and heights on each."""
+    largest = {g: max(instrument.largest[c] for c in g) for g in groups}
+
+    def contribution(loading, vehicle, values):
+        reading, load = np.zeros((loading.size, 6)), change_of_load(loading)
+        for group, heights in zip(groups, np.reshape(values, (len(groups), len(WIDTHS))), strict=True):
+            for share, height in zip(WIDTHS.values(), heights, strict=True):
+                width = share * largest[group]
+                for c in group:
+                    reading[:, c] += height * (load[:, c] - play(load[:, c], width)) / width
         return Contribution(reading=reading)
 
     return contribution
@@ -111,9 +138,9 @@ EFFECT = Effect(
         "by h while it falls; negative h is a reading that hangs behind its load"
     ),
     validity=(
-        "a loop independent of the rate of loading, by play operators whose half widths are 2 and 15 per cent "
-        "of the largest load; shows only where loads come back from above, and what was loaded before the run "
-        "is not known"
+        "a loop independent of the rate of loading, by play operators whose half widths are 2, 5 and 15 per cent of "
+        "the largest load; shows only where loads come back from above, and what was loaded before the run is not "
+        "known"
     ),
     excited_by=("load_change",),
     confusers=("creep", "amplifier_filter", "motor_lag"),

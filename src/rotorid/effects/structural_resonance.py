@@ -1,17 +1,26 @@
 """A stand that rings at a frequency of its own."""
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import change_of_load
+from rotorid.effects.loading import change_of_load, unsmoothed
 
 
 def resonance(signal, frequency_hz, damping, dt_s):
-    """ω_n²/(s² + 2 ζ ω_n s + ω_n²) on (n, k), exact for inputs that are linear between samples, from rest."""
+    """ω_n²/(s² + 2 ζ ω_n s + ω_n²) on (n, k), from rest; the gain holds far up to half the rate."""
+    b, a = recursion(float(frequency_hz), float(damping), float(dt_s))
+    return lfilter(b, a, unsmoothed(signal), axis=0)
+
+
+@lru_cache(maxsize=256)
+def recursion(frequency_hz, damping, dt_s):
+    """Coefficients of the recursion, exact for inputs that are linear between samples."""
     w = 2 * np.pi * max(frequency_hz, 1e-3)
     b, a, _ = cont2discrete(([w * w], [1.0, 2 * max(damping, 1e-4) * w, w * w]), dt_s, method="foh")
-    return lfilter(b[0], a, signal, axis=0)
+    return b[0], a
 
 
 def ringing(loading, vehicle, values):

@@ -7,6 +7,9 @@ from rotorid.effects.creep import followed
 from rotorid.effects.loading import at_sensor
 from rotorid.effects.scale import rotor_radius_m
 
+STOPPED_RAD_S = 1.0
+"""Below this speed a rotor counts as at rest."""
+
 
 def thrust_part(gain, loading, vehicle):
     """Reading of the believed thrust times a gain (n, k)."""
@@ -19,10 +22,14 @@ def thrust_part(gain, loading, vehicle):
 
 
 def recirculation(loading, vehicle, values):
-    """T_i = (1 − c LP_τ) C_F ω_i²: air takes τ to come round, then the rotor works in its own wake."""
-    thrust = vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2
-    gain = -values[0] * followed(thrust, values[1], loading.dt_s) / np.maximum(thrust, 1e-9)
-    return Contribution(reading=thrust_part(np.where(thrust > 1e-9, gain, 0.0), loading, vehicle))
+    """T_i = C_F ω_i (ω_i − c LP_τ ω_i): air thrown out goes as the speed, and comes round as inflow after τ.
+
+    Inflow w takes k ω w from the thrust of a turning rotor, and nothing from one at rest.
+    """
+    speed = loading.motion.rotor_speed
+    late = followed(speed, values[1], loading.dt_s)
+    gain = np.where(speed > STOPPED_RAD_S, -values[0] * late / np.maximum(speed, STOPPED_RAD_S), 0.0)
+    return Contribution(reading=thrust_part(gain, loading, vehicle))
 
 
 def by_distance(loading, vehicle, values):
@@ -41,7 +48,7 @@ def reading_forms(instrument):
         forms.append(
             Form(
                 "recirculation",
-                "T = C_F ω² − c (C_F ω² after a lag of τ)",
+                "T = C_F ω² − c C_F ω (ω after a lag of τ)",
                 (
                     Parameter("c", "1", 0.0, 0.5, meaning="share of the thrust"),
                     Parameter(

@@ -84,10 +84,15 @@ def effort(segments: list[Segment]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def _changes(loading: Loading) -> np.ndarray:
-    """Squares of the rates of the loads and of the loads themselves, (n, 4)."""
+    """Squares of the rates of the loads, of the loads themselves and of the rotors' speeds, (n, 5).
+
+    A speed sensor's noise is a share of the speed: its square grows with the thrust, not with the thrust's square.
+    """
     rate = np.gradient(loading.load, loading.dt_s, axis=0) ** 2
     size = (loading.load - loading.rest) ** 2
-    return np.stack([rate[:, :3].sum(1), rate[:, 3:].sum(1), size[:, :3].sum(1), size[:, 3:].sum(1)], axis=1)
+    speed = loading.motion.rotor_speed
+    turning = np.zeros(loading.size) if speed is None else (speed**2).mean(axis=1)
+    return np.stack([rate[:, :3].sum(1), rate[:, 3:].sum(1), size[:, :3].sum(1), size[:, 3:].sum(1), turning], axis=1)
 
 
 def _series(finding: Finding, segments: list[Segment], vehicle) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.clock_skew import between_samples, weights_of_four
 from rotorid.effects.contract import SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.findings import Estimate, Finding, Trace
@@ -46,6 +47,9 @@ LEAST_BLOCKS = 12
 MOST_BLOCKS = 400
 STEADY_BLOCKS = 40
 SHORT = 60
+ROUNDS = 2
+FINER = 4
+"""Steps of a chain that takes time to one sample."""
 ALIKE = 12.0
 """Whitened squares within which another form explains as well."""
 
@@ -80,16 +84,39 @@ class ChainResult:
 
 
 def applied(loading: Loading, chain: Chain, values, full_speed: float, first_full: float, volts) -> np.ndarray:
-    """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed."""
-    speed = loading.command * (full_speed / first_full)
+    """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed.
+
+    Between samples a command is taken as smooth: the chain runs on a clock FINER times faster. (A command that holds
+    until the next is then half a sample late: offsets in time below a sample are a nuisance anyway.)
+    """
+    timed = any(form.excited_by == "change" for _, form in chain)
+    finer = FINER if timed else 1
+    command, time_s = between(loading.command, finer), between(loading.time_s, finer)
+    voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
+    speed = command * (full_speed / first_full)
     at = 0
     for _, form in chain:
-        path = SpeedPath(speed, loading.time_s, full_speed, loading.motion.voltage, volts)
+        path = SpeedPath(speed, time_s, full_speed, voltage, volts)
         # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
         with np.errstate(invalid="ignore"):
             speed = np.nan_to_num(form.apply(path, np.asarray(values[at : at + len(form.parameters)])))
         at += len(form.parameters)
-    return speed
+    return speed[::finer]
+
+
+def between(values: np.ndarray, finer: int) -> np.ndarray:
+    """Samples (n,) or (n, k) with `finer` − 1 more between any two."""
+    if finer == 1 or len(values) < 4:
+        return np.repeat(values, finer, axis=0)[: (len(values) - 1) * finer + 1]
+    out = np.empty(((len(values) - 1) * finer + 1, *values.shape[1:]))
+    out[::finer] = values
+    for k in range(1, finer):
+        # As between_samples, with the same four weights in the whole interior.
+        ends = between_samples(values.reshape(len(values), -1), np.array([0.0, len(values) - 2]) + k / finer)
+        out[k], out[k - finer - 1] = ends[0].reshape(values.shape[1:]), ends[1].reshape(values.shape[1:])
+        weights = weights_of_four(1.0 + k / finer)
+        out[finer + k : -finer : finer] = sum(w * values[i : len(values) - 3 + i] for i, w in enumerate(weights))
+    return out
 
 
 class Problem:
@@ -328,6 +355,23 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
     problem.learn((), problem.neutral(), coloured=False)
     best = problem.fit((), problem.neutral())
     dropped: dict[str, str] = {}
+    for _ in range(ROUNDS):
+        best = grown(problem, best, forms, dropped)
+        problem.learn(best.chain, best.theta)
+        best = problem.fit(best.chain, best.theta)
+        names = {key for key, _ in best.chain}
+        best = exchanged(problem, best, forms)
+        new = {key for key, _ in best.chain} - names
+        if not new:
+            break
+        # What came in another's place is whitened by its own residual, and beside it others may be needed.
+        dropped = {key: reason for key, reason in dropped.items() if key not in new}
+    best = pruned(problem, better_forms(problem, best, forms), dropped)
+    return worded(problem, best, forms, dropped)
+
+
+def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainFit:
+    """The chain with forms added one by one as long as they explain more; why others did not enter in `dropped`."""
     for _ in range(MOST_FORMS):
         # Whitening by the residual of the richest chain seen: by a poor one's, everything would look like noise.
         problem.learn(best.chain, best.theta, coloured=bool(best.chain))
@@ -340,22 +384,39 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
             fit = problem.fit(chain, best_start(problem, chain, best, pair), QUICK_FIT)
             tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
         tried.sort(key=lambda t: -t[0])
-        grown = False
+        entered = False
         for score, pair, fit in tried[:MOST_TRIED]:
             if score <= 0:
                 break
             fit = problem.fit(fit.chain, fit.theta)
             reason = weakness(problem, fit, best, pair)
             if reason is None:
-                best, grown = fit, True
+                best, entered = fit, True
                 break
             dropped.setdefault(pair[0], reason)
-        if not grown:
+        if not entered:
             break
-    problem.learn(best.chain, best.theta)
-    best = problem.fit(best.chain, best.theta)
-    best = pruned(problem, better_forms(problem, best, forms), dropped)
-    return worded(problem, best, forms, dropped)
+    return best
+
+
+def exchanged(problem: Problem, best: ChainFit, forms) -> ChainFit:
+    """The chain with an id in another's place where that explains clearly more: what entered first need not be true."""
+    taken = {key for key, _ in best.chain}
+    tried = []
+    for key, current in best.chain:
+        for pair in forms:
+            if pair[0] in taken:
+                continue
+            chain = ordered(tuple(pair if k == key else (k, f) for k, f in best.chain))
+            fit = problem.fit(chain, best_start(problem, chain, best, pair), QUICK_FIT)
+            more = COST_PER_PARAMETER * max(0, len(pair[1].parameters) - len(current.parameters))
+            tried.append((fit.cost + more, fit))
+    cost, quick = min(tried, key=lambda t: t[0], default=(np.inf, best))
+    if cost >= best.cost - ALIKE:
+        return best
+    # Another form of what is there may do as well.
+    own = better_forms(problem, best, forms)
+    return problem.fit(quick.chain, quick.theta) if cost < own.cost - ALIKE else own
 
 
 def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | None:
@@ -451,12 +512,11 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
         tuple(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)) if problem.measured else ("force_z",)
     )
     findings = []
-    lags = any(k == "motor_lag" for k, _ in best.chain)
     dt_s = 1.0 / setup.instrument.rate_hz
     for key, form in best.chain:
         where = place_of(best.chain, key, problem.scaled)
-        if key == "delay" and abs(best.theta[where][0] + lags * dt_s) <= SUB_SAMPLE * dt_s:
-            continue  # the lag's own step of one sample taken back, or less than a sample: no finding
+        if key == "delay" and abs(best.theta[where][0]) <= SUB_SAMPLE * dt_s:
+            continue  # less than a sample: no finding
         values, deviation = best.theta[where], sd[where]
         p = p_value(values - np.array(form.neutral), covariance[where, where], count)
         others = alternatives(problem, best, key, forms)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
@@ -32,6 +34,8 @@ NO_ROTORS = "a bench has no rotors"
 SPEED_IDS = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 MISTAKES = ("axis_sign", "unit_error", "rotor_order", "spin_direction", "sensor_dropout")
 OFFSET = "offset:load-reading"
+AtWork = Sequence[tuple[Form, np.ndarray]]
+"""Forms with their parameter values."""
 DISPLACED = ("velocity", "angular_velocity", "angular_acceleration", "specific_force", "accelerometer", "gyroscope")
 
 
@@ -159,12 +163,13 @@ def value_column(key: str, loading: Loading, vehicle: Vehicle) -> np.ndarray:
     return rotor_wrench(loading.motion, still) - rotor_wrench(loading.motion, flat)
 
 
-def term_columns(term: Term, loading: Loading, vehicle: Vehicle) -> list[np.ndarray]:
-    """Columns of a term, (n, 6) each."""
+def term_columns(term: Term, loading: Loading, vehicle: Vehicle, at_work: AtWork = ()) -> list[np.ndarray]:
+    """Columns of a term, (n, 6) each; the offset in time moves the load with what is `at_work` on its reading."""
     if term.kind == "value":
         return [value_column(term.key, loading, vehicle)]
     if term.kind == "nuisance":
-        return [np.gradient(loading.load, loading.dt_s, axis=0)]
+        predicted = sum((form_reading(form, values, loading, vehicle) for form, values in at_work), loading.load)
+        return [np.gradient(predicted, loading.dt_s, axis=0)]
     form, values = term.form, np.asarray(term.values, float)
     if term.slope_of is not None:
         step = 1e-3 * max(abs(values[term.slope_of]), 1e-6)
@@ -183,8 +188,11 @@ def term_columns(term: Term, loading: Loading, vehicle: Vehicle) -> list[np.ndar
     return columns
 
 
-def rows_of(setup: Setup, terms: list[Term], loadings=None) -> list[Rows]:
-    """Rows of every stretch's parts, averaged; a channel that is not compared is NaN in y and zero in x."""
+def rows_of(setup: Setup, terms: list[Term], loadings=None, at_work: AtWork = ()) -> list[Rows]:
+    """Rows of every stretch's parts, averaged; a channel that is not compared is NaN in y and zero in x.
+
+    `at_work` are the effects known so far: what a reading's clock is off moves their part of it as well.
+    """
     out = []
     channels = list(setup.instrument.channels)
     for loading in setup.loadings if loadings is None else loadings:
@@ -197,7 +205,7 @@ def rows_of(setup: Setup, terms: list[Term], loadings=None) -> list[Rows]:
         x = np.zeros((len(small), 6, sum(t.size for t in terms)))
         at = 0
         for term in terms:
-            for column in term_columns(term, loading, setup.vehicle):
+            for column in term_columns(term, loading, setup.vehicle, at_work):
                 x[:, channels, at] = averaged(column[:, channels], setup.average)
                 at += 1
         out += [Rows(loading.run, times[p], small[p], x[p]) for p in pieces]

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.instrument.columns import rows_of, term_columns
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
@@ -36,7 +37,9 @@ TARE_MARGIN = 2.0
 LEAST_BLOCKS_OF_A_RUN = 5
 EXCITED_SHARE = 0.1
 MAIN_SHARE = 0.2
-ROUNDS = 3
+ROUNDS = 4
+SETTLED = 1e-3
+"""Relative change of nonlinear parameters from round to round below which they have settled."""
 REFUTED = 12.0
 """Whitened squares by which another effect may do worse on the runs held out before it is no alternative."""
 LEAST_HELD_OUT = 4
@@ -289,13 +292,19 @@ def modest(terms: list[Term], most: int) -> np.ndarray:
     return np.array(sorted(chosen), int)
 
 
+def whole_reading(terms: list[Term], active) -> list[tuple[Form, np.ndarray]]:
+    """Forms at work that change the reading as a whole, gain one: filters, resonances, other clocks."""
+    chosen = [t for t in terms if t.key in (active or ()) and t.kind == "effect" and not t.form.linear]
+    return [(t.form, np.array(t.values, float)) for t in chosen]
+
+
 def reading_model(
     setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None
 ) -> ReadingModel:
-    """Rows, regression and search; `filters` (noise, taps) of an earlier round are kept where given."""
+    """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept."""
     loadings = setup.loadings if loadings is None else loadings
-    rows = rows_of(setup, terms, loadings)
-    noise, taps = filters if filters is not None else noise_and_filters(setup, terms, rows)
+    rows = rows_of(setup, terms, loadings, whole_reading(terms, active))
+    noise, taps = noise_and_filters(setup, terms, rows) if filters is None else filters
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz)
@@ -332,7 +341,7 @@ def whitened(model: ReadingModel, values: list[np.ndarray]) -> list[np.ndarray]:
     return [np.stack([lfilter(taps[c], [1.0], v[:, c])[longest:] for c in taps], axis=1).ravel() for v in values]
 
 
-def refined(model: ReadingModel, loadings=None) -> list[Term]:
+def refined(model: ReadingModel) -> list[Term]:
     """Terms with the nonlinear parameters of those at work fitted, all linear ones free (variable projection)."""
     setup, search = model.setup, model.search
     moving = [k for k in model.selection.active if search.terms[k].form.nonlinear]
@@ -347,7 +356,8 @@ def refined(model: ReadingModel, loadings=None) -> list[Term]:
     for i, k in enumerate(owner):
         index[i] = pieces_of(stretches[k], setup.average)[i - owner.index(k)]
     channels = list(setup.instrument.channels)
-    fixed = [k for k in (*search.always, *model.selection.active) if k not in moving]
+    timing = [k for k in search.always if search.terms[k].kind == "nuisance"]
+    fixed = [k for k in (*search.always, *model.selection.active) if k not in moving and k not in timing]
     reg = model.regression
 
     def white(values):
@@ -368,13 +378,14 @@ def refined(model: ReadingModel, loadings=None) -> list[Term]:
             out[k][i] = value
         return {k: replace(search.terms[k], values=tuple(v)) for k, v in out.items()}
 
-    def columns_of(term):
+    def columns_of(term, whole_forms=()):
         whole: dict[int, list[np.ndarray]] = {}
         parts = []
         for i in fitted:
             k = owner[i]
             if k not in whole:
-                whole[k] = [averaged(x, setup.average) for x in term_columns(term, stretches[k], setup.vehicle)]
+                columns = term_columns(term, stretches[k], setup.vehicle, whole_forms)
+                whole[k] = [averaged(x, setup.average) for x in columns]
             block = []
             for column in whole[k]:
                 full = np.zeros((len(index[i]), 6))
@@ -386,8 +397,14 @@ def refined(model: ReadingModel, loadings=None) -> list[Term]:
     def residual(theta):
         target, free = y, list(base)
         weights = list(prior)
-        for term in with_values(theta).values():
-            own = columns_of(term)
+        moved = list(with_values(theta).values())
+        whole = whole_reading(moved, moving)
+        for term in [*(search.terms[k] for k in timing), *moved]:
+            own = columns_of(term, whole)
+            if term.kind == "nuisance":
+                free += own
+                weights += [1.0 / term.prior_sd[0] ** 2]
+                continue
             if term.form.linear:
                 free += own
                 weights += [0.0] * len(own)
@@ -410,19 +427,29 @@ def refined(model: ReadingModel, loadings=None) -> list[Term]:
 
 
 def fitted_model(setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None) -> ReadingModel:
-    """Search and refinement in turn until the same terms come out."""
+    """Search and refinement in turn until the same terms with the same values come out.
+
+    What is noise is learnt anew after the first refinement: whitened by a ring or a lag that no column had before it,
+    the regression would be deaf at the very frequencies where the effect shows.
+    """
     model = reading_model(setup, terms, active, loadings)
-    for _ in range(ROUNDS):
-        before = set(model.selection.active)
-        if not any(model.search.terms[k].form.nonlinear for k in before):
+    for number in range(ROUNDS):
+        before, start = model.selection.active, nonlinear_values(model)
+        if not len(start):
             break
-        terms = refined(model, loadings)
-        again = reading_model(setup, terms, model.selection.active, loadings, (model.noise, model.regression.filters))
-        same = set(again.selection.active) == before
-        model = again
-        if same:
+        terms = refined(model)
+        kept = (model.noise, model.regression.filters) if number else None
+        model = reading_model(setup, terms, before, loadings, kept)
+        values = nonlinear_values(model)
+        if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=SETTLED):
             break
     return model
+
+
+def nonlinear_values(model: ReadingModel) -> np.ndarray:
+    """Nonlinear parameters of all terms at work, in their order."""
+    terms = [model.search.terms[k] for k in sorted(model.selection.active)]
+    return np.array([t.values[i] for t in terms for i in t.form.nonlinear])
 
 
 def active_values(model: ReadingModel, key: str) -> np.ndarray:
@@ -452,7 +479,7 @@ def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndar
     ]
     if not term.form.linear:
         chosen = [t for t in chosen if t.key != key]
-    rows = rows_of(setup, [*chosen, *slopes], loadings)
+    rows = rows_of(setup, [*chosen, *slopes], loadings, whole_reading(at_work, model.selection.active))
     if not term.form.linear:
         # The form itself, at gain one, is in the model: only its slopes are fitted.
         known = rows_of(setup, [own], loadings)
