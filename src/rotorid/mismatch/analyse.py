@@ -139,7 +139,11 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     findings, told = with_square_term(findings, told, model)
     told = without_values_in_question(findings, told)
     before, after, depends = dependence(prepared, model, segments)
-    share, channels, depends, description = leftover(prepared, model, segments, noisy, before, after, depends)
+    claimed = bool(values) or any(f.status in ("established", "ambiguous") for f in findings)
+    delivered = delivered_residuals(model, values, plain_values) if claimed else None
+    share, channels, depends, description = leftover(
+        prepared, model, segments, noisy, before, after, depends, delivered
+    )
     findings = together(findings)
     fly = next_flight(findings, prepared, model.noise)
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}

@@ -164,12 +164,13 @@ def _spectrum(parts, rate_hz: float):
     return spectra[0][0], sum(s[1] * len(p) for s, p in zip(spectra, long, strict=True)) / total
 
 
-def leftover(prepared, model, segments, noisy, before, after, depends):
+def leftover(prepared, model, segments, noisy, before, after, depends, delivered=None):
     """Share of the mismatch that no named effect explains, its channels, on what it depends, and a plain description.
 
-    Three things count: empirical terms that won against the catalogue, what a ridge regression on all inputs and
-    their products ("whatever could be explained") still finds, fitted on the training runs and judged held out, and
-    slow changes that no sensor's noise can have made.
+    Four things count: empirical terms that won against the catalogue, what a ridge regression on all inputs and
+    their products ("whatever could be explained") still finds, fitted on the training runs and judged held out,
+    slow changes that no sensor's noise can have made, and what the residuals `delivered` ((n, 12) per stretch; None
+    where nothing is claimed) keep because no believed value by itself could be called wrong.
     """
     slow = slow_excess(prepared, model, segments, noisy)
     names, inputs = _stack(prepared, segments)
@@ -184,7 +185,7 @@ def leftover(prepared, model, segments, noisy, before, after, depends):
     gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
     weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
     total_before = total_after = 0.0
-    channels, gains = [], []
+    channels, gains, unsettled = [], [], []
     for c in range(6):
         name = CHANNELS[c]
         if name not in after:
@@ -206,11 +207,14 @@ def leftover(prepared, model, segments, noisy, before, after, depends):
         # What moves slowly is no noise: shares are of what the named effects could have explained.
         flexible = max(flexible - moving, 0.1 * flexible)
         total_before += max(start - flexible, 0.0) / flexible
-        if not (seen or diffuse or moving):
+        told = energy if delivered is None else sum(float(delivered[i][:, c] @ delivered[i][:, c]) for i in judged)
+        kept = kept_by_values(told, energy + outside, count * noise)
+        if not (seen or diffuse or moving or kept):
             continue
         channels.append(name)
         gone = (outside if seen else 0.0) + (energy - flexible if diffuse else 0.0)
-        gone = max(gone, moving)
+        gone = max(gone, moving) + kept
+        unsettled += [name] if kept else []
         total_after += gone / flexible
         gains.append(
             f"{name} from {np.sqrt((flexible + gone) / count):.3g} to {np.sqrt(flexible / count):.3g} {_unit(name)}"
@@ -226,9 +230,20 @@ def leftover(prepared, model, segments, noisy, before, after, depends):
         peaks = [f"{name} around {hz:.1f} Hz, {rms:.2g} {_unit(name)} rms" for name, (rms, hz) in slow.items()]
         moving = f"it changes slowly in a way that no column follows ({'; '.join(peaks)})"
         causes = f"{causes} and {moving}" if causes else moving
-    text = causes or f"{', '.join(channels)} still depend on {' and '.join(depends) or 'the inputs'}"
-    text += f"; the cause is not in the catalogue (a plain empirical term would lower {', '.join(gains)})"
+    if causes or not unsettled:
+        causes = causes or f"{', '.join(channels)} still depend on {' and '.join(depends) or 'the inputs'}"
+        causes += "; the cause is not in the catalogue"
+    if unsettled:
+        values = f"what is left of {', '.join(unsettled)} cannot be put down to any one believed value"
+        causes = f"{causes}; {values}" if causes else values
+    text = f"{causes} (a plain empirical term would lower {', '.join(gains)})"
     return float(min(1.0, total_after / max(total_before, 1e-9))), tuple(channels), tuple(depends), text
+
+
+def kept_by_values(delivered: float, fitted: float, noise: float) -> float:
+    """Energy that what is delivered leaves beyond the model with every value free (`fitted`); 0 below the noise's."""
+    kept = delivered - fitted
+    return kept if kept > noise else 0.0
 
 
 def _unit(channel: str) -> str:

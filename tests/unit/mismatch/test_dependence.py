@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rotorid.mismatch.dependence import _features, _wald, probes
+from rotorid.mismatch.dependence import _features, _wald, kept_by_values, probes
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.rows import Thinner
 
@@ -73,3 +73,9 @@ def test_the_inputs_are_those_the_recording_has():
 
 def test_products_of_inputs():
     np.testing.assert_array_equal(_features(np.array([[2.0, 3.0]])), [[2, 3, 4, 6, 9]])
+
+
+def test_what_free_values_explain_and_no_wrong_value_tells_is_left_over():
+    """A residual of 5 where the fit with every value free leaves 2, noise of 1: 3 are kept; of 2.5, nothing."""
+    assert kept_by_values(5.0, 2.0, 1.0) == 3.0
+    assert kept_by_values(2.5, 2.0, 1.0) == 0.0
