@@ -15,6 +15,8 @@ from rotorid.mismatch.unknowns import DEPENDS_ON, UNKNOWNS
 ALARM_P = 1e-5
 SMALLEST_SHARE_OF_NOISE = 0.3
 """A left-over dependence below this share of the noise is not worth a word."""
+MOST_BY_VALUES = 0.8
+"""Share up to which mismatch that some believed value would explain counts as left over: its kind is known."""
 BLOCK_S = 2.0
 SLOW_BANDS_HZ = ((0.15, 0.7), (0.7, 2.5))
 FAST_BAND = (0.3, 0.75)
@@ -184,7 +186,7 @@ def leftover(prepared, model, segments, noisy, before, after, depends, delivered
     size = features[0].shape[1]
     gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
     weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
-    total_before = total_after = 0.0
+    total_before = total_after = by_values = 0.0
     channels, gains, unsettled = [], [], []
     for c in range(6):
         name = CHANNELS[c]
@@ -213,9 +215,11 @@ def leftover(prepared, model, segments, noisy, before, after, depends, delivered
             continue
         channels.append(name)
         gone = (outside if seen else 0.0) + (energy - flexible if diffuse else 0.0)
-        gone = max(gone, moving) + kept
-        unsettled += [name] if kept else []
+        gone = max(gone, moving)
         total_after += gone / flexible
+        by_values += kept / flexible
+        gone += kept
+        unsettled += [name] if kept else []
         gains.append(
             f"{name} from {np.sqrt((flexible + gone) / count):.3g} to {np.sqrt(flexible / count):.3g} {_unit(name)}"
         )
@@ -237,7 +241,9 @@ def leftover(prepared, model, segments, noisy, before, after, depends, delivered
         values = f"what is left of {', '.join(unsettled)} cannot be put down to any one believed value"
         causes = f"{causes}; {values}" if causes else values
     text = f"{causes} (a plain empirical term would lower {', '.join(gains)})"
-    return float(min(1.0, total_after / max(total_before, 1e-9))), tuple(channels), tuple(depends), text
+    share = total_after / total_before
+    share = max(share, min(share + by_values / total_before, MOST_BY_VALUES))
+    return float(min(1.0, share)), tuple(channels), tuple(depends), text
 
 
 def kept_by_values(delivered: float, fitted: float, noise: float) -> float:
