@@ -321,9 +321,14 @@ def plain_sentence(
     """What a pilot is told: where, how much, what was left out, with which numbers, and how much better it gets."""
     if word == "no_mismatch":
         return _agreement(analysis, channels)
+    established = with_status(analysis, "established")
+    claimed_else = analysis.values or with_status(analysis, "ambiguous")
+    if word == "explained" and not claimed_else and all(_concerns_the_recording(f) for f in established):
+        said = [capital(f.sentence.rstrip(".")) + "." for f in established]
+        return " ".join([*said, _agreement(analysis, channels, "Apart from that the believed vehicle")])
     main = main_channel(analysis, locations, channels)
     parts = [_where(main, locations, channels, analysis)]
-    parts += [_left_out(f, k == 0) for k, f in enumerate(with_status(analysis, "established"))]
+    parts += [_left_out(f, k == 0) for k, f in enumerate(established)]
     parts += [_either(f, analysis) for f in one_per_class(with_status(analysis, "ambiguous"))]
     parts += [_wrong(name, values) for name, values in analysis.values.items()]
     if with_status(analysis, "established", "ambiguous") or analysis.values:
@@ -331,6 +336,11 @@ def plain_sentence(
     if word != "explained":
         parts.append(_rest(analysis, locations))
     return " ".join(p for p in parts if p)
+
+
+def _concerns_the_recording(finding: Finding) -> bool:
+    """Whether a finding is a fault of the recording itself, put right before any physics was looked at."""
+    return finding.form is None and not finding.equation and bool(finding.sentence)
 
 
 def one_per_class(findings: Sequence[Finding]) -> list[Finding]:
@@ -476,7 +486,7 @@ def _rest(analysis: Analysis, locations: Sequence[Location]) -> str:
     return text + "."
 
 
-def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
+def _agreement(analysis: Analysis, channels: Mapping[str, Channel], who: str = "The believed vehicle") -> str:
     shown = [c for c in ("force_z", "force_x", "moment_x", "moment_z") if c in channels] or list(channels)
     chosen = shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]
     left = listed(
@@ -487,10 +497,10 @@ def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
         ]
     )
     if not left:
-        return "Nothing was found that the believed vehicle leaves out."
+        return f"{who} leaves out nothing that was found."
     where = _either_split(channels[chosen[0]])[1]
     return (
-        f"The believed vehicle describes these recordings: the error that is left {where}, {left}, does not depend on "
+        f"{who} describes these recordings: the error that is left {where}, {left}, does not depend on "
         "how it was flown."
     )
 

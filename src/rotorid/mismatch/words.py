@@ -85,8 +85,8 @@ GROUND_WORDS = (
     ("The believed vehicle describes", "The believed values describe"),
     ("the believed vehicle describes", "the believed values describe"),
     (
-        "Nothing was found that the believed vehicle leaves out.",
-        "Nothing was found that the believed values leave out.",
+        "The believed vehicle leaves out nothing that was found.",
+        "The believed values leave out nothing that was found.",
     ),
     ("forward force", "force along x"),
     ("sideways force", "force along y"),

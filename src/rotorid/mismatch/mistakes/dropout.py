@@ -59,7 +59,7 @@ def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     first = where[0]
     more = "" if len(where) == 1 else f" and {len(where) - 1} more stretch{'es' if len(where) > 2 else ''}"
     sentence = (
-        f"{', '.join(columns)} dropped out ({kinds} readings) in {first[0]} from {first[1]:.2f} s to {first[2]:.2f} s"
+        f"Readings of {', '.join(columns)} dropped out ({kinds}) in {first[0]} from {first[1]:.2f} s to {first[2]:.2f} s"
         f"{more}; these samples were left out."
     )
     finding = Finding(
