@@ -59,8 +59,8 @@ def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     first = where[0]
     more = "" if len(where) == 1 else f" and {len(where) - 1} more stretch{'es' if len(where) > 2 else ''}"
     sentence = (
-        f"Readings of {', '.join(columns)} dropped out ({kinds}) in {first[0]} from {first[1]:.2f} s to {first[2]:.2f} s"
-        f"{more}; these samples were left out."
+        f"Readings of {', '.join(columns)} dropped out ({kinds}) in {first[0]} "
+        f"from {first[1]:.2f} s to {first[2]:.2f} s{more}; these samples were left out."
     )
     finding = Finding(
         id="sensor_dropout",
