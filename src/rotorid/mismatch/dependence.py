@@ -83,13 +83,23 @@ def dependence(prepared, model, segments):
             continue
         taps = model.regression.filters[c]
         raw = [r.y[:, c] for r in model.rows]
-        left = [r.y[:, c] - r.x[:, c][:, full.columns] @ named for r in model.rows]
+        left = left_by(model.rows, c, full.columns, named)
         before[CHANNELS[c]], _ = _wald(raw, inputs, taps, prepared.thinner.rate_hz)
         after[CHANNELS[c]], t = _wald(left, inputs, taps, prepared.thinner.rate_hz)
         if after[CHANNELS[c]] < ALARM_P:
             for i in np.argsort(-np.abs(t))[:2]:
                 depends.setdefault(names[i], 0)
     return before, after, list(depends)
+
+
+def left_by(rows, channel: int, columns, beta) -> list[np.ndarray]:
+    """What coefficients leave of a channel, (n,) per stretch; where they leave more than there was, what there was.
+
+    Where a flight hardly excites a value its column is mostly noise, and the correction for that noise can overshoot.
+    """
+    raw = [r.y[:, channel] for r in rows]
+    left = [y - r.x[:, channel][:, columns] @ beta for y, r in zip(raw, rows, strict=True)]
+    return left if sum(float(x @ x) for x in left) <= sum(float(y @ y) for y in raw) else raw
 
 
 def _wald(parts, inputs, taps, rate_hz):
@@ -134,7 +144,7 @@ def slow_excess(prepared, model, segments, noisy) -> dict[str, tuple[float, floa
     for c in range(6):
         if not np.isfinite(model.noise[c]):
             continue
-        left = [r.y[:, c] - r.x[:, c][:, full.columns] @ full.beta for r in model.rows]
+        left = left_by(model.rows, c, full.columns, full.beta)
         added = [b.y[:, c] - a.y[:, c] for a, b in zip(clean_rows, noisy_rows, strict=True)]
         frequency, found = _spectrum(left, rate)
         if frequency is None:
@@ -192,7 +202,7 @@ def leftover(prepared, model, segments, noisy, before, after, depends, delivered
         name = CHANNELS[c]
         if name not in after:
             continue
-        left = [r.y[:, c] - r.x[:, c][:, full.columns] @ full.beta for r in model.rows]
+        left = left_by(model.rows, c, full.columns, full.beta)
         empirical = [r.x[:, c][:, full.columns[unnamed]] @ full.beta[unnamed] for r in model.rows]
         cross = sum(f.T @ e for f, e, t in zip(features, left, training, strict=True) if t)
         beta = np.linalg.solve(weights, cross)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rotorid.mismatch.dependence import _features, _wald, kept_by_values, probes
+from rotorid.mismatch.dependence import _features, _wald, kept_by_values, left_by, probes
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.rows import Thinner
 
@@ -79,3 +79,10 @@ def test_what_free_values_explain_and_no_wrong_value_tells_is_left_over():
     """A residual of 5 where the fit with every value free leaves 2, noise of 1: 3 are kept; of 2.5, nothing."""
     assert kept_by_values(5.0, 2.0, 1.0) == 3.0
     assert kept_by_values(2.5, 2.0, 1.0) == 0.0
+
+
+def test_a_fit_that_leaves_more_than_there_was_is_not_believed():
+    """y = (1, 2), x = (1, 1): with 1 there remain (0, 1); with 5, (-4, -3), which is more than y."""
+    rows = [SimpleNamespace(y=np.array([[1.0], [2.0]]), x=np.ones((2, 1, 1)))]
+    np.testing.assert_allclose(left_by(rows, 0, [0], np.array([1.0]))[0], [0.0, 1.0])
+    np.testing.assert_allclose(left_by(rows, 0, [0], np.array([5.0]))[0], [1.0, 2.0])
