@@ -7,6 +7,7 @@ reading lies on another clock than what loads it.
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import between_samples
 from rotorid.effects.recorded import late_sensors
 
 
@@ -20,32 +21,6 @@ def set_forms(vehicle):
         return values[1] + values[0] * since_s
 
     return late_sensors(vehicle, "written at t: the value of t − T − e t", parameters, (0.004, 0.0), late_s)
-
-
-def between_samples(values, steps):
-    """Even samples (n, k) at places `steps` (n,) counted from the first; ends held.
-
-    Cubic through the four neighbours (Lagrange): a straight line between samples would smooth what moves fast, and
-    by another amount at each place between two samples.
-    """
-    last = len(values) - 1
-    steps = np.clip(steps, 0.0, last)
-    first = np.clip(np.floor(steps).astype(int) - 1, 0, max(last - 3, 0))
-    if last < 3:
-        return np.stack([np.interp(steps, np.arange(last + 1), column) for column in values.T], axis=1)
-    weights = weights_of_four(steps - first)
-    return sum(w[:, None] * values[first + i] for i, w in enumerate(weights))
-
-
-def weights_of_four(place):
-    """Lagrange's weights of samples 0, 1, 2 and 3 at a place among them."""
-    x = place
-    return (
-        -(x - 1) * (x - 2) * (x - 3) / 6,
-        x * (x - 2) * (x - 3) / 2,
-        -x * (x - 1) * (x - 3) / 2,
-        x * (x - 1) * (x - 2) / 6,
-    )
 
 
 def at_other_times(loading, late_s):

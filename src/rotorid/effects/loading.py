@@ -204,6 +204,32 @@ def unsmoothed(load: np.ndarray) -> np.ndarray:
     return out
 
 
+def between_samples(values, steps):
+    """Even samples (n, k) at places `steps` (n,) counted from the first; ends held.
+
+    Cubic through the four neighbours (Lagrange): a straight line between samples would smooth what moves fast, and
+    by another amount at each place between two samples.
+    """
+    last = len(values) - 1
+    steps = np.clip(steps, 0.0, last)
+    first = np.clip(np.floor(steps).astype(int) - 1, 0, max(last - 3, 0))
+    if last < 3:
+        return np.stack([np.interp(steps, np.arange(last + 1), column) for column in values.T], axis=1)
+    weights = weights_of_four(steps - first)
+    return sum(w[:, None] * values[first + i] for i, w in enumerate(weights))
+
+
+def weights_of_four(place):
+    """Lagrange's weights of samples 0, 1, 2 and 3 at a place among them."""
+    x = place
+    return (
+        -(x - 1) * (x - 2) * (x - 3) / 6,
+        x * (x - 2) * (x - 3) / 2,
+        -x * (x - 1) * (x - 3) / 2,
+        x * (x - 1) * (x - 2) / 6,
+    )
+
+
 def change_of_load(loading: Loading) -> np.ndarray:
     """Load less what rested on the sensor before, (n, 6)."""
     return loading.load - loading.rest

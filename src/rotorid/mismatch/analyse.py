@@ -21,11 +21,11 @@ from rotorid.mismatch.dependence import dependence, leftover
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.gusts import gust_finding, with_gusts
 from rotorid.mismatch.harmless import REASON as HARM
-from rotorid.mismatch.harmless import Values, believed_residuals, delivered_residuals, without_harm
+from rotorid.mismatch.harmless import Values, believed_residuals, delivered_residuals, held_out_masks, without_harm
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.next_flight import next_flight
-from rotorid.mismatch.prepare import Prepared, prepare, training_rule
+from rotorid.mismatch.prepare import Prepared, prepare
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
@@ -108,15 +108,13 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         findings += speed_findings(found[0], prepared, measured, found[1])
         if found[2] is None:
             reasons.setdefault("battery_sag", "no battery voltage")
-    rule = training_rule(prepared.split, segments)
-    held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
     findings += wrench_findings(
         model.rows,
         model.regression,
         model.search,
         model.selection,
         model.noise,
-        held,
+        held_out_masks(prepared, model, segments),
         nonlinear_intervals(prepared, model, segments),
     )
 
@@ -135,14 +133,14 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     notes += run_scale_notes(model)
     if found is not None and found[0].lag_alone is not None:
         notes.append(lag_alone_note(found[0].lag_alone))
-    traces = make_traces(prepared, model, found, measured, plain_values, values)
+    delivered = delivered_residuals(model, values, plain_values)
+    traces = make_traces(prepared, model, found, measured, plain_values, values, delivered)
     findings, told = with_square_term(findings, told, model)
     told = without_values_in_question(findings, told)
     before, after, depends = dependence(prepared, model, segments)
     claimed = bool(values) or any(f.status in ("established", "ambiguous") for f in findings)
-    delivered = delivered_residuals(model, values, plain_values) if claimed else None
     share, channels, depends, description = leftover(
-        prepared, model, segments, noisy, before, after, depends, delivered
+        prepared, model, segments, noisy, before, after, depends, delivered if claimed else None
     )
     findings = together(findings)
     fly = next_flight(findings, prepared, model.noise)
@@ -503,9 +501,9 @@ def always_of(model: WrenchModel, *kinds: str) -> list[str]:
 
 
 def make_traces(
-    prepared, model: WrenchModel, found, measured: bool, plain_values: dict, values: dict
+    prepared, model: WrenchModel, found, measured: bool, plain_values: dict, values: dict, delivered: list[np.ndarray]
 ) -> tuple[Trace, ...]:
-    """Residual of every channel before refitting, after refitting and with the effects.
+    """Residual of every channel before refitting, after refitting and with the effects (`delivered`, (n, 12) each).
 
     Only values that are clearly wrong are refitted: the others stay as believed, as in the improved vehicle.
     """
@@ -513,7 +511,6 @@ def make_traces(
     loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
     plain = regression.fit(always_of(model, "nuisance") + list(plain_values), loose=loose)
     believed_left = believed_residuals(prepared, model, found is not None and not measured)
-    delivered = delivered_residuals(model, values, plain_values)
     out = []
     for r, segment, before, after in zip(model.rows, prepared.segments, believed_left, delivered, strict=True):
         refitted = r.y - r.x[:, :, plain.columns] @ plain.beta

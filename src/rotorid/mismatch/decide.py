@@ -156,19 +156,16 @@ def wrench_findings(
 def fails_held_out(
     regression: Regression, always: list[str], named: list[str], key: str, loose: dict[str, float]
 ) -> bool:
-    """Whether a changed value that should help on the held-out blocks does harm there: it belongs to the runs fitted.
-
-    As for effects, the outermost eighths of the blocks do not count.
-    """
+    """Whether a changed value that should help on the held-out blocks does harm there: it is of the runs fitted."""
     mask = regression.held_out
     if mask.sum() < 4:
         return False
     with_it = regression.fit(always + named, loose=loose)
     without = regression.fit(always + [k for k in named if k != key], loose=loose)
-    gains = np.sort((without.residual_square - with_it.residual_square)[mask])
-    cut = max(1, len(gains) // 8)
-    gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
-    return gain < 0 and regression.expected_gain(with_it, without, mask) > EXPECTED_HELD_OUT
+    return (
+        regression.held_out_gain(with_it, without) < 0
+        and regression.expected_gain(with_it, without, mask) > EXPECTED_HELD_OUT
+    )
 
 
 def wrong_values(

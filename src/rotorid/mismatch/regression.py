@@ -239,6 +239,15 @@ class Regression:
         part = np.where(np.isin(fit.columns, own), fit.beta, 0.0)
         return float(2 * part @ (cross - gram @ rest) - part @ gram @ part)
 
+    def held_out_gain(self, with_it: Fit, without: Fit) -> float:
+        """Whitened squares that a fit explains beyond another on the held-out blocks, the outermost eighths aside.
+
+        A gust in a held-out run must not decide about everything else.
+        """
+        gains = np.sort((without.residual_square - with_it.residual_square)[self.held_out])
+        cut = max(1, len(gains) // 8)
+        return float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
+
     def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
         """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
 

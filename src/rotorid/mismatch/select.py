@@ -372,10 +372,7 @@ class Search:
                 continue
             without = self.without(key, active)
             expected = self.regression.expected_gain(with_it, without, mask)
-            gains = np.sort((without.residual_square - with_it.residual_square)[mask])
-            # A gust in a held-out run must not decide about everything else: the outermost blocks do not count.
-            cut = max(1, len(gains) // 8)
-            gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
+            gain = self.regression.held_out_gain(with_it, without)
             if expected <= EXPECTED_HELD_OUT:
                 continue
             if gain >= 0 and self.harms is not None and self.harms(key, with_it, without):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.effects.amplifier_filter import followed_now
-from rotorid.effects.clock_skew import between_samples
-from rotorid.effects.loading import unsmoothed
+from rotorid.effects.loading import between_samples, unsmoothed
 from rotorid.effects.structural_resonance import resonance
 from rotorid.mismatch.instrument.chain import between
 

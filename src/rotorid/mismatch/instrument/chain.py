@@ -16,9 +16,8 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.clock_skew import between_samples, weights_of_four
 from rotorid.effects.contract import SpeedForm, SpeedPath
-from rotorid.effects.loading import Loading, forms_of
+from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
 from rotorid.mismatch.findings import Estimate, Finding, Trace
 from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.instrument.predict import full_voltage_of
