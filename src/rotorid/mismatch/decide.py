@@ -205,11 +205,11 @@ def wrong_values(
         return fit.gain - cost
 
     subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]
-    named = max(subsets, key=penalised)
-    while named:
+    doubtful: set[str] = set()
+    while named := max((s for s in subsets if not doubtful.intersection(s)), key=penalised):
         fit = regression.fit(always + named, loose=loose)
         other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
-        doubtful = {}
+        certainty = {}
         for key in named:
             beta, covariance = coefficients(regression, fit, key)
             change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
@@ -221,10 +221,11 @@ def wrong_values(
             pinned = abs(change) > 0.98 * regression.limit[regression.start[key]]
             fails = fails_held_out(regression, always, named, key, loose)
             if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or pinned or fails or not agrees or not matters:
-                doubtful[key] = abs(change) / sd
-        if not doubtful:
+                certainty[key] = 0.0 if pinned else abs(change) / sd  # at a limit an estimate has no error of its own
+        if not certainty:
             break
-        named.remove(min(doubtful, key=doubtful.get))
+        # Without it the others are chosen anew: a value at its limit must not hide one that is plainly wrong.
+        doubtful.add(min(certainty, key=certainty.get))
     if not named:
         return {}
     fit = regression.fit(always + named, jackknife=True, loose=loose)

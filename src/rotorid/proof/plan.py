@@ -7,6 +7,7 @@ first part of a case's name is its family (of an instrument the first two: `stan
 from __future__ import annotations
 
 import csv
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -57,12 +58,18 @@ def choose(entries: Sequence[Entry], seeds: Mapping[str, int], patterns: Sequenc
 
 
 def batches(entries: Sequence[Entry], size: int) -> dict[str, list[Entry]]:
-    """Cases in batches of one family, lower seeds first: with more seeds asked for, earlier batches stay the same."""
+    """Cases in batches of one family, lower seeds first, each named by what is in it.
+
+    With more seeds asked for, full batches keep their name and are not judged again; a batch that holds other cases has
+    another name, so what was judged under another plan is never taken for it.
+    """
     out: dict[str, list[Entry]] = {}
     for family in dict.fromkeys(e.family for e in entries):
         own = sorted((e for e in entries if e.family == family), key=lambda e: e.seed)
         for start in range(0, len(own), size):
-            out[f"{family}-{start // size:03d}"] = own[start : start + size]
+            part = own[start : start + size]
+            content = hashlib.sha256("\n".join(e.case for e in part).encode()).hexdigest()[:8]
+            out[f"{family}-{start // size:03d}-{content}"] = part
     return out
 
 

@@ -135,3 +135,34 @@ def test_a_value_that_only_the_fitted_runs_need_is_not_called_wrong():
     made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: run == "a", 1.0, RATE_HZ)
     search = Search(made, lambda key, b: np.ones(12))
     assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
+
+
+def test_a_value_in_doubt_makes_room_for_the_one_that_is_plainly_wrong():
+    """Torque and inertia share a column, the inertia is the less trusted, and the other side sees no inertia."""
+    rng = np.random.default_rng(4)
+    x = columns(4000, rng)
+    x[:, 5, 3] = -x[:, 5, 1]
+    y = np.full((4000, 12), np.nan)
+    for channel in (2, 5):
+        y[:, channel] = 0.12 * x[:, channel, 1] + coloured(4000, NOISE, rng, pole=0.0)
+    terms = [Term(key, "value", prior_sd=(0.02 if key == "torque" else sd,)) for key, sd in TRUST.items()]
+    seen = x.copy()
+    seen[:, 5, 3] = 0.01 * coloured(4000, 1.0, rng, pole=0.9)
+    time_s = np.arange(4000) / RATE_HZ
+    made, back = (
+        build(
+            [Rows("a", time_s, y, part)],
+            terms,
+            {c: np.array([1.0 / NOISE]) for c in (2, 5)},
+            lambda run, t: True,
+            1.0,
+            RATE_HZ,
+        )
+        for part in (x, seen)
+    )
+    search = Search(made, lambda key, b: np.ones(12))
+    nothing = Selection([], made.fit(list(TRUST)))
+    assert list(wrong_values(made, search, nothing, None, lambda key, change: 1.0)) == ["inertia_zz"]
+    found = wrong_values(made, search, nothing, back, lambda key, change: 1.0)
+    assert list(found) == ["torque"]
+    assert found["torque"][0] == pytest.approx(0.12, abs=0.01)
