@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.mistakes import dropout, find_mistakes
 from rotorid.recordings import RecordingSet
 
 from .flights import COLUMNS, quad, recorded, with_table
@@ -244,6 +244,49 @@ def test_dropouts(sound, kind):
     run = fixed.runs[0]
     inside = (run.time_s >= 8.0) & (run.time_s <= 10.5)
     assert np.isnan(run.column(name)[inside]).all() and np.isfinite(run.column(name)[~inside]).all()
+
+
+ACCELEROMETER = tuple(f"specific_force_{a}_m_s2" for a in "xyz")
+
+
+def test_a_sensor_that_freezes_for_a_tenth_of_a_second(sound):
+    """All axes stand still at once, ten times: too short for one column alone, but no noise does that."""
+    starts = np.arange(3.0, 12.0, 0.9)
+
+    def spoil(table):
+        for start in starts:
+            inside = (table["time_s"] >= start) & (table["time_s"] < start + 0.1)
+            table.loc[inside, list(ACCELEROMETER)] = (
+                table.loc[table["time_s"] < start, list(ACCELEROMETER)].iloc[-1].values
+            )
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(sound, spoil))
+    finding = one(findings, "sensor_dropout")
+    assert finding.channels == ACCELEROMETER and "held" in finding.sentence
+    assert len(finding.windows) == 2 * len(starts)
+    for _, start, stop in finding.windows:
+        assert np.abs(starts - start).min() < 0.011 and stop - start == pytest.approx(0.1, abs=0.011)
+    blank = np.isnan(fixed.runs[0].array(ACCELEROMETER))
+    assert blank.all(axis=1).sum() == blank.any(axis=1).sum() == pytest.approx(0.1 * len(starts) * 200, abs=len(starts))
+
+
+def test_one_column_that_rests_for_a_tenth_of_a_second_is_no_dropout(sound):
+    def spoil(table):
+        inside = (table["time_s"] >= 8.0) & (table["time_s"] < 8.1)
+        table.loc[inside, ACCELEROMETER[0]] = 0.125
+        return table
+
+    assert "sensor_dropout" not in ids(find_mistakes(with_table(sound, spoil))[1])
+
+
+def test_a_slow_sensor_that_loses_packets_is_no_dropout():
+    """25 Hz in a log of 250 Hz, one in five packets lost: stretches of two to five periods are its habit."""
+    rng = np.random.default_rng(5)
+    t = np.arange(20_000) / 250.0
+    kept = np.flatnonzero((np.arange(t.size) % 10 == 0) & (rng.random(t.size) > 0.2))
+    values = rng.standard_normal((t.size, 3))[kept[np.searchsorted(kept, np.arange(t.size), "right") - 1]]
+    assert dropout.held(t, values, dropout.SHORTEST_FREEZE_S, dropout.SHORTEST_FREEZE_PERIODS) == []
 
 
 def test_a_rotor_that_is_hardly_ever_read(sound):

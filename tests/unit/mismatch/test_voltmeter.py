@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.signal import lfilter
 
 from rotorid.effects.contract import Motion
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.voltmeter import running_mean, without_noise
+from rotorid.mismatch.voltmeter import connected, running_mean, without_noise
+from rotorid.recordings import RecordingSet, Run
 
 RATE_HZ = 200.0
 TIME_S = np.arange(32000) / RATE_HZ
@@ -65,6 +67,21 @@ def test_without_commands_the_reading_stays():
     command, true = loaded(np.random.default_rng(5))
     bare = replace(flown(true, command), command=None)
     assert without_noise([bare]) == [bare]
+
+
+def test_a_voltmeter_that_is_not_connected_is_not_believed():
+    """Noise about 0 V is no battery; single zeros among readings of one are holes."""
+    rng = np.random.default_rng(7)
+    dead = pd.DataFrame({"time_s": TIME_S[:100], "battery_voltage_v": 0.05 * rng.standard_normal(100)})
+    sound = dead.assign(battery_voltage_v=12.0)
+    holes = sound.assign(battery_voltage_v=np.where(np.arange(100) % 10 == 0, 0.0, 12.0))
+    recordings = RecordingSet("s", None, (Run("a", dead), Run("b", sound), Run("c", holes)))
+    fixed, notes = connected(recordings)
+    assert notes == ("battery_voltage_v of a reads below 0.5 V: taken as not connected.",)
+    assert not fixed.runs[0].has("battery_voltage_v")
+    assert fixed.runs[1] is recordings.runs[1]
+    left = fixed.runs[2].column("battery_voltage_v")
+    assert np.isnan(left[::10]).all() and (left[1:10] == 12.0).all()
 
 
 def test_a_running_mean_keeps_a_line_to_its_ends():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units, vibration
 from rotorid.mismatch.mistakes.signals import ReadSet
+from rotorid.mismatch.voltmeter import connected
 from rotorid.recordings import RecordingSet
 
 
@@ -18,7 +19,7 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding
     for error in units.by_size(recordings):
         recordings = units.corrected(recordings, error)
         findings.append(units.as_finding(error))
-    notes: tuple[str, ...] = ()
+    recordings, notes = connected(recordings)
     for step in (axes.find, rotor_layout.find, timing.find):
         found = step(recordings)
         recordings, notes = found.recordings, notes + found.notes

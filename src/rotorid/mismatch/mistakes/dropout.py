@@ -8,12 +8,15 @@ import numpy as np
 
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.mistakes.signals import replace_columns, sensor_columns
-from rotorid.mismatch.motion import fresh_samples, stretches
+from rotorid.mismatch.motion import stretches
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 SHORTEST_GAP_S = 0.3
 SHORTEST_GAP_PERIODS = 12
 """A missing or held stretch counts from this many of the sensor's own periods on."""
+SHORTEST_FREEZE_PERIODS = 8
+SHORTEST_FREEZE_S = 0.04
+"""Where all columns of a sensor stand still at once, a shorter stretch is no chance."""
 MERGE_S = 0.3
 SHORTEST_STAND_S = 0.15
 STANDING = 0.2
@@ -81,6 +84,9 @@ def in_run(run: Run, vehicle: Vehicle) -> list[Stretch]:
         if sensor in ("commands", "throttle") or not present:
             continue
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
+        frozen = []
+        if len(present) > 1 and not zero:
+            frozen = held(run.time_s, run.array(tuple(present)), SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS)
         for name in present:
             values = run.column(name)
             blank = missing(run.time_s, values)
@@ -89,7 +95,7 @@ def in_run(run: Run, vehicle: Vehicle) -> list[Stretch]:
                 blank = blank & ~zero[name]
             found += _as_stretches(run, name, sensor, "missing", blank, 0.0)
             rest = np.where(zero.get(name, np.zeros(len(values), bool)), np.nan, values)
-            for mask, p in held(run.time_s, rest):
+            for mask, p in [*held(run.time_s, rest[:, None]), *frozen]:
                 found += _as_stretches(run, name, sensor, "held", mask, p)
     return found
 
@@ -125,26 +131,32 @@ def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     return mask
 
 
-def held(time_s: np.ndarray, values: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Stretches in which a changing column repeats one reading far longer than chance and habit allow."""
-    index = np.flatnonzero(np.isfinite(values))
+def held(
+    time_s: np.ndarray, values: np.ndarray, shortest_s: float = SHORTEST_GAP_S, periods: int = SHORTEST_GAP_PERIODS
+) -> list[tuple[np.ndarray, float]]:
+    """Stretches in which changing columns (n, k) all repeat one reading far longer than chance and habit allow.
+
+    At least `shortest_s` seconds and `periods` of the sensor's own periods long. Each as a mask (n,) with its p-value.
+    """
+    index = np.flatnonzero(np.isfinite(values).all(axis=1))
     if len(index) < 100:
         return []
     v, t = values[index], time_s[index]
-    same = np.concatenate([[False], np.diff(v) == 0.0])
+    same = np.concatenate([[False], (np.diff(v, axis=0) == 0.0).all(axis=1)])
     runs = [(a - 1, b) for a, b in stretches(same)]
     if not runs:
         return []
     lengths = np.array([b - a for a, b in runs])
-    period = float(np.median(np.diff(t[fresh_samples(v)]))) if same.mean() > 0.4 else float(np.median(np.diff(t)))
+    period = float(np.median(np.diff(t[~same] if same.mean() > 0.4 else t)))
     out = []
     for (a, b), length in zip(runs, lengths, strict=True):
         duration = t[b - 1] - t[a]
-        if duration < max(SHORTEST_GAP_S, SHORTEST_GAP_PERIODS * period):
+        if duration < max(shortest_s, periods * period):
             continue
-        others = lengths[lengths < length]
+        # Stretches half as long or longer are of its own kind; the shorter ones show what chance and habit do.
+        others = lengths[lengths < length / 2]
         habit = np.quantile(others, 0.99) if len(others) > 20 else 1
-        repeat = (same.sum() - (length - 1)) / max(len(v) - length, 1)
+        repeat = (others - 1).sum() / len(v)
         p = float(min(1.0, len(v) * max(repeat, 1.0 / len(v)) ** (length / max(habit, 1))))
         if p > CHANCE or length < 8 * habit:
             continue
