@@ -21,6 +21,13 @@ def independent_of_speed(motion, vehicle, values):
     return Contribution(moment=-values[0] * np.cross(motion.air_velocity, E3))
 
 
+def rolling(motion, vehicle, values):
+    """M = −k_roll Σ ω_i (v_i − (v_i · e3) e3): about the airspeed itself, whichever way a rotor spins."""
+    hub = motion.hub_velocity(vehicle.rotor_positions_m())
+    weighted = (motion.rotor_speed[:, :, None] * hub).sum(axis=1)
+    return Contribution(moment=-values[0] * weighted * (1.0 - E3))
+
+
 def forms(vehicle):
     size = scale(vehicle)
     k_flap = size.arm_m * size.drag_per_rotor_speed
@@ -40,6 +47,13 @@ def forms(vehicle):
             independent_of_speed,
             ("velocity",),
         ),
+        Form(
+            "about the airspeed, at the hubs",
+            "M = −k_roll Σ ω_i (v_i − (v_i · e3) e3)",
+            (Parameter("k_roll", "N m s2/(rad m)", 0.0, k_flap, meaning="moment about the airspeed per rotor speed"),),
+            rolling,
+            ("velocity", "rotor_speed"),
+        ),
     )
 
 
@@ -48,8 +62,14 @@ EFFECT = Effect(
     name="the hub moment of blade flapping",
     sentence="a pitching or rolling moment grows with airspeed",
     forms=forms,
-    source=("Mahony, Kumar and Corke, Multirotor aerial vehicles, IEEE RAM 2012; RotorPy's k_flap; catalogue F6"),
-    sign=("positive raises the nose in forward flight (the disc tilts back) and rolls away from sideways flight"),
+    source=(
+        "Mahony, Kumar and Corke, Multirotor aerial vehicles, IEEE RAM 2012; RotorPy's k_flap; catalogue F6; the "
+        "moment about the airspeed: Martin and Salaün, ICRA 2010, rolling moment of Gazebo's RotorS"
+    ),
+    sign=(
+        "positive raises the nose in forward flight (the disc tilts back) and rolls away from sideways flight; k_roll "
+        "is positive where the moment points against the airspeed"
+    ),
     validity=("advance ratios below about 0.1 to 0.2; the force part of flapping is rotor_drag (one class with it)"),
     excited_by=("velocity", "angular_velocity"),
     confusers=("rotor_interference", "rotor_drag"),

@@ -39,6 +39,10 @@ def power_from(path, values):
     return path.full_speed * (dead_zone(path, values[:1]) / path.full_speed) ** values[1]
 
 
+LINEAR = 0.005
+"""No speed controller is proportional to its command within less, and a calibration of its throttle is no better."""
+
+
 EFFECT = Effect(
     id="throttle_curve",
     name="the curve between throttle and rotor speed",
@@ -49,8 +53,8 @@ EFFECT = Effect(
             "affine",
             "ω = (1 + a_1) ω_c + a_0 ω_max",
             (
-                Parameter("a_0", "1", -0.8, 0.8, meaning="speed at no command, share of ω_max"),
-                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope"),
+                Parameter("a_0", "1", -0.8, 0.8, meaning="speed at no command, share of ω_max", negligible=LINEAR),
+                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope", negligible=LINEAR),
             ),
             0,
             affine,
@@ -60,8 +64,8 @@ EFFECT = Effect(
             "quadratic",
             "ω = (1 + a_1 + a_2 ω_c/ω_max) ω_c",
             (
-                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope at no command"),
-                Parameter("a_2", "1", -2.0, 2.0, meaning="growth of the slope with the command"),
+                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope at no command", negligible=LINEAR),
+                Parameter("a_2", "1", -2.0, 2.0, meaning="growth of the slope with the command", negligible=LINEAR),
             ),
             0,
             quadratic,
@@ -70,7 +74,7 @@ EFFECT = Effect(
         SpeedForm(
             "dead zone",
             "ω = ω_max (u − u_0)/(1 − u_0)",
-            (Parameter("u_0", "1", -0.3, 0.5, meaning="command at which the rotors start"),),
+            (Parameter("u_0", "1", -0.3, 0.5, meaning="command at which the rotors start", negligible=LINEAR),),
             0,
             dead_zone,
             (0.0,),
@@ -78,7 +82,7 @@ EFFECT = Effect(
         SpeedForm(
             "thrust curve of the throttle",
             "T/T_max = b u + (1 − b) u²",
-            (Parameter("b", "1", -0.3, 1.0, meaning="linear share of thrust"),),
+            (Parameter("b", "1", -0.3, 1.0, meaning="linear share of thrust", negligible=2 * LINEAR),),
             0,
             root,
             (0.0,),
@@ -86,7 +90,16 @@ EFFECT = Effect(
         SpeedForm(
             "power of the throttle",
             "ω = ω_max u^n",
-            (Parameter("n", "1", 0.2, 3.0, meaning="exponent; 0.5 for a thrust proportional to the throttle"),),
+            (
+                Parameter(
+                    "n",
+                    "1",
+                    0.2,
+                    3.0,
+                    meaning="exponent; 0.5 for a thrust proportional to the throttle",
+                    negligible=LINEAR,
+                ),
+            ),
             0,
             power,
             (1.0,),
@@ -95,8 +108,8 @@ EFFECT = Effect(
             "power above a dead zone",
             "ω = ω_max ((u − u_0)/(1 − u_0))^n",
             (
-                Parameter("u_0", "1", -0.05, 0.5, meaning="command at which the rotors start"),
-                Parameter("n", "1", 0.2, 3.0, meaning="exponent"),
+                Parameter("u_0", "1", -0.05, 0.5, meaning="command at which the rotors start", negligible=LINEAR),
+                Parameter("n", "1", 0.2, 3.0, meaning="exponent", negligible=LINEAR),
             ),
             0,
             power_from,

@@ -26,6 +26,11 @@ def at_the_hubs(motion, vehicle, values):
     return _tilted(motion, vehicle, values[0], values[1], np.ones(vehicle.rotor_count))
 
 
+def thrust_alone(motion, vehicle, values):
+    """F_i += T_i (ε_x, ε_y, 0) at each hub, reaction torques upright: what flows off the rotor leans, not the motor."""
+    return at_hubs(_forces(motion, vehicle, values[0], values[1]), vehicle.rotor_positions_m())
+
+
 def force_only(motion, vehicle, values):
     """F = T (ε_x, ε_y, 0) at the centre of mass."""
     return Contribution(force=_forces(motion, vehicle, values[0], values[1]).sum(axis=1))
@@ -47,6 +52,13 @@ def forms(vehicle):
     ]
     return (
         Form("all rotors, at the hubs", "F_i = T_i (ε_x, ε_y, −1)", tilt, at_the_hubs, needs),
+        Form(
+            "all rotors, at the hubs, thrust alone",
+            "F_i = T_i (ε_x, ε_y, −1), torques upright",
+            tilt,
+            thrust_alone,
+            needs,
+        ),
         Form("all rotors, at the centre of mass", "F = T (ε_x, ε_y, −1)", tilt, force_only, needs),
         *singles,
     )

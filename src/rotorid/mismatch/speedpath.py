@@ -449,7 +449,9 @@ class SpeedSearch:
                     fit = self.problem.with_covariance(fit)
                 p, score, _ = self.judge(base, fit, key)
                 if p > ENTER_P or score <= 0 or negligible(fit, key):
-                    dropped[key] = f"p = {p:.2g} beside the others"
+                    dropped[key] = (
+                        "it is too slight to matter" if negligible(fit, key) else f"p = {p:.2g} beside the others"
+                    )
                     fit, changed = self.problem.with_covariance(base) if base.chain else base, True
                     break
         return fit
