@@ -17,11 +17,12 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
-from rotorid.mismatch.dependence import dependence, leftover
+from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.gusts import gust_finding, with_gusts
 from rotorid.mismatch.harmless import REASON as HARM
 from rotorid.mismatch.harmless import Values, believed_residuals, delivered_residuals, held_out_masks, without_harm
+from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import stretches
 from rotorid.mismatch.next_flight import next_flight
@@ -139,9 +140,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     told = without_values_in_question(findings, told)
     before, after, depends = dependence(prepared, model, segments)
     claimed = bool(values) or any(f.status in ("established", "ambiguous") for f in findings)
-    share, channels, depends, description = leftover(
-        prepared, model, segments, noisy, before, after, depends, delivered if claimed else None
-    )
+    left = leftover(prepared, model, segments, noisy, after, depends, delivered if claimed else None)
     findings = together(findings)
     fly = next_flight(findings, prepared, model.noise)
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}
@@ -158,10 +157,10 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         noise_floor=noise_floors(prepared, model, found, measured),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(segments, prepared),
-        unexplained_share=share,
-        unexplained_channels=channels,
-        unexplained_depends_on=depends,
-        unexplained_description=description,
+        unexplained_share=left.share,
+        unexplained_channels=left.channels,
+        unexplained_depends_on=left.depends_on,
+        unexplained_description=left.description,
         next_manoeuvre=fly.manoeuvre,
         next_separates=fly.separates,
         next_sigma=fly.sigma,

@@ -29,6 +29,7 @@ REGIME_WORDS = {
     "battery_voltage_v": ("battery voltage", "V"),
     "voltage_v": ("battery voltage", "V"),
     "time_s": ("time", "s"),
+    "run": ("the run", ""),
     "load_force_x": ("load along x", "N"),
     "load_force_y": ("load along y", "N"),
     "load_force_z": ("load along z", "N"),

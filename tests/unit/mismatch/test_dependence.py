@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rotorid.mismatch.dependence import _features, _wald, kept_by_values, left_by, probes
+from rotorid.mismatch.dependence import _wald, left_by, probes
+from rotorid.mismatch.leftover import _features, kept_by_values
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.rows import Thinner
 
