@@ -46,6 +46,9 @@ LASTING_S = 12.0
 MOST_EXTRAPOLATION = 1.05
 """Speed in a window, beside the fastest that is fitted, up to which the drag is known."""
 GUST_P = 1e-6
+BESIDE_A_BURST = 1.0
+"""Size, in units of the noise, of a gust that is believed where a stronger one (BURST_SIZE) blew: left out, it would be
+noise to the others."""
 STEPS, ROUNDS = 4, 2
 """Gauss-Newton steps for the wind alone, and searches repeated in it."""
 LARGEST_STEP_M_S = 4.0
@@ -227,13 +230,22 @@ def in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], ask
         Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, covariances[key], chance(wind, covariances[key]))
         for key, (term, wind) in winds.items()
     ]
-    gusts = [g for g in gusts if g.p_value < GUST_P and size_of(g, again) > BURST_SIZE]
-    if not gusts:
+    sizes = {g.window: size_of(g, again) for g in gusts if g.p_value < GUST_P}
+    if max(sizes.values(), default=0.0) <= BURST_SIZE:
         return None
+    gusts = [g for g in gusts if sizes.get(g.window, 0.0) > BESIDE_A_BURST]
     if len(gusts) < len(asked):
         present = {g.window for g in gusts}
         return in_moving_air(prepared, model, terms, [t for t in asked if t.window in present])
     return replace(again, wind=model.wind, wind_sd=model.wind_sd, gusts=tuple(gusts))
+
+
+def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
+    """Those beyond chance that are strong, and the weaker ones beside them; nothing where none is strong."""
+    sizes = [(g, size_of(g, model)) for g in gusts if g.p_value < GUST_P]
+    if max((size for _, size in sizes), default=0.0) <= BURST_SIZE:
+        return []
+    return [g for g, size in sizes if size > BESIDE_A_BURST]
 
 
 def chance(wind: np.ndarray, covariance: np.ndarray) -> float:

@@ -1,8 +1,11 @@
 """A gust found as a wind, through the drag it is felt by."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rotorid.mismatch import gusts
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.gusts import Gust, blowing, knots_of
 
@@ -37,6 +40,17 @@ def test_it_is_found_in_every_run_and_leaves_little(gusty):
         if trace.channel in ("force_x", "force_y"):
             inside = (trace.time_s > 8.5) & (trace.time_s < 11.5)
             assert trace.after[inside].std() < 0.35 * np.sqrt(np.mean(trace.before[inside] ** 2))
+
+
+def test_a_weaker_gust_beside_a_strong_one_is_kept(monkeypatch):
+    """Of 5, 2, 2 and 0.5 times the noise: the strong one bears out those of 2; alone, those of 2 say nothing."""
+    sizes = {"a": 5.0, "b": 2.0, "c": 2.0, "d": 0.5}
+    found = [Gust(run, np.arange(3.0), np.ones((3, 2)), np.eye(6), 1e-9) for run in sizes]
+    monkeypatch.setattr(gusts, "size_of", lambda gust, model: sizes[gust.run])
+    assert [g.run for g in gusts.believed(found, None)] == ["a", "b", "c"]
+    assert gusts.believed(found[1:], None) == []
+    doubtful = replace(found[0], p_value=1e-3)
+    assert gusts.believed([doubtful, *found[1:]], None) == []
 
 
 def test_without_a_gust_none_is_told():
