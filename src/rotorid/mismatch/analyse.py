@@ -494,11 +494,6 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
     return vehicle.model_copy(update=change)
 
 
-def always_of(model: WrenchModel, *kinds: str) -> list[str]:
-    """Terms of some kinds, which every fit carries."""
-    return [t.key for t in model.regression.terms if t.kind in kinds]
-
-
 def make_traces(
     prepared, model: WrenchModel, found, measured: bool, plain_values: dict, values: dict, delivered: list[np.ndarray]
 ) -> tuple[Trace, ...]:
@@ -508,7 +503,7 @@ def make_traces(
     """
     regression = model.regression
     loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
-    plain = regression.fit(always_of(model, "nuisance") + list(plain_values), loose=loose)
+    plain = regression.fit(regression.keys_of("nuisance") + list(plain_values), loose=loose)
     believed_left = believed_residuals(prepared, model, found is not None and not measured)
     out = []
     for r, segment, before, after in zip(model.rows, prepared.segments, believed_left, delivered, strict=True):

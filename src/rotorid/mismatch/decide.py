@@ -185,7 +185,7 @@ def wrong_values(
     matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is False
     on a stand, where a mass only weighs.
     """
-    nuisance = [t.key for t in regression.terms if t.kind in ("nuisance", "wind")]
+    nuisance = regression.keys_of("nuisance", "wind")
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
     loose = {key: max(sd, WIDEST_TRUST) for key, sd in trust.items()}

@@ -34,7 +34,7 @@ Values = dict[str, tuple[float, float]]
 
 def delivered_fit(model: WrenchModel, values: Values, also: Values | None = None) -> Fit:
     """The fit of what is delivered: effects, wrong values (and those of `also` as free as they), nuisances."""
-    always = [t.key for t in model.regression.terms if t.kind in ("nuisance", "wind")]
+    always = model.regression.keys_of("nuisance", "wind")
     loose = {k: WIDEST_TRUST for k in (*(also or {}), *values)}
     return model.regression.fit(always + list(values) + model.selection.active, loose=loose)
 

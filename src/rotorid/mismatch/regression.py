@@ -118,6 +118,10 @@ class Regression:
     names: dict[str, int]
     """Number of each run."""
 
+    def keys_of(self, *kinds: str) -> list[str]:
+        """Keys of the terms of some kinds."""
+        return [t.key for t in self.terms if t.kind in kinds]
+
     def columns(self, keys: Iterable[str]) -> np.ndarray:
         """Column numbers of terms, in the order given."""
         sizes = {t.key: t.size for t in self.terms}

@@ -232,7 +232,7 @@ def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list
 def make_traces(setup: Setup, model: ReadingModel, plain: dict, values: dict):
     """Traces, and residuals (n, 6) of every stretch before and after: values named are changed, others as believed."""
     regression = model.regression
-    nuisance = [t.key for t in regression.terms if t.kind == "nuisance"]
+    nuisance = regression.keys_of("nuisance")
     loose = {k: WIDEST_TRUST for k in (*plain, *values)}
     only = regression.fit(nuisance + list(plain), loose=loose)
     full = regression.fit(nuisance + list(values) + model.selection.active, loose=loose)
