@@ -25,6 +25,7 @@ from scipy.optimize import nnls
 from scipy.signal import lfilter
 from scipy.stats import chi2, f
 
+from rotorid.mismatch.between_runs import apart
 from rotorid.mismatch.findings import Analysis, Trace
 from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.motion import Segment
@@ -78,6 +79,8 @@ class Interval:
     stop: int
     p_value: float
     explained: bool
+    of_the_run: bool = False
+    """Whether it is the run that matters, and no regime."""
 
 
 def locate(analysis: Analysis) -> list[Location]:
@@ -103,7 +106,7 @@ def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]
     out = []
     for i in intervals:
         key = (i.trace.channel, i.explained)
-        if key not in regimes:
+        if key not in regimes and not i.of_the_run:
             regimes[key] = regime_of(analysis, *key)
         out.append(
             Location(
@@ -113,7 +116,7 @@ def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]
                 stop_s=_edge(analysis, i, i.stop - 1, -1),
                 p_value=float(np.clip(i.p_value, SMALLEST_P, 1.0)),
                 energy_share=_energy_share(mismatch_of(i.trace, i.explained), slice(i.start, i.stop)),
-                regime=regimes[key],
+                regime=None if i.of_the_run else regimes[key],
             )
         )
     return out
@@ -329,7 +332,21 @@ def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
         for w in white:
             w[: len(taps)] = 0.0
         found += _louder(traces, white, limit) + _shifted(traces, white, parts, limit)
+        if "run" in analysis.unexplained_depends_on:
+            found += _apart(traces, parts)
     return found
+
+
+def _apart(traces, parts) -> list[Interval]:
+    """Whole runs whose mean is off, where runs differ."""
+    noise = channel_noise(traces)
+    between = apart([t.run for t in traces], parts, 1.0 / _period(traces[0]), noise)
+    means = between.means if between else {}
+    return [
+        Interval(t, 0, len(t.after), between.p_value, False, of_the_run=True)
+        for t in traces
+        if abs(means.get(t.run, 0.0)) > SHIFTED * noise
+    ]
 
 
 def _evened(traces: Sequence[Trace], white: list[np.ndarray], hard) -> list[np.ndarray]:

@@ -1,5 +1,7 @@
 """Locations: nothing on noise, true edges of bursts and of what findings explain, the right regime."""
 
+from dataclasses import replace
+
 import pytest
 
 from rotorid.mismatch.locate import locate
@@ -29,6 +31,19 @@ def test_drag_is_located_in_the_dash_and_its_regime_is_airspeed():
         assert f.stop_s == pytest.approx(DASH_S[1], abs=0.3)
         assert f.regime.variable == "airspeed_m_s"
         assert 0 < f.regime.low < 5.0 <= f.regime.high + 0.1
+
+
+def test_a_run_that_differs_from_the_others_is_located_as_a_whole():
+    """Run b is off by 3 of its noise throughout; told only where the analysis says that runs differ."""
+    made = analysis(unexplained_depends_on=("run",), unexplained_share=1.0)
+    traces = tuple(
+        replace(t, after=t.after + 3 * made.noise_floor[t.channel]) if (t.run, t.channel) == ("b", "moment_y") else t
+        for t in made.traces
+    )
+    (found,) = locate(replace(made, traces=traces))
+    assert (found.run, found.channel, found.regime) == ("b", "moment_y", None)
+    assert (found.start_s, found.stop_s) == (0.0, pytest.approx(LENGTH_S - 0.01))
+    assert found.energy_share == pytest.approx(1.0)
 
 
 def test_windows_that_a_finding_states_are_taken_as_they_are():
