@@ -467,6 +467,8 @@ def build(
     names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
     for k, r in enumerate(rows):
         size = len(r.y) - longest
+        if size < 2:
+            continue  # shorter than the whitening reaches: it says nothing
         parts = np.array_split(np.arange(size), max(1, size // per_block))
         gram, cross, square = np.zeros((len(parts), at, at)), np.zeros((len(parts), at)), np.zeros(len(parts))
         for channel, taps in filters.items():

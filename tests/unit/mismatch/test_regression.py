@@ -232,3 +232,20 @@ def test_the_gain_expected_on_held_out_blocks_is_what_a_right_model_gains():
     gained = (without.residual_square - with_it.residual_square)[found.held_out].sum()
     assert expected == pytest.approx(0.25 * n / 2, rel=0.15)
     assert gained == pytest.approx(expected, rel=0.2)
+
+
+def test_a_stretch_shorter_than_the_whitening_says_nothing():
+    """Three samples between two holes, a filter of eight: the fit is that of the long stretch alone."""
+    rng = np.random.default_rng(8)
+    x = np.zeros((400, 12, 1))
+    x[:, 0, 0] = rng.standard_normal(400)
+    y = np.full((400, 12), np.nan)
+    y[:, 0] = 0.5 * x[:, 0, 0] + 0.1 * rng.standard_normal(400)
+    time_s = np.arange(400) / RATE_HZ
+    long, short = Rows("a", time_s, y, x), Rows("a", time_s[:3] + 100.0, 9.0 + y[:3], x[:3])
+    filters = {0: np.array([1.0, *[0.0] * 7])}
+    fits = [
+        build(rows, [Term("x", "effect")], filters, lambda run, t: True, 1.0, RATE_HZ).fit(["x"])
+        for rows in ([long], [long, short])
+    ]
+    assert fits[1].beta == pytest.approx(fits[0].beta, rel=1e-12)

@@ -16,6 +16,7 @@ from rotorid.effects.hysteresis import NARROW, play
 from rotorid.effects.loading import CHANNELS, Instrument, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.instrument.settling import settling_s, without_settling
+from rotorid.mismatch.instrument.tachometer import without_noise
 from rotorid.mismatch.prepare import split_runs
 from rotorid.mismatch.rows import baseline_wrench
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
@@ -160,6 +161,8 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
             continue
         own = {name: at(values) for name, values in others.items()}
         speed, ordered, tilt = at(speeds), at(command), at(attitude)
+        if speed is not None:
+            speed = without_noise(speed, 1.0 / dt_s)
         rotation = None if tilt is None else rotation_of(tilt[:, 0], tilt[:, 1])
         if vehicle.kind == "stand" and rotation is None:
             rotation = np.broadcast_to(np.eye(3), (len(time_s), 3, 3))
