@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rotorid.mismatch.instrument.tachometer import WIDTHS, without_noise
+from rotorid.effects.contract import Motion
+from rotorid.effects.loading import Loading
+from rotorid.mismatch.instrument.tachometer import WIDTHS, quieter, without_noise
 
 RATE_HZ = 200.0
 TIME_S = np.arange(6000) / RATE_HZ
@@ -48,3 +50,21 @@ def test_a_speed_that_moves_quickly_is_no_noise():
 def test_a_short_stretch_stays_as_it_is():
     short = np.random.default_rng(1).standard_normal((2 * WIDTHS[-1] - 1, 2))
     assert without_noise(short, RATE_HZ) is short
+
+
+def loading(load: np.ndarray) -> Loading:
+    """A stretch with this load along z, N, and a reading of 6 times the steps' thrust with noise of 0.1 N."""
+    noise = 0.1 * np.random.default_rng(3).standard_normal(TIME_S.size)
+    whole, reading = np.full((TIME_S.size, 6), np.nan), np.full((TIME_S.size, 6), np.nan)
+    whole[:, 2], reading[:, 2] = load, 6e-6 * stepping() ** 2 + noise
+    motion = Motion(time_s=TIME_S, rotor_speed=None)
+    return Loading("run", TIME_S, TIME_S, whole, reading, np.zeros(6), motion)
+
+
+def test_the_reading_tells_noise_of_the_counter_from_unrest_of_the_rotor():
+    """Loads with 0.3 N of noise that the reading does not show, against the true ones: and the other way round."""
+    true = 6e-6 * stepping() ** 2
+    noisy, clean = (loading(true + size * np.random.default_rng(4).standard_normal(true.size)) for size in (0.3, 0.0))
+    assert quieter([noisy], [clean]) == [clean]
+    assert quieter([clean], [noisy]) == [clean]
+    assert quieter([clean], [clean]) == [clean]

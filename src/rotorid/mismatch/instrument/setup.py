@@ -16,7 +16,7 @@ from rotorid.effects.hysteresis import NARROW, play
 from rotorid.effects.loading import CHANNELS, Instrument, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.instrument.settling import settling_s, without_settling
-from rotorid.mismatch.instrument.tachometer import without_noise
+from rotorid.mismatch.instrument.tachometer import quieter, without_noise
 from rotorid.mismatch.prepare import split_runs
 from rotorid.mismatch.rows import baseline_wrench
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
@@ -161,8 +161,6 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
             continue
         own = {name: at(values) for name, values in others.items()}
         speed, ordered, tilt = at(speeds), at(command), at(attitude)
-        if speed is not None:
-            speed = without_noise(speed, 1.0 / dt_s)
         rotation = None if tilt is None else rotation_of(tilt[:, 0], tilt[:, 1])
         if vehicle.kind == "stand" and rotation is None:
             rotation = np.broadcast_to(np.eye(3), (len(time_s), 3, 3))
@@ -197,6 +195,14 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
             )
         )
     return out
+
+
+def smoothed(loading: Loading) -> Loading:
+    """The loading with measured rotor speeds less their white noise."""
+    if not loading.measured or loading.motion.rotor_speed is None:
+        return loading
+    speed = without_noise(loading.motion.rotor_speed, 1.0 / loading.dt_s)
+    return replace(loading, motion=with_speed(loading.motion, speed))
 
 
 def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
@@ -274,6 +280,8 @@ def set_up(recordings: RecordingSet) -> Setup:
     loadings = [
         loaded_by(x, vehicle) for run in recordings.runs for x in stretches_of(run, vehicle, channels, dt_s, full)
     ]
+    if vehicle.kind == "stand":
+        loadings = quieter(loadings, [loaded_by(smoothed(x), vehicle) for x in loadings])
     if not loadings:
         raise InputError(f"{recordings.name}: no run has {SHORTEST} samples in a row with every channel")
     instrument = instrument_of(recordings, vehicle, channels, tuple(loadings), dt_s)

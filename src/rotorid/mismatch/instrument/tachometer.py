@@ -4,6 +4,7 @@ On a stand the speeds are the load: their noise is an error of the regressor, of
 takes away what is small or quick, and so looks like one. A rotor's inertia keeps its speed smooth, the noise of a
 counter is white: every instant gets the longest window whose parabola agrees with those of all shorter ones
 (intersection of confidence intervals; A. Goldenshluger and A. Nemirovski, 1997), long on a plateau, short at a step.
+What is quick may also be the rotors' own: the reading tells, for it follows rotors but not their counters.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter
 from scipy.signal import savgol_coeffs, savgol_filter, welch
+
+from rotorid.effects.loading import Loading
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
@@ -22,6 +25,8 @@ LEVEL = 2.0
 """Ratio of the power in the two halves beyond which there is signal up there, and nothing is done."""
 PIECE = 256
 """Samples of a piece whose spectrum is taken; shorter stretches stay as they are."""
+QUIETER, LOUDER = 0.98, 1.01
+"""Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none."""
 LOCAL_S = 1.0
 """Time over which the size of the noise is read off: it may grow with the speed."""
 
@@ -31,6 +36,22 @@ def without_noise(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     if len(speed) < max(PIECE, 2 * WIDTHS[-1]):
         return speed
     return np.stack([_smoothed(x, rate_hz) if _noisy(x) else x for x in speed.T], axis=1)
+
+
+def quieter(as_read: list[Loading], smoothed: list[Loading]) -> list[Loading]:
+    """Of stretches with loads from the speeds as read and from smoothed ones those whose loads the readings follow.
+
+    Compared by the squares of the steps from sample to sample, in which effects of the instrument are small.
+    """
+    ratio = _steps(smoothed) / np.maximum(_steps(as_read), 1e-300)
+    better = len(ratio) > 0 and np.nanmin(ratio) < QUIETER and np.nanmax(ratio) < LOUDER
+    return smoothed if better else as_read
+
+
+def _steps(loadings: list[Loading]) -> np.ndarray:
+    """Squares of the steps of reading less load, (6,), channels that are not read being NaN."""
+    parts = [np.diff(x.reading - x.load, axis=0) ** 2 for x in loadings]
+    return np.concatenate(parts).sum(axis=0) if parts else np.zeros(0)
 
 
 def _noisy(speed: np.ndarray) -> bool:
