@@ -2,13 +2,35 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import AXES, UNITS, cross_channels
 
 
 def _growing(loading):
     """F|F|, (n, 6): an arm that gives way in proportion to the load turns and stretches the reading by it."""
     return loading.load * np.abs(loading.load)
+
+
+def turning(loading, vehicle, values):
+    """y − F = θ × F, θ = (−b F_y + e_x F_z, b F_x + e_y F_z, 0): what bends turns the load, loads along two axes too.
+
+    b is the bending by forces across, e_x and e_y that by a vertical force whose line of action is off the support's.
+    """
+    force = loading.load[:, :3]
+    bend, off_x, off_y = values
+    angle = np.zeros_like(force)
+    angle[:, 0] = -bend * force[:, 1] + off_x * force[:, 2]
+    angle[:, 1] = bend * force[:, 0] + off_y * force[:, 2]
+    reading = np.zeros((loading.size, 6))
+    reading[:, :3] = np.cross(angle, force)
+    return Contribution(reading=reading)
+
+
+TURNS = (
+    Parameter("b", "rad/N", meaning="turn per force across"),
+    Parameter("e_x", "rad/N", meaning="turn about x per vertical force"),
+    Parameter("e_y", "rad/N", meaning="turn about y per vertical force"),
+)
 
 
 def _form(name, pairs):
@@ -35,6 +57,8 @@ def reading_forms(instrument):
     if len(sources) > 1:
         pairs = tuple((t, s) for s in sources for t in instrument.channels if t < 3)
         forms.append(_form("under all forces", pairs))
+    if sources == (0, 1, 2) and set(sources) <= set(instrument.channels):
+        forms.append(Form("turning", "y = F + θ × F, θ = (−b F_y + e_x F_z, b F_x + e_y F_z, 0)", TURNS, turning))
     return tuple(forms)
 
 

@@ -95,10 +95,15 @@ def instrument_for(loading: Loading, vehicle: Vehicle) -> Instrument:
     )
 
 
-def forms():
+def bench_instrument():
     vehicle = stand_vehicle()
     instrument = instrument_for(stand_loading(vehicle), vehicle)
-    bench = replace(instrument, vehicle=Vehicle.model_validate({"name": "b", "kind": "bench"}))
+    return replace(instrument, vehicle=Vehicle.model_validate({"name": "b", "kind": "bench"}))
+
+
+def forms():
+    vehicle = stand_vehicle()
+    instrument, bench = instrument_for(stand_loading(vehicle), vehicle), bench_instrument()
     return [
         (key, form) for key in NEW for form in forms_of(catalogue()[key], bench if key == "compliance" else instrument)
     ]
@@ -257,3 +262,13 @@ def test_the_files_of_a_bench_hold_its_model(tmp_path):
     assert [e["id"] for e in written.effects] == ["tare_offset"]
     assert "flight" not in verdict.sentence
     assert entries(written, set_up(bench_set()).instrument)[0][0][0].name == "constant"
+
+
+def test_a_load_along_two_axes_is_turned_by_what_bends():
+    """F = (3, 0, 4) N with b 0.01, e_y 0.02 rad/N: θ_y = 0.03 + 0.08 = 0.11, θ × F = (0.44, 0, −0.33) N."""
+    form = next(f for f in forms_of(catalogue()["compliance"], bench_instrument()) if f.name == "turning")
+    loading = stand_loading(stand_vehicle())
+    loading = replace(loading, load=np.tile([3.0, 0, 4, 0, 0, 0], (loading.size, 1)))
+    reading = form_reading(form, np.array([0.01, 0.05, 0.02]), loading, stand_vehicle())
+    # θ_x = 0.05 · 4 = 0.2 turns the vertical force sideways: −0.2 · 4 along y.
+    np.testing.assert_allclose(reading[0, :3], [0.44, -0.8, -0.33], atol=1e-12)
