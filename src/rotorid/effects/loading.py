@@ -73,6 +73,8 @@ class Loading:
     """Load before the first sample as far as known, (6,): the weight on an untared stand, else nothing."""
     motion: Motion
     """Rotor speeds and what acts on them; empty on a bench."""
+    speed_read: np.ndarray | None = None
+    """Rotor speeds as they were read, (n, k), rad/s, where those of the motion are smoothed."""
     attitude: tuple[np.ndarray, np.ndarray] | None = None
     """Roll and pitch of the mount, (n,) each, rad."""
     temperature: np.ndarray | None = None

@@ -151,7 +151,8 @@ class Problem:
         for x in self.fitted if loadings is None else loadings:
             speed = applied(x, chain, values, full, self.first_full, self.volts)
             if self.measured:
-                out.append(x.motion.rotor_speed - speed)
+                read = x.motion.rotor_speed if x.speed_read is None else x.speed_read
+                out.append(read - speed)
                 continue
             moved = loaded_by(replace(x, motion=with_speed(x.motion, speed)), self.setup.vehicle)
             left = moved.reading - moved.load

@@ -201,8 +201,9 @@ def smoothed(loading: Loading) -> Loading:
     """The loading with measured rotor speeds less their white noise."""
     if not loading.measured or loading.motion.rotor_speed is None:
         return loading
-    speed = without_noise(loading.motion.rotor_speed, 1.0 / loading.dt_s)
-    return replace(loading, motion=with_speed(loading.motion, speed))
+    read = loading.motion.rotor_speed
+    speed = without_noise(read, 1.0 / loading.dt_s)
+    return replace(loading, motion=with_speed(loading.motion, speed), speed_read=read)
 
 
 def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:

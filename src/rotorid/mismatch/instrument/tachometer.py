@@ -2,8 +2,8 @@
 
 On a stand the speeds are the load: their noise is an error of the regressor, of which a play or a filter of the load
 takes away what is small or quick, and so looks like one. A rotor's inertia keeps its speed smooth, the noise of a
-counter is white: every instant gets the longest window whose parabola agrees with those of all shorter ones
-(intersection of confidence intervals; A. Goldenshluger and A. Nemirovski, 1997), long on a plateau, short at a step.
+counter is white: on a plateau every instant gets the longest window whose parabola agrees with those of all shorter
+ones (intersection of confidence intervals; A. Goldenshluger and A. Nemirovski, 1997); at a step the reading stays.
 What is quick may also be the rotors' own: the reading tells, for it follows rotors but not their counters.
 """
 
@@ -17,7 +17,9 @@ from rotorid.effects.loading import Loading
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
-GAMMA = 2.0
+STEADY_WIDTH = 33
+"""Samples that must agree for a reading to be replaced: near a step a window bends what it smooths."""
+GAMMA = 2.6
 """Half-width of the confidence intervals, in standard errors."""
 BAND = (0.5, 0.75, 1.0)
 """Shares of the highest frequency in which the noise must be white, in two halves."""
@@ -74,5 +76,6 @@ def _smoothed(speed: np.ndarray, rate_hz: float) -> np.ndarray:
         value, doubt = savgol_filter(speed, width, 2), GAMMA * sd * np.sqrt(weight @ weight)
         low, high = np.maximum(low, value - doubt), np.minimum(high, value + doubt)
         agrees &= low <= high
-        best = np.where(agrees, value, best)
+        if width >= STEADY_WIDTH:
+            best = np.where(agrees, value, best)
     return best
