@@ -73,8 +73,6 @@ class Loading:
     """Load before the first sample as far as known, (6,): the weight on an untared stand, else nothing."""
     motion: Motion
     """Rotor speeds and what acts on them; empty on a bench."""
-    speed_read: np.ndarray | None = None
-    """Rotor speeds as they were read, (n, k), rad/s, where those of the motion are smoothed."""
     attitude: tuple[np.ndarray, np.ndarray] | None = None
     """Roll and pitch of the mount, (n,) each, rad."""
     temperature: np.ndarray | None = None
@@ -87,6 +85,8 @@ class Loading:
     """Whether the rotor speeds were measured (not commanded)."""
     keep: np.ndarray | None = None
     """Mask of the samples to be compared, (n,); None for all."""
+    speed_read: np.ndarray | None = None
+    """Rotor speeds as they were read, (n, k), rad/s, where those of the motion are smoothed."""
     extra: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
