@@ -8,12 +8,16 @@ from rotorid.effects.scale import scale
 E3 = np.array([0.0, 0.0, 1.0])
 
 
+def _weighted_airspeed(motion, vehicle):
+    """Σ ω_i v_i over the hubs, (n, 3), m/s²."""
+    hub = motion.hub_velocity(vehicle.rotor_positions_m())
+    return (motion.rotor_speed[:, :, None] * hub).sum(axis=1)
+
+
 def hub_moment(motion, vehicle, values):
     """M = k_flap Σ ω_i (v_i × e3): the disc tilts back and pulls the nose up in forward flight."""
-    hub = motion.hub_velocity(vehicle.rotor_positions_m())
-    weighted = (motion.rotor_speed[:, :, None] * hub).sum(axis=1)
     # v × e3 with e3 down has y component -v_x; nose up is +y, hence the sign.
-    return Contribution(moment=-values[0] * np.cross(weighted, E3))
+    return Contribution(moment=-values[0] * np.cross(_weighted_airspeed(motion, vehicle), E3))
 
 
 def independent_of_speed(motion, vehicle, values):
@@ -23,9 +27,7 @@ def independent_of_speed(motion, vehicle, values):
 
 def rolling(motion, vehicle, values):
     """M = −k_roll Σ ω_i (v_i − (v_i · e3) e3): about the airspeed itself, whichever way a rotor spins."""
-    hub = motion.hub_velocity(vehicle.rotor_positions_m())
-    weighted = (motion.rotor_speed[:, :, None] * hub).sum(axis=1)
-    return Contribution(moment=-values[0] * weighted * (1.0 - E3))
+    return Contribution(moment=-values[0] * _weighted_airspeed(motion, vehicle) * (1.0 - E3))
 
 
 def forms(vehicle):

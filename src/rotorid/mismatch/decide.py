@@ -205,8 +205,9 @@ def wrong_values(
         return fit.gain - cost
 
     subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]
+    best_first = sorted(subsets, key=penalised, reverse=True)
     doubtful: set[str] = set()
-    while named := max((s for s in subsets if not doubtful.intersection(s)), key=penalised):
+    while named := next(s for s in best_first if not doubtful.intersection(s)):
         fit = regression.fit(always + named, loose=loose)
         other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
         certainty = {}

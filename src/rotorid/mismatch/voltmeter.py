@@ -15,31 +15,11 @@ import numpy as np
 from scipy.signal import lfilter
 
 from rotorid.mismatch.motion import Segment
-from rotorid.recordings import RecordingSet, Run
-from rotorid.recordings import columns as c
 
-LEAST_V = 0.5
-"""No battery that turns a rotor has less: such a reading is of a voltmeter that is not connected."""
 SLOW_S = 5.0
 """Length of the mean that is taken for slow."""
 RELAXATION_S = (0.0, 0.03, 0.1, 0.3, 1.0)
 """Time constants with which the voltage may follow the load."""
-
-
-def connected(recordings: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:
-    """The set without voltages that no battery has, and a note for every run whose voltmeter read mostly such."""
-    runs, notes = [], []
-    for run in recordings.runs:
-        if run.has(c.BATTERY_VOLTAGE):
-            voltage = run.table[c.BATTERY_VOLTAGE]
-            dead = voltage < LEAST_V
-            if dead.any():
-                mostly = dead.sum() > voltage.notna().sum() / 2
-                run = Run(run.name, run.table.assign(**{c.BATTERY_VOLTAGE: np.nan if mostly else voltage.mask(dead)}))
-            if dead.any() and mostly:
-                notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {LEAST_V} V: taken as not connected.")
-        runs.append(run)
-    return replace(recordings, runs=tuple(runs)), tuple(notes)
 
 
 def without_noise(segments: list[Segment]) -> list[Segment]:

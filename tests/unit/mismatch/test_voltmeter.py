@@ -10,8 +10,9 @@ import pytest
 from scipy.signal import lfilter
 
 from rotorid.effects.contract import Motion
+from rotorid.mismatch.mistakes.dead_voltmeter import connected
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.voltmeter import connected, running_mean, without_noise
+from rotorid.mismatch.voltmeter import running_mean, without_noise
 from rotorid.recordings import RecordingSet, Run
 
 RATE_HZ = 200.0

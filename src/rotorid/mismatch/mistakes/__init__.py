@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units, vibration
+from rotorid.mismatch.mistakes.dead_voltmeter import connected
 from rotorid.mismatch.mistakes.signals import ReadSet
-from rotorid.mismatch.voltmeter import connected
 from rotorid.recordings import RecordingSet
 
 

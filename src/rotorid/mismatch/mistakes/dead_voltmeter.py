@@ -1,0 +1,31 @@
+"""Voltages that no battery has: of a voltmeter that is not connected."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.mismatch.mistakes.signals import replace_columns
+from rotorid.recordings import RecordingSet, Run
+from rotorid.recordings import columns as c
+
+LEAST_V = 0.5
+"""No battery that turns a rotor has less."""
+
+
+def connected(recordings: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:
+    """The set without voltages that no battery has, and a note for every run whose voltmeter read mostly such."""
+    notes = []
+
+    def change(run: Run):
+        if not run.has(c.BATTERY_VOLTAGE):
+            return {}
+        voltage = run.table[c.BATTERY_VOLTAGE]
+        dead = voltage < LEAST_V
+        if not dead.any():
+            return {}
+        mostly = dead.sum() > voltage.notna().sum() / 2
+        if mostly:
+            notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {LEAST_V} V: taken as not connected.")
+        return {c.BATTERY_VOLTAGE: np.nan if mostly else voltage.mask(dead)}
+
+    return replace_columns(recordings, change), tuple(notes)
