@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rotorid.effects.contract import Motion
+from rotorid.mismatch.height import quiet_height
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.signal import kernels
@@ -289,6 +290,8 @@ def build_segments(
             above = core(height)[:, 0]
         elif position is not None and vehicle.ground_z_m is not None:
             above = vehicle.ground_z_m - core(position)[:, 2]
+        if above is not None:
+            above = quiet_height(above, None if world_velocity is None else -world_velocity[:, 2], dt)
         motion = Motion(
             time_s=grid[inside],
             rotor_speed=core(used_speed),

@@ -161,5 +161,6 @@ def test_throttle_is_a_command_by_the_upper_limit(run):
 def test_height_from_the_ground_and_unknown_columns_kept(run):
     table = run.table.assign(payload_state=np.linspace(0, 1, len(run.table)))
     (segment,) = build_segments(Run("r", pd.DataFrame(table)), quad(ground_z_m=0.5), RATE_HZ, CUTOFF_HZ)
-    np.testing.assert_allclose(segment.motion.height, 0.5 - segment.motion.position[:, 2])
+    # Less the flutter of the position, which is below a centimetre.
+    np.testing.assert_allclose(segment.motion.height, 0.5 - segment.motion.position[:, 2], atol=0.01)
     assert list(segment.extra) == ["payload_state"] and len(segment.extra["payload_state"]) == segment.motion.size
