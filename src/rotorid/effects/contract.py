@@ -155,6 +155,13 @@ class Form:
     (`height`: far from the ground). `always` for a form that is there in any flight. Empty takes the effect's."""
     on_loading: bool = False
     """Whether the contribution takes a `Loading` (an instrument's) in place of a `Motion`."""
+    of_reading: tuple[int, ...] = ()
+    """Linear parameters s of Ω_m = (1 + s) Ω for which recordings give the reading Ω_m alone: a fit to it is of
+    s/(1 + s)."""
+
+    def stated(self, index: int, fitted: float) -> float:
+        """The parameter `index` as its equation has it, from the coefficient fitted to recordings."""
+        return fitted / (1.0 - fitted) if index in self.of_reading else fitted
 
     @property
     def linear(self) -> tuple[int, ...]:

@@ -41,7 +41,7 @@ def forms(vehicle):
     t = each("theta", "rad", -0.5, 0.5, "turn of the sensor about", 0.003)
     return (
         Form("bias", "Ω_m = Ω + b", b, bias, needs[:2], excited_by=("always",)),
-        Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs),
+        Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs, of_reading=(0, 1, 2)),
         Form("misalignment", "Ω_m = Ω + θ × Ω", t, misalignment, needs),
     )
 

@@ -39,17 +39,32 @@ def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray
     return fit.beta[where], fit.covariance[np.ix_(where, where)]
 
 
-def estimates(regression: Regression, fit: Fit, search: Search, key: str) -> tuple[Estimate, ...]:
-    """Linear parameters of a term with 95 % intervals: within runs and between them."""
+def suggested(search: Search, active: list[str]) -> Fit | None:
+    """The model with the strongest effect beside it that explains more than it costs and is still not stated.
+
+    It may be too small, too unsure or too much like the others; as long as it may be there, what is stated may be off
+    by what it would change.
+    """
+    found = next((c for c in search.candidates(active) if c.score > 0 and c.physical), None)
+    return None if found is None else search.regression.fit([*search.always, *active, found.key])
+
+
+def estimates(
+    regression: Regression, fit: Fit, search: Search, key: str, suggested: Fit | None = None
+) -> tuple[Estimate, ...]:
+    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`."""
     term = search.terms[key]
     beta, covariance = coefficients(regression, fit, key)
     spread, p = regression.between_runs(fit, key)
     variance = np.diag(covariance) + (spread if p < 0.05 else 0.0)
     reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
+    other = beta if suggested is None else coefficients(regression, suggested, key)[0]
     out = []
-    for index, value, sd in zip(term.form.linear, beta, np.sqrt(variance), strict=False):
+    for index, value, also, sd in zip(term.form.linear, beta, other, np.sqrt(variance), strict=False):
         parameter = term.form.parameters[index]
-        out.append(Estimate(parameter.symbol, float(value), parameter.unit, value - reach * sd, value + reach * sd))
+        ends = (value, min(value, also) - reach * sd, max(value, also) + reach * sd)
+        middle, low, high = (float(term.form.stated(index, x)) for x in ends)
+        out.append(Estimate(parameter.symbol, middle, parameter.unit, low, high))
     return tuple(out)
 
 
@@ -105,6 +120,7 @@ def wrench_findings(
     """A finding for every term that entered, and for those that looked like something and did not survive."""
     effects = catalogue()
     findings = []
+    beside = suggested(search, selection.active)
     for key in selection.active:
         term = search.terms[key]
         if term.effect in UNKNOWNS:
@@ -119,8 +135,10 @@ def wrench_findings(
         status = "ambiguous" if alternatives else "established"
         values = np.array(term.values, float)
         if term.form.linear:
-            values[list(term.form.linear)] = beta
-        parameters = estimates(regression, selection.fit, search, key) if term.form.linear else ()
+            values[list(term.form.linear)] = [
+                term.form.stated(i, b) for i, b in zip(term.form.linear, beta, strict=True)
+            ]
+        parameters = estimates(regression, selection.fit, search, key, beside) if term.form.linear else ()
         if key in nonlinear:
             values, sd = nonlinear[key]
             parameters = tuple(

@@ -216,3 +216,11 @@ def test_bounds_follow_the_vehicle():
     assert size.hover_speed_rad_s == pytest.approx(1073.4, abs=0.1)
     assert size.drag_per_rotor_speed == pytest.approx(5 * 0.652 / (4 * 1073.4), rel=1e-4)
     assert size.arm_m == pytest.approx(np.sqrt(2) * D)
+
+
+def test_a_scale_fitted_to_the_reading_itself_is_stated_of_what_it_should_have_read():
+    """Ω_m = 1.08 Ω: the reading is off by 0.08 Ω = 0.08 / 1.08 of itself."""
+    scale = next(f for f in catalogue()["gyro_error"].forms(thesis_vehicle()) if f.name == "scale")
+    assert [scale.stated(i, 0.08 / 1.08) for i in range(3)] == pytest.approx([0.08] * 3)
+    bias = next(f for f in catalogue()["gyro_error"].forms(thesis_vehicle()) if f.name == "bias")
+    assert bias.stated(0, 0.08) == 0.08
