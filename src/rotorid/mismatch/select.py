@@ -415,11 +415,11 @@ class Search:
                 continue
             spread, p = self.regression.between_runs(fit, key)
             cols = self.regression.columns([key])
-            where = [list(fit.columns).index(c) for c in cols]
+            beta = fit.beta[[list(fit.columns).index(c) for c in cols]]
             runs = len(np.unique(self.regression.run[self.regression.training]))
-            if p < UNSTEADY_P and (spread * runs).sum() > (UNSTEADY_SHARE * fit.beta[where]) @ (
-                UNSTEADY_SHARE * fit.beta[where]
-            ):
+            # Coefficients of one term have different units: what counts is how much of its contribution changes.
+            gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
+            if p < UNSTEADY_P and np.diag(gram) @ spread * runs > UNSTEADY_SHARE**2 * (beta @ gram @ beta):
                 return key
         return None
 
