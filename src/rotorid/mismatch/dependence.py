@@ -1,4 +1,11 @@
-"""Does a residual depend on the inputs? A test of independence, not of whiteness."""
+"""Does a residual depend on the inputs? A test of independence, not of whiteness.
+
+Residual and inputs are made from the same readings, so a sensor's noise stands in both: where a flight hardly changes
+the thrust, the tachometers' noise alone makes the residual depend on it. What that noise adds to the cross moments is
+learnt by adding the same noise once more, and taken away (Fuller, Measurement Error Models, 1987, ch. 2). A
+tachometer's noise may be coloured, and stronger in the band of the rows than its white part: a residual that some
+possible strength of it explains is no dependence.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +15,7 @@ from scipy.stats import f as f_distribution
 
 from rotorid.mismatch.between_runs import compared
 from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.prepare import assemble_rows
 from rotorid.mismatch.regression import at_least, quadratic_form
 from rotorid.mismatch.rows import CHANNELS
 
@@ -46,26 +54,55 @@ def probes(segment: Segment, prepared) -> dict[str, np.ndarray]:
     return out
 
 
-def standardised(prepared, segments):
-    """Names of the inputs that vary, and per stretch their values (n, p), of mean 0 and deviation 1 over the set."""
-    names = None
-    parts = []
-    for s in segments:
-        z = probes(s, prepared)
-        names = list(z) if names is None else [n for n in names if n in z]
-        parts.append(z)
+def standardised(prepared, segments, also=()):
+    """Names of the inputs that vary, and per stretch their values (n, p), of mean 0 and deviation 1 over `segments`.
+
+    Stretches of `also` follow on the same scale.
+    """
+    parts = [probes(s, prepared) for s in (*segments, *also)]
+    names = [n for n in parts[0] if all(n in z for z in parts)]
     stacked = [np.stack([z[n] for n in names], axis=1) for z in parts]
-    mean = np.concatenate(stacked).mean(axis=0)
-    spread = np.concatenate(stacked).std(axis=0)
+    every = np.concatenate(stacked[: len(segments)])
+    mean, spread = every.mean(axis=0), every.std(axis=0)
     keep = spread > 1e-9
     return [n for n, k in zip(names, keep, strict=True) if k], [
         ((z - mean) / np.where(spread > 0, spread, 1))[:, keep] for z in stacked
     ]
 
 
-def dependence(prepared, model, segments):
-    """p-values per channel that the residual depends on no input and not on the run, before and after; and inputs."""
-    names, inputs = standardised(prepared, segments)
+def added_noise(prepared, segments, noisy) -> list[np.ndarray]:
+    """What the sensors' noise, added once more (`noisy`), changes in the channels of each stretch, (n, 12)."""
+    clean_rows, noisy_rows = assemble_rows(prepared, [], segments), assemble_rows(prepared, [], noisy)
+    return [b.y - a.y for a, b in zip(clean_rows, noisy_rows, strict=True)]
+
+
+def most_noise(prepared, segments, noisy) -> float:
+    """How many times the energy of the noise added can be in the rotors' readings, at least 1.
+
+    Noise that is alike and independent in every rotor has no more energy than the combination of rotors that moves
+    least (the smallest eigenvalue of their covariance).
+    """
+    if not noisy or segments[0].motion.rotor_speed is None:
+        return 1.0
+    read, added, count = 0.0, 0.0, 0
+    for s, n in zip(segments, noisy, strict=True):
+        speeds = prepared.thinner(s.motion.rotor_speed)
+        noise = prepared.thinner(n.motion.rotor_speed) - speeds
+        speeds = speeds - speeds.mean(axis=0)
+        read, added, count = read + speeds.T @ speeds, added + float((noise**2).mean(axis=1).sum()), count + len(speeds)
+    return max(1.0, float(np.linalg.eigvalsh(read)[0]) / added) if added > 0 else 1.0
+
+
+def dependence(prepared, model, segments, noisy):
+    """p-values per channel that the residual depends on no input and not on the run, before and after; and inputs.
+
+    `noisy` are the segments with the sensors' noise added once more; empty where that is not known.
+    """
+    names, inputs = standardised(prepared, segments, noisy)
+    inputs, again = inputs[: len(segments)], inputs[len(segments) :]
+    noise = added_noise(prepared, segments, noisy) if noisy else []
+    moved = [b - a for a, b in zip(inputs, again, strict=True)] if noisy else []
+    most = most_noise(prepared, segments, noisy)
     full = model.regression.fit(model.search.always + model.selection.active)
     named = np.where(model.unnamed(full.columns), 0.0, full.beta)
     before, after, depends = {}, {}, {}
@@ -77,8 +114,9 @@ def dependence(prepared, model, segments):
         left = left_by(model.rows, c, full.columns, named)
         rate_hz = prepared.thinner.rate_hz
         runs = [r.run for r in model.rows]
-        p_before, _ = _wald(raw, inputs, taps, rate_hz)
-        p_after, t = _wald(left, inputs, taps, rate_hz)
+        shared = [(d[:, c], z) for d, z in zip(noise, moved, strict=True)] or None
+        p_before, _ = _wald(raw, inputs, taps, rate_hz, shared, most)
+        p_after, t = _wald(left, inputs, taps, rate_hz, shared, most)
         # Neither on the inputs nor on the run: the smaller of two p-values, doubled.
         before[CHANNELS[c]] = min(1.0, 2 * min(p_before, compared(runs, raw, rate_hz)[1]))
         after[CHANNELS[c]] = min(1.0, 2 * min(p_after, compared(runs, left, rate_hz)[1]))
@@ -98,21 +136,29 @@ def left_by(rows, channel: int, columns, beta) -> list[np.ndarray]:
     return left if sum(float(x @ x) for x in left) <= sum(float(y @ y) for y in raw) else raw
 
 
-def _wald(parts, inputs, taps, rate_hz):
-    """Block-robust Hotelling test of a regression of the whitened residual on the whitened inputs."""
+def _wald(parts, inputs, taps, rate_hz, shared=None, most=1.0):
+    """Block-robust Hotelling test of a regression of the whitened residual on the whitened inputs.
+
+    `shared` holds per stretch what one more draw of the sensors' noise changes in residual (n,) and inputs (n, p);
+    once to `most` times that is taken away, as much as explains most.
+    """
     size = inputs[0].shape[1]
-    gram, scores, blocks = np.zeros((size, size)), [], []
+    blocks, noise = [], np.zeros(size)
     per = max(2, int(BLOCK_S * rate_hz))
-    skip = len(taps) - 1
-    for y, z in zip(parts, inputs, strict=True):
-        yw, zw = lfilter(taps, [1.0], y)[skip:], lfilter(taps, [1.0], z, axis=0)[skip:]
-        for index in np.array_split(np.arange(len(yw)), max(1, len(yw) // per)):
-            blocks.append((zw[index].T @ zw[index], zw[index].T @ yw[index]))
+    for k, (y, z) in enumerate(zip(parts, inputs, strict=True)):
+        yw, zw = _whitened(y, taps), _whitened(z, taps)
+        y_noise, z_noise = (0 * yw, 0 * zw) if shared is None else (_whitened(x, taps) for x in shared[k])
+        for i in np.array_split(np.arange(len(yw)), max(1, len(yw) // per)):
+            blocks.append((zw[i].T @ zw[i], zw[i].T @ yw[i], len(i)))
+        noise = noise + z_noise.T @ y_noise
     gram = sum(b[0] for b in blocks)
-    cross = sum(b[1] for b in blocks)
     inverse = np.linalg.pinv(gram, rcond=1e-9, hermitian=True)
-    beta = inverse @ cross
-    scores = np.array([b[1] - b[0] @ beta for b in blocks])
+    cross = sum(b[1] for b in blocks)
+    scale = float(noise @ inverse @ noise)
+    noise = noise * float(np.clip(noise @ inverse @ cross / scale, 1.0, most)) if scale > 0 else noise
+    beta = inverse @ (cross - noise)
+    each = noise / sum(b[2] for b in blocks)
+    scores = np.array([c - n * each - g @ beta for g, c, n in blocks])
     plain = inverse
     robust = inverse @ (scores.T @ scores) @ inverse
     covariance = at_least(robust, plain)
@@ -122,3 +168,7 @@ def _wald(parts, inputs, taps, rate_hz):
         return 1.0, np.zeros(size)
     p = float(f_distribution.sf(statistic * (count - size) / (size * (count - 1)), size, count - size))
     return p, beta / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+
+
+def _whitened(x: np.ndarray, taps: np.ndarray) -> np.ndarray:
+    return lfilter(taps, [1.0], x, axis=0)[len(taps) - 1 :]

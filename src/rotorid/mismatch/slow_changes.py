@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import welch
 
-from rotorid.mismatch.dependence import SMALLEST_SHARE_OF_NOISE, left_by
-from rotorid.mismatch.prepare import assemble_rows
+from rotorid.mismatch.dependence import SMALLEST_SHARE_OF_NOISE, added_noise, left_by
 from rotorid.mismatch.rows import CHANNELS
 
 SLOW_BANDS_HZ = ((0.15, 0.7), (0.7, 2.5))
@@ -29,13 +28,13 @@ def slow_excess(prepared, model, segments, noisy) -> dict[str, tuple[float, floa
     rate = prepared.thinner.rate_hz
     fast = tuple(share * prepared.thinner.cutoff_hz for share in FAST_BAND)
     full = model.regression.fit(model.search.always + model.selection.active)
-    clean_rows, noisy_rows = assemble_rows(prepared, [], segments), assemble_rows(prepared, [], noisy)
+    noise = added_noise(prepared, segments, noisy)
     out = {}
     for c in range(6):
         if not np.isfinite(model.noise[c]):
             continue
         left = left_by(model.rows, c, full.columns, full.beta)
-        added = [b.y[:, c] - a.y[:, c] for a, b in zip(clean_rows, noisy_rows, strict=True)]
+        added = [x[:, c] for x in noise]
         frequency, found = _spectrum(left, rate)
         if frequency is None:
             continue

@@ -355,10 +355,14 @@ def one_per_class(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]) -> str:
-    """The channel in which the mismatch stands out most: its error before over its noise, found ones first."""
+    """The channel in which the mismatch stands out most: its error before over its noise.
+
+    Of the channels of what was named; without any, of those that are left unexplained; else of those located.
+    """
     inverse = [t.channel for t in analysis.traces]
     named = [c for f in with_status(analysis, "established", "ambiguous") for c in f.channels if c in channels]
-    pool = named or [loc.channel for loc in locations if loc.channel in channels] or inverse
+    left = [] if analysis.values else [c for c in analysis.unexplained_channels if c in channels]
+    pool = named or left or [loc.channel for loc in locations if loc.channel in channels] or inverse
 
     def excess(name):
         errors = channels[name].rmse.training

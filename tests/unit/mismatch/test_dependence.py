@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rotorid.mismatch.dependence import _wald, left_by, probes
+from rotorid.mismatch.dependence import _wald, left_by, most_noise, probes
 from rotorid.mismatch.leftover import _features, kept_by_values
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.rows import Thinner
@@ -45,6 +45,42 @@ def test_a_dependence_of_a_third_of_the_noise_is_seen():
     inputs = np.stack([coloured(2400, 1.0, rng, pole=0.95) for _ in range(4)], axis=1)
     noise = coloured(2400, 1.0, rng, pole=0.6)
     assert p_of(noise + 0.35 * inputs[:, 2], inputs) < 1e-5
+
+
+def read_by_noisy_tachometers(slope: float, pole: float, seed: int):
+    """A residual that hangs on a reading by `slope`; the reading's noise is in both. And one more draw of the noise."""
+    rng = np.random.default_rng(seed)
+    moved, noise, again = (coloured(4800, size, rng, pole=p) for size, p in ((1.0, 0.9), (1.0, pole), (0.4, 0.0)))
+    residual = slope * moved - 0.5 * noise + coloured(4800, 1.0, rng, pole=0.0)
+    inputs, taps = (moved + noise)[:, None], autoregression([residual])
+    return [residual], [inputs], taps, [(-0.5 * again, again[:, None])]
+
+
+def test_the_noise_that_residual_and_input_share_is_no_dependence():
+    """The noise is six times as strong as its white part (0.4² of 1²) says; where it may be, nothing is called."""
+    residual, inputs, taps, shared = read_by_noisy_tachometers(0.0, pole=0.8, seed=3)
+    assert _wald(residual, inputs, taps, RATE_HZ)[0] < 1e-9
+    assert _wald(residual, inputs, taps, RATE_HZ, shared)[0] < 1e-5
+    assert _wald(residual, inputs, taps, RATE_HZ, shared, most=20.0)[0] > 0.01
+
+
+def test_a_dependence_beyond_what_shared_noise_makes_is_still_seen():
+    """The other sign, and the same sign with noise that cannot be as strong as that."""
+    residual, inputs, taps, shared = read_by_noisy_tachometers(1.2, pole=0.8, seed=4)
+    assert _wald(residual, inputs, taps, RATE_HZ, shared, most=20.0)[0] < 1e-6
+    residual, inputs, taps, shared = read_by_noisy_tachometers(-0.8, pole=0.8, seed=5)
+    assert _wald(residual, inputs, taps, RATE_HZ, shared, most=2.0)[0] < 1e-6
+
+
+def test_noise_has_no_more_energy_than_the_combination_of_rotors_that_moves_least():
+    """All four rotors move together by 9 rad/s and each by itself by 3; the noise added is 1: nine times at most."""
+    rng = np.random.default_rng(6)
+    speed = 1000 + 9 * rng.standard_normal((8000, 1)) + 3 * rng.standard_normal((8000, 4))
+    noisy = speed + rng.standard_normal((8000, 4))
+    prepared = SimpleNamespace(thinner=lambda x: x)
+    segments = [[SimpleNamespace(motion=SimpleNamespace(rotor_speed=x))] for x in (speed, noisy)]
+    assert most_noise(prepared, *segments) == pytest.approx(9.0, rel=0.05)
+    assert most_noise(prepared, segments[0], []) == 1.0
 
 
 def test_too_few_blocks_say_nothing():
