@@ -66,7 +66,7 @@ def standardised(prepared, segments):
 def dependence(prepared, model, segments):
     """p-values per channel that the residual depends on no input and not on the run, before and after; and inputs."""
     names, inputs = standardised(prepared, segments)
-    full = model.regression.fit(model.search.always + model.selection.active)
+    full = model.full_fit()
     named = np.where(model.unnamed(full.columns), 0.0, full.beta)
     before, after, depends = {}, {}, {}
     for c in range(6):
