@@ -36,7 +36,7 @@ from rotorid.recordings import RecordingSet, Run  # noqa: E402
 ROWS = ((15, 250), (30, 250), (60, 250), (120, 250), (240, 250), (600, 500))
 HOUR = (3600, 500)
 PERIOD_S = 60
-DRAG, TAU_S, G = 6e-5, 0.04, 9.81
+DRAG_N_S_M, TAU_S, G = 0.26, 0.04, 9.81
 WIND_M_S = np.array([2.0, -1.0, 0.0])
 VEHICLE = EXAMPLE.model_copy(update={"name": "benchmark", "ground_z_m": 0.0, "rotor_speed_limits_rad_s": (0.0, 2500.0)})
 
@@ -69,7 +69,7 @@ def attitude(up: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     return np.stack([np.cross(y, z), y, z], axis=2)
 
 
-def minute(rate_hz: int, seed: int = 1) -> dict[str, np.ndarray]:
+def minute(rate_hz: int, seed: int = 8) -> dict[str, np.ndarray]:
     """One minute of true motion, every signal periodic: the path is given, attitude and rotors follow from it."""
     rng = np.random.default_rng(seed)
     sizes = ((2.5, 0.35, 0.02, 3.0), (2.5, 0.35, 0.02, 3.0), (0.7, 0.5, 0.02, 3.0))
@@ -81,17 +81,18 @@ def minute(rate_hz: int, seed: int = 1) -> dict[str, np.ndarray]:
     felt = slope(velocity, rate_hz) - [0.0, 0.0, G]
     drag, air = np.zeros_like(velocity), velocity - WIND_M_S
     for _ in range(8):
-        # Thrust carries what drag does not; drag needs attitude and rotor speeds, which need the thrust.
+        # Thrust carries what drag does not; drag needs the attitude, which needs the thrust.
         rotation = attitude(felt - drag, yaw)
-        force = np.einsum("nji,nj->ni", rotation, felt)
-        collective = np.sqrt(-4 * mass * force[:, 2:] / VEHICLE.thrust_coefficient_n_s2)
         body = np.einsum("nji,nj->ni", rotation, air) * [1.0, 1.0, 0.0]
-        drag = np.einsum("nij,nj->ni", rotation, -DRAG / mass * collective * body)
+        drag = np.einsum("nij,nj->ni", rotation, -DRAG_N_S_M / mass * body)
+    force = np.einsum("nji,nj->ni", rotation, felt)
     turning = np.einsum("nji,njk->nik", rotation, slope(rotation, rate_hz))
     rates = np.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
     moment = slope(rates, rate_hz) @ inertia + np.cross(rates, rates @ inertia)
     thrusts = np.column_stack([-mass * force[:, 2], moment]) @ mixer.T
-    speed = np.sqrt(np.maximum(thrusts, 0.05) / VEHICLE.thrust_coefficient_n_s2)
+    if thrusts.min() < 0:
+        raise ValueError("no rotor pulls: the motion asks for more than the vehicle can do")
+    speed = np.sqrt(thrusts / VEHICLE.thrust_coefficient_n_s2)
     quaternion = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
     turned = np.einsum("ij,ij->i", quaternion[1:], quaternion[:-1]) < 0
     quaternion[1:] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]

@@ -111,7 +111,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
             reasons.setdefault("battery_sag", "no battery voltage")
     findings += wrench_findings(
         model.rows,
-        model.regression,
+        model.search.regression,
         model.search,
         model.selection,
         model.noise,
@@ -128,7 +128,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     plain_values = {}
     if model.wind is None:
         nothing = Selection([], model.selection.fit)
-        plain_values = wrong_values(model.regression, model.search, nothing, None, size_of_value(model))
+        plain_values = wrong_values(model.search.regression, model.search, nothing, None, size_of_value(model))
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
     notes += run_scale_notes(model)
@@ -181,7 +181,7 @@ def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:
 def values_called_wrong(model: WrenchModel) -> Values:
     """Believed values that the model's recordings contradict."""
     reverse = reverse_regression(model.prepared, model, model.segments)
-    return wrong_values(model.regression, model.search, model.selection, reverse, size_of_value(model))
+    return wrong_values(model.search.regression, model.search, model.selection, reverse, size_of_value(model))
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
@@ -214,7 +214,7 @@ def thrust_differs(model: WrenchModel) -> bool:
     """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than RUN_SPREAD."""
     if "thrust" not in model.search.terms or not all(s.measured_speed for s in model.prepared.segments):
         return False
-    regression = model.regression
+    regression = model.search.regression
     fit = regression.fit(model.search.always + model.selection.active)
     spread, p = regression.between_runs(fit, "thrust")
     runs = len(np.unique(regression.run[regression.training]))
@@ -232,11 +232,12 @@ def lag_alone_note(fit: SpeedFit) -> str:
 
 def run_scale_notes(model: WrenchModel) -> list[str]:
     """What was done about a thrust that differs between runs."""
-    terms = [t for t in model.regression.terms if t.key.startswith(RUN_SCALE)]
+    regression = model.search.regression
+    terms = [t for t in regression.terms if t.key.startswith(RUN_SCALE)]
     if not terms:
         return []
-    fit = model.regression.fit(model.search.always + model.selection.active)
-    found = [fit.beta[fit.columns == model.regression.start[t.key]][0] for t in terms]
+    fit = regression.fit(model.search.always + model.selection.active)
+    found = [fit.beta[fit.columns == regression.start[t.key]][0] for t in terms]
     parts = ", ".join(f"{t.run} {100 * b:+.1f} %" for t, b in zip(terms, found, strict=True))
     return [f"The thrust coefficient is not the same in every run; each has its own scale ({parts})."]
 
@@ -424,16 +425,16 @@ def absorbed_findings(model: WrenchModel, values: dict, findings: list[Finding])
     """Effects that look significant while the wrong values are held at their belief, and vanish with them."""
     if not values:
         return []
-    search = model.search
+    search, regression = model.search, model.search.regression
     held = [k for k in search.always if k not in values]
-    base = model.regression.fit(held + model.selection.active)
+    base = regression.fit(held + model.selection.active)
     taken = {f.id for f in findings}
     out: dict[str, Finding] = {}
-    for term in model.regression.terms:
+    for term in regression.terms:
         if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
             continue
-        fit = model.regression.fit([*held, *model.selection.active, term.key])
-        p = model.regression.wald(fit, model.regression.columns([term.key]), search.blocks)
+        fit = regression.fit([*held, *model.selection.active, term.key])
+        p = regression.wald(fit, regression.columns([term.key]), search.blocks)
         if p < ABSORBED_P and fit.gain - base.gain > 50:
             name = catalogue()[term.effect].name
             out[term.effect] = Finding(

@@ -103,7 +103,7 @@ def dependence(prepared, model, segments, noisy):
     noise = added_noise(prepared, segments, noisy) if noisy else []
     moved = [b - a for a, b in zip(inputs, again, strict=True)] if noisy else []
     most = most_noise(prepared, segments, noisy)
-    full = model.regression.fit(model.search.always + model.selection.active)
+    full = model.full_fit()
     named = np.where(model.unnamed(full.columns), 0.0, full.beta)
     before, after, depends = {}, {}, {}
     for c in range(6):

@@ -38,7 +38,8 @@ KNOT_S, RESTLESS_KNOT_S = 0.3, 1.0
 """Distance of knots in a window, where a gust may set in within a fraction of a second, and where the wind changes
 all the time."""
 MOST_KNOTS = 150
-"""Knots of all restless runs together: beyond, the recording is too long to ask for a wind everywhere."""
+"""Knots of all runs together: beyond, the recording is too long to ask for a wind everywhere, and of windows the
+strongest are looked at."""
 RESTLESS_SHARE = 0.5
 """A wind that never rests must take away more than this share of the energy left in the horizontal force."""
 LASTING_S = 12.0
@@ -141,6 +142,7 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
         for s, rows, left in zip(segments, model.rows, after_residual(model), strict=True)
     ]
     found = [(run, [w for w in own if not beyond_fitted(model, run, *w[:2])]) for run, own in found]
+    found = strongest(found)
     asked = [wind_term(run, knots_of(a, b, KNOT_S)) for run, own in found for a, b, _ in own]
     if feels_wind(model):
         # A force that no wind makes through the drag is no gust: it stays unexplained.
@@ -157,6 +159,20 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
         # A strong gust hides the drag through which it is felt; with the gust known as a force it shows.
         return in_moving_air(prepared, again, terms, asked) or again
     return again
+
+
+def strongest(found: list[tuple[str, list]], most_knots: int = MOST_KNOTS) -> list[tuple[str, list]]:
+    """The strongest windows (start_s, stop_s, strength) of all runs, as many as have `most_knots` in all.
+
+    Every knot is two columns of the regression: their number must not grow with the recording.
+    """
+    kept, left = set(), most_knots
+    for run, window in sorted(((r, w) for r, own in found for w in own), key=lambda rw: -rw[1][2]):
+        left -= len(knots_of(*window[:2], KNOT_S))
+        if left < 0:
+            break
+        kept.add((run, window))
+    return [(run, [w for w in own if (run, w) in kept]) for run, own in found]
 
 
 def beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -> bool:
@@ -223,21 +239,21 @@ def in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], ask
             return None
         steps, covariances = estimated(prepared, again, still, 1)
         winds = {k: (t, values + steps[k][1]) for k, (t, values) in winds.items()}
+        gusts = believed([gust_of(term, wind, covariances[key]) for key, (term, wind) in winds.items()], again)
+        if not gusts:
+            return None
     everywhere = any(t.window[2] - t.window[1] > 0.9 * length_of(model, t.run) for t in asked)
     if everywhere and horizontal_energy(again) > (1 - RESTLESS_SHARE) * horizontal_energy(model):
         return None
-    gusts = [
-        Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, covariances[key], chance(wind, covariances[key]))
-        for key, (term, wind) in winds.items()
-    ]
-    sizes = {g.window: size_of(g, again) for g in gusts if g.p_value < GUST_P}
-    if max(sizes.values(), default=0.0) <= BURST_SIZE:
-        return None
-    gusts = [g for g in gusts if sizes.get(g.window, 0.0) > BESIDE_A_BURST]
     if len(gusts) < len(asked):
         present = {g.window for g in gusts}
         return in_moving_air(prepared, model, terms, [t for t in asked if t.window in present])
     return replace(again, wind=model.wind, wind_sd=model.wind_sd, gusts=tuple(gusts))
+
+
+def gust_of(term: Term, wind: np.ndarray, covariance: np.ndarray) -> Gust:
+    """The gust of a term's knots with its wind, north then east (2 knots,), m/s."""
+    return Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, covariance, chance(wind, covariance))
 
 
 def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:

@@ -98,8 +98,9 @@ def without(model: WrenchModel, key: str) -> WrenchModel:
     """The model with one effect less, all else fitted anew."""
     search, old = model.search, model.selection
     active = [k for k in old.active if k != key]
-    fit = model.regression.fit(search.always + active, jackknife=True)
-    p_values = {k: model.regression.wald(fit, model.regression.columns([k]), search.blocks) for k in active}
+    regression = search.regression
+    fit = regression.fit(search.always + active, jackknife=True)
+    p_values = {k: regression.wald(fit, regression.columns([k]), search.blocks) for k in active}
     reasons = {**old.not_established, search.terms[key].effect: REASON}
     return replace(model, selection=replace(old, active=active, fit=fit, p_values=p_values, not_established=reasons))
 

@@ -102,7 +102,7 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None)
 def channels_of(prepared, model, segments, slow, p_after, delivered) -> list[Channel]:
     """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others."""
     _, inputs = standardised(prepared, segments)
-    full = model.regression.fit(model.search.always + model.selection.active)
+    full = model.full_fit()
     unnamed = model.unnamed(full.columns)
     training = [r.run in prepared.split.training for r in model.rows]
     if prepared.split.training == prepared.split.held_out:

@@ -13,7 +13,7 @@ Fuller, Measurement Error Models, 1987, ch. 2).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
@@ -39,6 +39,7 @@ MOST_DISTRUST = 3.0
 VALUE_LIMITS = (0.15, 0.4)
 """A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
 mismatch that needs a third of the arm is no wrong ruler."""
+MOST_OF_ACTIVE_SET = 20
 HOLD = 1e6
 RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
@@ -124,11 +125,11 @@ class Regression:
 
     def columns(self, keys: Iterable[str]) -> np.ndarray:
         """Column numbers of terms, in the order given."""
-        sizes = {t.key: t.size for t in self.terms}
-        parts = [np.arange(self.start[k], self.start[k] + sizes[k]) for k in keys]
-        return np.concatenate(parts).astype(int) if parts else np.zeros(0, int)
+        parts = [self._where[k] for k in keys]
+        return np.concatenate(parts) if parts else np.zeros(0, int)
 
     def __post_init__(self):
+        self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
         self._total_gram = self.gram[self.training].sum(axis=0)
         self._total_cross = self.cross[self.training].sum(axis=0)
         self.limit = np.full(len(self._total_cross), np.inf)
@@ -137,6 +138,44 @@ class Regression:
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
         self._explained: dict[tuple[str, ...], float] = {}
         self._fits: dict[tuple[tuple[str, ...], bool], Fit] = {}
+
+    def without_winds(self) -> Regression:
+        """The same without the winds of single runs: every other column less what they take of it.
+
+        A wind has two columns for every knot, hundreds where it never rests, and each acts in a few blocks. Their
+        share of any fit is linear in the other coefficients (Frisch, Waugh and Lovell), so it is taken out once:
+        fits, gains, block scores and robust covariances of the others are those of the whole. The winds stand last,
+        so column numbers stay.
+        """
+        winds = [t for t in self.terms if t.kind == "wind" and t.run]
+        if not winds:
+            return self
+        cols = self.columns([t.key for t in winds])
+        kept = cols.min()
+        if cols.max() + 1 != len(self.precision) or len(cols) != len(self.precision) - kept:
+            raise ValueError("the winds of single runs must be the last columns")
+        every = np.arange(len(self.precision))
+        gram, cross, bias, bias_cross = self._normal(every, self.training)
+        normal = gram - bias + np.diag(self.precision)
+        inverse = ridge_inverse(normal[kept:, kept:])
+        # A wind follows the other coefficients b as `alone + follows @ b`.
+        follows, alone = -inverse @ normal[kept:, :kept], inverse @ (cross - bias_cross)[kept:]
+        blocks = [
+            projected(*of_block, kept, follows, alone)
+            for of_block in zip(self.gram, self.cross, self.square, strict=True)
+        ]
+        bias_gram, bias_cross, _ = projected(self.bias_gram, self.bias_cross, 0.0, kept, follows, alone)
+        return replace(
+            self,
+            terms=[t for t in self.terms if t not in winds],
+            start={k: v for k, v in self.start.items() if v < kept},
+            gram=np.array([b[0] for b in blocks]),
+            cross=np.array([b[1] for b in blocks]),
+            square=np.array([b[2] for b in blocks]),
+            precision=self.precision[:kept],
+            bias_gram=bias_gram,
+            bias_cross=bias_cross,
+        )
 
     def _normal(self, cols: np.ndarray, mask: np.ndarray):
         share = mask.sum() / len(mask)
@@ -183,12 +222,12 @@ class Regression:
         beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
         self._fit_held_out_scales(cols, beta, mask)
         count = int(mask.sum())
-        every = self.gram[np.ix_(np.arange(len(mask)), cols, cols)]
-        blocks = every[mask]
-        scores = self.cross[np.ix_(np.flatnonzero(mask), cols)] - bias_cross / count - (blocks - bias / count) @ beta
+        every, explained = self.gram[:, cols[:, None], cols], self.cross[:, cols]
+        pull = every @ beta
+        scores = (explained - pull)[mask] - (bias_cross - bias @ beta) / count
         if jackknife:
             eye = np.eye(len(cols))
-            scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
+            scores = np.linalg.solve(eye[None] - (every[mask] - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
         spread = scores.T @ scores * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse
         # With the ridge, or two columns that are copies of each other would seem to be known.
@@ -197,7 +236,7 @@ class Regression:
         uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
         shift = DOUBT_OF_CORRECTION * (beta - uncorrected)
         covariance = at_least(robust, plain) + np.outer(shift, shift)
-        rss = self.square - 2 * self.cross[:, cols] @ beta + (every @ beta) @ beta
+        rss = self.square - 2 * explained @ beta + pull @ beta
         gain = float(self.square[mask].sum() - rss[mask].sum())
         return Fit(cols, beta, covariance, rss, gain)
 
@@ -211,7 +250,7 @@ class Regression:
             own = self.run == self.names[term.run]
             if not len(where) or (own & mask).any():
                 continue
-            gram = self.gram[own][:, column, cols].sum(axis=0)
+            gram = self.gram[own, column][:, cols].sum(axis=0)
             beta[where] = 0.0
             left = self.cross[own, column].sum() - gram @ beta
             beta[where] = left / (gram[where[0]] + self.precision[column])
@@ -260,15 +299,17 @@ class Regression:
         cols = self.columns([key])
         where = [list(fit.columns).index(c) for c in cols]
         rest = [i for i in range(len(fit.columns)) if i not in where]
+        owns = self.gram[:, cols[:, None], cols]
+        lefts = self.cross[:, cols] - self.gram[:, cols[:, None], fit.columns[rest]] @ fit.beta[rest]
+        every = np.diag(self._total_gram)[cols]
         estimates, variances = [], []
         for run in np.unique(self.run[self.training]):
             mask = self.training & (self.run == run)
             if mask.sum() < 5:
                 continue
-            own = self.gram[mask][:, cols][:, :, cols]
+            own, cross = owns[mask], lefts[mask]
             total = own.sum(axis=0)
-            cross = self.cross[mask][:, cols] - self.gram[mask][:, cols][:, :, fit.columns[rest]] @ fit.beta[rest]
-            if total[0, 0] < 1e-3 * self.gram[self.training][:, cols[0], cols[0]].sum():
+            if total[0, 0] < 1e-3 * every[0]:
                 continue  # the effect is hardly excited in this run
             inverse = np.linalg.pinv(total, rcond=1e-10, hermitian=True)
             beta = inverse @ cross.sum(axis=0)
@@ -276,7 +317,6 @@ class Regression:
             robust = inverse @ (scores.T @ scores) @ inverse
             estimates.append(beta)
             # A coefficient that a run does not excite says nothing there: a height of mass on a level mount.
-            every = np.diagonal(self.gram[self.training][:, cols][:, :, cols], axis1=1, axis2=2).sum(axis=0)
             silent = np.diag(total) < 1e-3 * every
             variances.append(np.where(silent, np.inf, np.maximum(np.diag(robust), np.diag(inverse))))
         if len(estimates) < 2:
@@ -298,8 +338,8 @@ class Regression:
             where = np.flatnonzero(without.columns == column)
             if len(where):
                 shift[i] -= without.beta[where[0]]
-        grams = self.gram[np.ix_(np.flatnonzero(mask), with_it.columns, with_it.columns)]
-        return float(((grams @ shift) @ shift).sum())
+        gram = self.gram[:, with_it.columns[:, None], with_it.columns][mask].sum(axis=0)
+        return float(shift @ gram @ shift)
 
     def beyond(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Columns and coefficients of a term's own part: what `keys` would absorb of it is taken off.
@@ -320,7 +360,9 @@ class Regression:
             values, vectors = np.linalg.eigh(inner / np.outer(unit, unit))
             values = np.maximum(values, RIDGE)
             forth, back = (vectors / np.sqrt(values)).T, (vectors * np.sqrt(values)).T
-            taken = lsq_linear(forth, -back @ (unit * pull), bounds=(-most / unit, most / unit)).x * unit
+            # Of few columns the active set is found at once; of many, interior steps are faster.
+            method = "bvls" if len(unit) < MOST_OF_ACTIVE_SET else "trf"
+            taken = lsq_linear(forth, -back @ (unit * pull), bounds=(-most / unit, most / unit), method=method).x * unit
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
@@ -344,6 +386,21 @@ class Regression:
         return float(f.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
 
 
+def projected(
+    gram: np.ndarray, cross: np.ndarray, square: float, kept: int, follows: np.ndarray, alone: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Gram matrix (kept, kept), cross products and square of a block whose columns from `kept` on have the
+    coefficients `alone + follows @ b`, b those of the columns before."""
+    acting = np.flatnonzero(np.diag(gram)[kept:])
+    last, follows, alone = kept + acting, follows[acting], alone[acting]
+    mixed, own = gram[:kept, last], gram[np.ix_(last, last)]
+    shared = mixed @ follows
+    inner = gram[:kept, :kept] + shared + shared.T + follows.T @ own @ follows
+    left = cross[last] - own @ alone
+    outer = cross[:kept] - mixed @ alone + follows.T @ left
+    return inner, outer, square - float(alone @ (cross[last] + left))
+
+
 def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
     dead = diagonal <= 1e-24
@@ -356,8 +413,8 @@ def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
     The one that is furthest out is held at its limit by an overwhelming prior, until none is out.
     """
     held, at = np.zeros(len(right)), np.zeros(len(right))
+    inverse = ridge_inverse(normal)
     for _ in range(len(right) + 1):
-        inverse = ridge_inverse(normal + np.diag(held))
         solution = inverse @ (right + held * at)
         out = np.where(held > 0, 0.0, np.abs(solution) / limit)
         worst = int(np.argmax(out)) if len(out) else 0
@@ -365,6 +422,9 @@ def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
             break
         held[worst] = HOLD * max(normal[worst, worst], 1e-300)
         at[worst] = np.sign(solution[worst]) * limit[worst]
+        # One more number on the diagonal is a change of rank one (Sherman and Morrison).
+        column = inverse[:, worst]
+        inverse = inverse - np.outer(column, column) * (held[worst] / (1.0 + held[worst] * column[worst]))
     return solution, inverse, held, at
 
 
@@ -382,7 +442,10 @@ def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
     scale = inverse_root(np.diag(gram))
     if (np.diag(bias) * scale**2).sum() <= MOST_ATTENUATION * 1e-9:
         return bias  # less than the limit in any direction that is kept below
-    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram)))
+    scaled = gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram))
+    if np.trace(np.linalg.solve(scaled, bias * np.outer(scale, scale))) <= MOST_ATTENUATION:
+        return bias  # the shares of all directions together are no more
+    values, vectors = np.linalg.eigh(scaled)
     values = np.maximum(values, 1e-9)
     back = vectors / np.sqrt(values)
     inner = back.T @ (bias * np.outer(scale, scale)) @ back

@@ -63,6 +63,11 @@ class Term:
         return self.key if self.run else self.effect
 
 
+def winds_last(terms: Iterable[Term]) -> list[Term]:
+    """Terms with the winds of single runs after all others, where `Regression.without_winds` expects them."""
+    return sorted(terms, key=lambda t: t.kind == "wind" and bool(t.run))
+
+
 def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Thrust force, thrust moment and reaction torque of the believed rotors, each (n, 3), N and N m."""
     squared = motion.rotor_speed**2

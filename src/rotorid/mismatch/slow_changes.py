@@ -27,7 +27,7 @@ def slow_excess(prepared, model, segments, noisy) -> dict[str, tuple[float, floa
         return {}  # what rotors make of their commands is not known well enough
     rate = prepared.thinner.rate_hz
     fast = tuple(share * prepared.thinner.cutoff_hz for share in FAST_BAND)
-    full = model.regression.fit(model.search.always + model.selection.active)
+    full = model.full_fit()
     noise = added_noise(prepared, segments, noisy)
     out = {}
     for c in range(6):

@@ -19,7 +19,7 @@ from rotorid.mismatch.regression import (
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.rows import Rows, Term, residual
+from rotorid.mismatch.rows import Rows, Term, residual, winds_last
 from rotorid.mismatch.select import FINAL_P, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
@@ -72,6 +72,11 @@ class WrenchModel:
     segments: list[Segment] = field(default_factory=list)
     """What the rows are made of: rotor speeds as the chain has them, moving air where it moves."""
     noisy_segments: list[Segment] = field(default_factory=list)
+
+    def full_fit(self) -> Fit:
+        """The fit of everything in the model, winds of single runs and all."""
+        always = [t.key for t in self.regression.terms if t.kind != "effect"]
+        return self.regression.fit(always + self.selection.active)
 
     def unnamed(self, columns: np.ndarray) -> np.ndarray:
         """Mask of the columns that belong to empirical terms, which no finding may count as its own."""
@@ -154,14 +159,14 @@ def searched(
     )
     per = max(2, int(rate))
 
-    values = [t.key for t in terms if t.kind == "value"]
+    values, seconds = [t.key for t in terms if t.kind == "value"], Seconds(rows, noise, per)
 
     def sizes_of(key: str, beta: np.ndarray) -> np.ndarray:
         # What refitted values would absorb of a term does not count as its size.
         short = any(t.key == key and t.run for t in terms)
         own = regression.columns([key])
         cols, coefficients = regression.beyond(values, key, beta) if key not in values else (own, beta)
-        return local_sizes(rows, cols, coefficients, noise, per, 1.0 if short else 0.9)
+        return seconds.sizes(cols, coefficients, 1.0 if short else 0.9)
 
     rule = training_rule(prepared.split, segments)
     held = [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in rows]
@@ -169,7 +174,8 @@ def searched(
     def harms(key: str, with_it: Fit, without: Fit) -> bool:
         return spoils_a_channel(rows, held, regression.columns([key]), with_it, without, noise, per)
 
-    search = Search(regression, sizes_of, known_sizes, harms)
+    # Winds of single runs are always in the model: fits of the search leave their many columns out.
+    search = Search(regression.without_winds(), sizes_of, known_sizes, harms)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise, noise)
 
 
@@ -233,11 +239,35 @@ def band_power(parts: list[np.ndarray], rate_hz: float, band: tuple[float, float
     return float(sum(power) / max(sum(len(p) for p in parts if len(p) >= 32), 1))
 
 
-def local_sizes(
-    rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray, per: int, quantile: float = 0.9
-) -> np.ndarray:
-    """Strongest tenth of the seconds of a contribution per channel, in units of the channel's noise, (12,)."""
-    return sizes_of_parts([r.x[:, :, cols] @ beta for r in rows], noise, per, quantile)
+class Seconds:
+    """How large contributions are second by second, from Gram matrices of their columns over blocks of `per` rows.
+
+    A search asks for the size of the same columns with other coefficients over and over: the rows are read once.
+    """
+
+    def __init__(self, rows: list[Rows], noise: np.ndarray, per: int):
+        self.rows, self.noise, self.per = rows, noise, per
+        self._grams: dict[tuple[int, ...], tuple[np.ndarray, list[np.ndarray]]] = {}
+
+    def sizes(self, cols: np.ndarray, beta: np.ndarray, quantile: float = 0.9) -> np.ndarray:
+        """Strongest tenth of the seconds of columns times coefficients per channel, in units of its noise, (12,)."""
+        channels, parts = self._grams_of(tuple(int(c) for c in cols))
+        best = np.zeros(12)
+        for gram in parts:
+            local = np.sqrt(np.maximum((gram @ beta) @ beta, 0.0))
+            best[channels] = np.fmax(best[channels], np.quantile(local, quantile, axis=0) / self.noise[channels])
+        return np.nan_to_num(best)
+
+    def _grams_of(self, cols: tuple[int, ...]) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Channels (c,) that columns act in, and of every stretch their mean products there, (seconds, c, k, k)."""
+        if cols not in self._grams:
+            parts = [r.x[: len(r.y) // self.per * self.per][:, :, list(cols)] for r in self.rows]
+            channels = np.flatnonzero(np.any([p.any(axis=(0, 2)) for p in parts], axis=0))
+            shape = (self.per, len(channels), len(cols))
+            parts = [p[:, channels].reshape(len(p) // self.per, *shape) for p in parts if len(p)]
+            turned = [p.transpose(0, 2, 3, 1) for p in parts]
+            self._grams[cols] = channels, [t @ t.swapaxes(-1, -2) / self.per for t in turned]
+        return self._grams[cols]
 
 
 def sizes_of_parts(parts: list[np.ndarray], noise: np.ndarray, per: int, quantile: float = 0.9) -> np.ndarray:
@@ -510,7 +540,7 @@ def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
 
 def after_residual(model: WrenchModel) -> list[np.ndarray]:
     """Residual rows with the selected effects, (n, 12) per segment."""
-    full = model.regression.fit(model.search.always + model.selection.active)
+    full = model.full_fit()
     return [r.y - r.x[:, :, full.columns] @ full.beta for r in model.rows]
 
 
@@ -526,9 +556,11 @@ def reverse_regression(prepared: Prepared, model: WrenchModel, segments) -> Regr
     way: the truth lies between (Frisch bounds).
     """
     active = [model.search.terms[k] for k in model.selection.active]
-    terms = [t for t in model.terms if t.kind != "effect"] + active
+    always = [t for t in model.terms if t.kind != "effect"]
+    terms = winds_last([*always, *active])
     rows = assemble_rows(prepared, terms, segments, chosen(model), measured_moment=True)
     rate = prepared.thinner.rate_hz
-    return build(
+    regression = build(
         rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
     )
+    return regression.without_winds()

@@ -53,6 +53,13 @@ def test_a_weaker_gust_beside_a_strong_one_is_kept(monkeypatch):
     assert gusts.believed([doubtful, *found[1:]], None) == []
 
 
+def test_of_too_many_windows_the_strongest_are_looked_at():
+    """Windows of 3 s have 11 knots: two fit into 25, whatever runs they are of."""
+    found = [("a", [(0.0, 3.0, 9.0), (5.0, 8.0, 6.5)]), ("b", [(1.0, 4.0, 7.0)])]
+    assert gusts.strongest(found, 25) == [("a", [(0.0, 3.0, 9.0)]), ("b", [(1.0, 4.0, 7.0)])]
+    assert gusts.strongest(found, 33) == found
+
+
 def test_without_a_gust_none_is_told():
     analysis = analyse(recorded(4, 5, flight={"drag": DRAG, "excitation": 1.5}))
     assert "gust" not in {f.id for f in analysis.findings}

@@ -234,6 +234,53 @@ def test_the_gain_expected_on_held_out_blocks_is_what_a_right_model_gains():
     assert gained == pytest.approx(expected, rel=0.2)
 
 
+def with_knots(knots: int) -> Regression:
+    """Two effects and a wind of so many knots in each of two runs, one of them held out; noisy regressors."""
+    rng = np.random.default_rng(9)
+    rows, noisy, size = [], [], 1600
+    for k in range(2):
+        x = np.stack([coloured(size, 1.0, rng, pole=0.9) for _ in range(2)], axis=1)
+        hats = [np.interp(np.arange(size), np.linspace(0, size, knots), unit) for unit in np.eye(knots)]
+        # A wind is felt through the second effect's own input: the two are far from orthogonal.
+        winds = np.zeros((size, 2 * knots))
+        winds[:, k * knots : (k + 1) * knots] = np.stack(hats, axis=1) * (1.0 + 0.3 * x[:, 1:])
+        blown = winds[:, k * knots : (k + 1) * knots] @ rng.standard_normal(knots)
+        y = x @ [0.5, -0.8] + blown + 0.3 * rng.standard_normal(size)
+        for out, error in ((rows, 0.0), (noisy, 0.2)):
+            read = np.concatenate([x + error * rng.standard_normal(x.shape), winds], axis=1)
+            out.append(rows_of(y, *read.T, run=f"r{k}"))
+    terms = [*terms_of("one", "two"), *(Term(f"wind{k}", "wind", "gust", size=knots, run=f"r{k}") for k in range(2))]
+    return build(rows, terms, {0: np.array([3.0, -0.5])}, lambda run, t: run == "r0", 1.0, RATE_HZ, noisy)
+
+
+def test_winds_taken_out_once_leave_every_fit_as_it_was():
+    whole = with_knots(20)
+    less, winds = whole.without_winds(), ["wind0", "wind1"]
+    full, reduced = whole.fit(["one", "two", *winds]), less.fit(["one", "two"])
+    np.testing.assert_allclose(reduced.beta, full.beta[:2], rtol=1e-8)
+    # The robust covariance is raised to the plain one direction by direction, here of two and there of all.
+    np.testing.assert_allclose(reduced.covariance, full.covariance[:2, :2], rtol=0.05)
+    np.testing.assert_allclose(reduced.residual_square, full.residual_square, rtol=1e-7)
+    gains = [r.fit(["one", "two", *w]).gain - r.fit(["one", *w]).gain for r, w in ((whole, winds), (less, []))]
+    assert gains[0] == pytest.approx(gains[1], rel=1e-6)
+    # Without the wind neither would be right: it is no small thing that was taken out.
+    assert np.abs(whole.fit(["one", "two"]).beta - full.beta[:2]).max() > 0.02
+
+
+def test_what_a_fit_costs_does_not_grow_with_the_knots_of_a_wind():
+    """A fit handles a matrix of this size for every block of time, and a search makes thousands of fits."""
+    few, many = (with_knots(k).without_winds() for k in (3, 40))
+    assert few.gram.shape == many.gram.shape and few.gram.shape[1:] == (2, 2)
+    assert with_knots(3).without_winds().terms == terms_of("one", "two")
+
+
+def test_winds_that_do_not_stand_last_are_refused():
+    rows = [rows_of(np.ones(400), np.ones(400), np.ones(400), run="a")]
+    terms = [Term("w", "wind", "gust", run="a"), *terms_of("one")]
+    with pytest.raises(ValueError, match="last"):
+        build(rows, terms, {0: np.array([1.0])}, lambda run, t: True, 1.0, RATE_HZ).without_winds()
+
+
 def test_a_stretch_shorter_than_the_whitening_says_nothing():
     """Three samples between two holes, a filter of eight: the fit is that of the long stretch alone."""
     rng = np.random.default_rng(8)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Rows
-from rotorid.mismatch.wrench import inflated_channels, spoils_a_channel
+from rotorid.mismatch.wrench import Seconds, inflated_channels, sizes_of_parts, spoils_a_channel
 
 
 def fit_of(*beta: float) -> Fit:
@@ -51,3 +51,22 @@ def test_a_residual_far_above_its_noise_is_itself_the_noise():
     remains = np.full((500, 12), np.nan)
     remains[:, 0], remains[:, 3] = 0.1 * rng.normal(size=500), 0.08 * rng.normal(size=500)
     assert list(np.flatnonzero(inflated_channels([remains], noise))) == [3]
+
+
+def test_sizes_second_by_second_are_those_of_the_rows():
+    """A column of 1 in the first second and 3 in the second, times 2, noise 0.5: 4 and 12, nine tenths up 11.2."""
+    rows = two_channels(1.0, 1.0, 85)
+    rows.x[:, 0, 0] = np.where(np.arange(85) < 40, 1.0, 3.0)
+    rows.x[:, 3, 0] = 0.0
+    noise = np.where(np.isfinite(rows.y[0]), 0.5, np.nan)
+    found = Seconds([rows], noise, 40).sizes(np.array([0]), np.array([2.0]))
+    np.testing.assert_allclose(found, [11.2, *[0.0] * 11])
+
+
+def test_sizes_of_several_columns_and_stretches():
+    rng = np.random.default_rng(2)
+    acts = (np.arange(12) < 4)[None, :, None]
+    stretches = [Rows("a", np.arange(n) / 40, np.zeros((n, 12)), rng.normal(size=(n, 12, 5)) * acts) for n in (410, 30)]
+    cols, beta, noise = np.array([4, 0, 3]), rng.normal(size=3), np.full(12, 2.0)
+    expected = sizes_of_parts([r.x[:, :, cols] @ beta for r in stretches], noise, 40)
+    np.testing.assert_allclose(Seconds(stretches, noise, 40).sizes(cols, beta), expected, rtol=1e-12)
