@@ -209,8 +209,8 @@ def smoothed(loading: Loading) -> Loading:
 def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
     """The motion with these rotor speeds (n, k), rad/s, and their derivative.
 
-    Of the quartic through five samples, which reads 0.01 % less at 8 Hz of 200 Hz; a parabola would read 3.5 % less, and
-    a rotor's inertia be found as much too large.
+    Of the quartic through five samples, which reads 0.01 % less at 8 Hz of 200 Hz; a parabola would read 3.5 % less,
+    and a rotor's inertia be found as much too large.
     """
     if speed is None:
         return motion
