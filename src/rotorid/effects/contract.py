@@ -191,6 +191,8 @@ class SpeedPath:
     """Battery voltage, (n,), V."""
     full_voltage: float | None = None
     """Largest battery voltage of the set, V."""
+    holds: bool = True
+    """Whether a command holds until the next instant; else it is smooth between instants."""
 
     @property
     def dt_s(self) -> float:

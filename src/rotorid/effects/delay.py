@@ -4,6 +4,7 @@ import numpy as np
 
 from rotorid.effects.clock_skew import at_other_times
 from rotorid.effects.contract import Effect, Form, Parameter, SpeedForm
+from rotorid.effects.loading import between_samples
 from rotorid.effects.recorded import late_sensors
 
 
@@ -19,8 +20,10 @@ def _later(speed, steps):
 
 
 def shifted(path, values):
-    """ω(t) = ω_c(t - T), linear between samples."""
+    """ω(t) = ω_c(t - T): of a command that holds the mean over a sample, of a smooth one a cubic between samples."""
     steps = values[0] / path.dt_s
+    if not path.holds:
+        return between_samples(path.speed, np.arange(len(path.speed)) - steps)
     whole = np.floor(steps)
     part = steps - whole
     out = _later(path.speed, whole)

@@ -8,38 +8,47 @@ from rotorid.effects.contract import Effect, Parameter, SpeedForm
 
 @njit(cache=True)
 def _lag(command, up, down):
-    """First-order lag with its own step factor (1 - exp(-dt/τ)) up and down; the command holds over a sample."""
+    """First-order lag with its own step (1 - exp(-dt/τ), weight of the command's change) up and down."""
     out = np.empty_like(command)
     for j in range(command.shape[1]):
         state = command[0, j]
         out[0, j] = state
         for i in range(1, command.shape[0]):
-            gap = command[i - 1, j] - state
-            state += (up if gap > 0 else down) * gap
+            old, change = command[i - 1, j], command[i, j] - command[i - 1, j]
+            share, weight = up if old - state + 0.5 * change * (up[1] > 0) > 0 else down
+            state += share * (old - state) + weight * change
             out[i, j] = state
     return out
 
 
-def lagged(command, tau_up_s, tau_down_s, dt_s):
-    """dω/dt = (ω_c - ω)/τ, exact over a sample, shape (n, k); no lag at all for time constants of zero."""
+def lagged(command, tau_up_s, tau_down_s, dt_s, holds=True):
+    """dω/dt = (ω_c - ω)/τ, shape (n, k); exact for a command that holds over a sample, or that is linear over it.
+
+    No lag at all for time constants of zero. Linear: ω_k = ω_(k-1) + (1 − e^-r)(c_(k-1) − ω_(k-1)) +
+    (1 − (1 − e^-r)/r)(c_k − c_(k-1)) with r = dt/τ.
+    """
     if tau_up_s <= 0.0 and tau_down_s <= 0.0:
         return command
-    up = 1.0 - np.exp(-dt_s / max(tau_up_s, 1e-5))
-    down = 1.0 - np.exp(-dt_s / max(tau_down_s, 1e-5))
-    return _lag(np.ascontiguousarray(command), up, down)
+    return _lag(np.ascontiguousarray(command), _step(tau_up_s, dt_s, holds), _step(tau_down_s, dt_s, holds))
+
+
+def _step(tau_s, dt_s, holds):
+    ratio = dt_s / max(tau_s, 1e-5)
+    share = 1.0 - np.exp(-ratio)
+    return share, 0.0 if holds else 1.0 - share / ratio
 
 
 def one_constant(path, values):
-    return lagged(path.speed, values[0], values[0], path.dt_s)
+    return lagged(path.speed, values[0], values[0], path.dt_s, path.holds)
 
 
 def up_and_down(path, values):
-    return lagged(path.speed, values[0], values[1], path.dt_s)
+    return lagged(path.speed, values[0], values[1], path.dt_s, path.holds)
 
 
 def on_thrust(path, values):
     """The thrust, not the speed, follows as a first-order lag."""
-    return np.sqrt(np.maximum(lagged(path.speed**2, values[0], values[0], path.dt_s), 0.0))
+    return np.sqrt(np.maximum(lagged(path.speed**2, values[0], values[0], path.dt_s, path.holds), 0.0))
 
 
 def _tau(symbol):

@@ -35,6 +35,8 @@ RATE_HZ = 30.0
 QUICK_FIT = 6
 MOST_TRIED = 4
 MOST_FORMS = 4
+MOST_DOUBT = 3.0
+"""Standard deviations by which a command may differ from the curve through its samples."""
 SUB_SAMPLE = 1.2
 """Offsets in time up to so many samples are a nuisance."""
 OTHER_SUPPLY = 0.05
@@ -60,7 +62,7 @@ Chain = tuple[tuple[str, SpeedForm], ...]
 
 @dataclass(frozen=True)
 class ChainFit:
-    """A fitted chain: full speed first where it is free, then the parameters of every form."""
+    """A fitted chain: full speed first where it is free, the parameters of every form, `unknown_courses` last."""
 
     chain: Chain
     theta: np.ndarray
@@ -80,33 +82,72 @@ class ChainResult:
     full_speed_sd: float
     findings: list[Finding] = field(default_factory=list)
     noise_rad_s: float | None = None
+    holds: bool = False
+    """Whether commands stand until their next sample."""
 
 
-def applied(loading: Loading, chain: Chain, values, full_speed: float, first_full: float, volts) -> np.ndarray:
+def takes_time(chain: Chain) -> bool:
+    return any(form.excited_by == "change" for _, form in chain)
+
+
+def unknown_courses(chain: Chain, dt_s: float) -> np.ndarray:
+    """One-sigma of what a chain's command did between its samples, which nobody recorded: its first two moments.
+
+    By how much it was late (s), and by which variance in time it was smoother or sharper than the curve through its
+    samples (s²). A command that holds is late by half a sample and spread by dt²/12, a straight line across a kink is
+    off by as much at most. A delay in the chain is the first moment already.
+    """
+    if not takes_time(chain):
+        return np.zeros(0)
+    spread = dt_s**2 / 12.0
+    return np.array([spread]) if "delay" in dict(chain) else np.array([0.5 * dt_s, spread])
+
+
+def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, finer: int) -> np.ndarray:
+    """Speeds (n, k) at samples from those on a clock `finer` times faster, with these moments between the samples.
+
+    ω(t − δ) + ½ v (ω(t + dt) − 2 ω(t) + ω(t − dt))/dt²: rotors take a command that is late or spread as it comes.
+    """
+    if len(moments) > 1:
+        speed = between_samples(speed, np.arange(len(speed)) - moments[0] / dt_s * finer)
+    out = speed[::finer].copy()
+    if len(moments) and len(out) > 2:
+        out[1:-1] += 0.5 * moments[-1] / dt_s**2 * np.diff(speed[::finer], 2, axis=0)
+    return out
+
+
+def applied(
+    loading: Loading, chain: Chain, values, full_speed: float, first_full: float, volts, holds: bool = False
+) -> np.ndarray:
     """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed.
 
-    Between samples a command is taken as smooth: the chain runs on a clock FINER times faster. (A command that holds
-    until the next is then half a sample late: offsets in time below a sample are a nuisance anyway.)
+    The chain runs on a clock FINER times faster. Between samples a command is smooth, and linear on that clock; or it
+    `holds` until the next sample. `values` are those of the forms, then what `unknown_courses` names.
     """
-    timed = any(form.excited_by == "change" for _, form in chain)
-    finer = FINER if timed else 1
-    command, time_s = between(loading.command, finer), between(loading.time_s, finer)
+    finer = FINER if takes_time(chain) else 1
+    command = held(loading.command, finer) if holds else between(loading.command, finer)
+    time_s = between(loading.time_s, finer)
     voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
     speed = command * (full_speed / first_full)
     at = 0
     for _, form in chain:
-        path = SpeedPath(speed, time_s, full_speed, voltage, volts)
+        path = SpeedPath(speed, time_s, full_speed, voltage, volts, holds)
         # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
         with np.errstate(invalid="ignore"):
             speed = np.nan_to_num(form.apply(path, np.asarray(values[at : at + len(form.parameters)])))
         at += len(form.parameters)
-    return speed[::finer]
+    return moved_between_samples(speed, np.asarray(values[at:]), loading.dt_s, finer)
+
+
+def held(values: np.ndarray, finer: int) -> np.ndarray:
+    """Samples (n, k) on a clock `finer` times faster, each of which stands until the next."""
+    return np.repeat(values, finer, axis=0)[: (len(values) - 1) * finer + 1]
 
 
 def between(values: np.ndarray, finer: int) -> np.ndarray:
     """Samples (n,) or (n, k) with `finer` − 1 more between any two."""
     if finer == 1 or len(values) < 4:
-        return np.repeat(values, finer, axis=0)[: (len(values) - 1) * finer + 1]
+        return held(values, finer)
     out = np.empty(((len(values) - 1) * finer + 1, *values.shape[1:]))
     out[::finer] = values
     for k in range(1, finer):
@@ -121,9 +162,13 @@ def between(values: np.ndarray, finer: int) -> np.ndarray:
 class Problem:
     """Residuals of a chain on the stretches that are fitted."""
 
-    def __init__(self, setup: Setup, others: list | None = None):
-        """`others` are (form, values) of effects of the reading found so far; their linear gains stay free."""
+    def __init__(self, setup: Setup, others: list | None = None, holds: bool = False):
+        """`others` are (form, values) of effects of the reading found so far; their linear gains stay free.
+
+        `holds` says that a command stands until its next sample; else it is smooth.
+        """
         self.setup = setup
+        self.holds = holds
         self.first_full = setup.full_speed or largest_command(setup)
         self.scaled = setup.estimated_full_speed
         self.volts = full_voltage_of(setup.loadings)
@@ -149,7 +194,7 @@ class Problem:
         full, values = (theta[0], theta[1:]) if self.scaled else (self.first_full, theta)
         out = []
         for x in self.fitted if loadings is None else loadings:
-            speed = applied(x, chain, values, full, self.first_full, self.volts)
+            speed = applied(x, chain, values, full, self.first_full, self.volts, self.holds)
             if self.measured:
                 read = x.motion.rotor_speed if x.speed_read is None else x.speed_read
                 out.append(read - speed)
@@ -197,13 +242,22 @@ class Problem:
     def neutral(self) -> np.ndarray:
         return np.array([self.first_full]) if self.scaled else np.zeros(0)
 
+    def unknown(self, chain: Chain) -> np.ndarray:
+        return unknown_courses(chain, 1.0 / self.setup.instrument.rate_hz)
+
+    def doubts(self, chain: Chain, theta: np.ndarray) -> np.ndarray:
+        """What is not known between samples, in its one-sigmas: joins the residuals."""
+        unknown = self.unknown(chain)
+        return theta[len(theta) - len(unknown) :] / unknown
+
     def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
         for _, form in chain:
             low += [p.low for p in form.parameters]
             high += [p.high for p in form.parameters]
-        return np.array(low), np.array(high)
+        reach = MOST_DOUBT * self.unknown(chain)
+        return np.array([*low, *-reach]), np.array([*high, *reach])
 
     def fit(self, chain: Chain, start: np.ndarray, most: int = 30) -> ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
@@ -215,7 +269,7 @@ class Problem:
         start = np.clip(start, low + 1e-9 * span, high - 1e-9 * span)
         scale = np.maximum(np.abs(start), 0.02 * span)
         found = least_squares(
-            lambda theta: self.white(chain, theta),
+            lambda theta: np.concatenate([self.white(chain, theta), self.doubts(chain, theta)]),
             start,
             bounds=(low, high),
             x_scale=scale,
@@ -235,8 +289,10 @@ class Problem:
             moved[i] += step if moved[i] + step <= high[i] else -step
             columns.append((self.white(fit.chain, moved) - base) / (moved[i] - fit.theta[i]))
         jacobian = np.stack(columns, axis=1)
-        unit = 1.0 / np.sqrt(np.maximum((jacobian**2).sum(axis=0), 1e-300))
-        gram = (jacobian * unit).T @ (jacobian * unit)
+        unknown = self.unknown(fit.chain)
+        known = np.concatenate([np.zeros(len(fit.theta) - len(unknown)), unknown**-2.0])
+        unit = 1.0 / np.sqrt(np.maximum((jacobian**2).sum(axis=0) + known, 1e-300))
+        gram = (jacobian * unit).T @ (jacobian * unit) + np.diag(known * unit**2)
         inverse = np.linalg.pinv(gram + 1e-9 * np.eye(len(gram)), hermitian=True)
         blocks = self.blocks(len(base))
         scores = np.array([(jacobian[b] * unit).T @ base[b] for b in blocks])
@@ -337,9 +393,14 @@ def start_of(chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm], values, sc
     return np.array(theta, float)
 
 
+def with_unknown(problem: Problem, chain: Chain, theta: np.ndarray) -> np.ndarray:
+    """Full speed and parameters of a chain, and nothing that happened between its samples."""
+    return np.concatenate([theta, np.zeros(len(problem.unknown(chain)))])
+
+
 def best_start(problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
     """Of a new form's starting values those that already explain most."""
-    options = [start_of(chain, fit, new, v, problem.scaled) for v in starts(new[1])]
+    options = [with_unknown(problem, chain, start_of(chain, fit, new, v, problem.scaled)) for v in starts(new[1])]
     return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
 
 
@@ -356,9 +417,8 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
     best = problem.fit((), problem.neutral())
     dropped: dict[str, str] = {}
     for _ in range(ROUNDS):
-        best = grown(problem, best, forms, dropped)
-        problem.learn(best.chain, best.theta)
-        best = problem.fit(best.chain, best.theta)
+        best = holding_or_not(problem, grown(problem, best, forms, dropped))
+        best = richer(problem, best)
         names = {key for key, _ in best.chain}
         best = exchanged(problem, best, forms)
         new = {key for key, _ in best.chain} - names
@@ -368,6 +428,24 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
         dropped = {key: reason for key, reason in dropped.items() if key not in new}
     best = pruned(problem, better_forms(problem, best, forms), dropped)
     return worded(problem, best, forms, dropped)
+
+
+def holding_or_not(problem: Problem, best: ChainFit) -> ChainFit:
+    """The fit with commands that hold from sample to sample, or with smooth ones, whichever explains more.
+
+    A chain that takes time sees the difference. Compared by sizes alone: whitened by its own residual, the poorer of
+    the two would look as good. `problem` is left with the better one.
+    """
+    if not takes_time(best.chain):
+        return best
+    problem.learn(best.chain, best.theta, coloured=False)
+    own = problem.fit(best.chain, best.theta)
+    problem.holds = not problem.holds
+    other = problem.fit(best.chain, best.theta)
+    if other.cost > own.cost - ALIKE:
+        problem.holds = not problem.holds
+        other = own
+    return richer(problem, other)
 
 
 def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainFit:
@@ -458,7 +536,7 @@ def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFi
         kept = [(k, f) for k, f in best.chain if k != worst]
         theta = [best.theta[:1]] if problem.scaled else []
         theta += [best.theta[place_of(best.chain, k, problem.scaled)] for k, _ in kept]
-        start = np.concatenate(theta) if theta else np.zeros(0)
+        start = with_unknown(problem, tuple(kept), np.concatenate(theta) if theta else np.zeros(0))
         best = richer(problem, ChainFit(tuple(kept), start, best.cost))
     return best
 
@@ -546,7 +624,7 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
             findings.append(Finding(id=key, status="not_established", sentence=text))
     full = float(best.theta[0]) if problem.scaled else problem.first_full
     noise = float(np.sqrt(np.mean(problem.noise**2))) if problem.measured else None
-    return ChainResult(best, full, float(sd[0]) if problem.scaled else 0.0, findings, noise)
+    return ChainResult(best, full, float(sd[0]) if problem.scaled else 0.0, findings, noise, problem.holds)
 
 
 def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]:
@@ -608,6 +686,7 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
                         [p],
                         [t for t in best.theta[:1]] if problem.scaled else [],
                         *[best.theta[place_of(best.chain, k, problem.scaled)] for k, _ in rest],
+                        np.zeros(len(problem.unknown(rest))),
                     ]
                 )
                 low, high = problem.bounds(rest)
@@ -631,7 +710,7 @@ def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
     values = result.fit.values(problem.scaled)
     out = []
     for x in setup.loadings:
-        speed = applied(x, result.fit.chain, values, result.full_speed, problem.first_full, problem.volts)
+        speed = applied(x, result.fit.chain, values, result.full_speed, problem.first_full, problem.volts, result.holds)
         command = x.command * (result.full_speed / problem.first_full)
         out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
     return tuple(out)
@@ -639,7 +718,7 @@ def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
 
 def speed_traces(setup: Setup, result: ChainResult) -> tuple[Trace, ...]:
     """Measured less commanded and less modelled speed of every rotor, where both are recorded."""
-    problem = Problem(setup)
+    problem = Problem(setup, holds=result.holds)
     start = problem.neutral()
     if problem.scaled:
         start = np.array([result.full_speed])

@@ -207,13 +207,17 @@ def smoothed(loading: Loading) -> Loading:
 
 
 def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
-    """The motion with these rotor speeds (n, k), rad/s, and their derivative (quadratic over five samples)."""
+    """The motion with these rotor speeds (n, k), rad/s, and their derivative.
+
+    Of the quartic through five samples, which reads 0.01 % less at 8 Hz of 200 Hz; a parabola would read 3.5 % less,
+    and a rotor's inertia be found as much too large.
+    """
     if speed is None:
         return motion
     acceleration = None
     if motion.size >= 7:
         dt_s = float(np.median(np.diff(motion.time_s)))
-        acceleration = savgol_filter(speed, 5, 2, deriv=1, delta=dt_s, axis=0)
+        acceleration = savgol_filter(speed, 5, 4, deriv=1, delta=dt_s, axis=0)
     return replace(motion, rotor_speed=speed, rotor_acceleration=acceleration)
 
 
