@@ -16,15 +16,16 @@ from scipy.signal import lfilter
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.thrust_curve import SQUARE
-from rotorid.mismatch.decide import WIDEST_TRUST, wrench_findings, wrong_values
+from rotorid.mismatch import within_trust
+from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.gusts import gust_finding, with_gusts
 from rotorid.mismatch.harmless import REASON as HARM
-from rotorid.mismatch.harmless import Values, believed_residuals, delivered_residuals, held_out_masks, without_harm
+from rotorid.mismatch.harmless import Values, believed_residuals, held_out_masks, residuals_of, without_harm
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.motion import stretches
+from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import Prepared, prepare
 from rotorid.mismatch.regime import regime_variables
@@ -32,6 +33,7 @@ from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
 from rotorid.mismatch.speedpath import SpeedFit, SpeedResult, commanded_path, nothing_between
 from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.within_trust import beyond_trust, settled
 from rotorid.mismatch.wrench import (
     WrenchModel,
     after_residual,
@@ -122,25 +124,38 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     if found is not None and not measured:
         findings = [throttle_or_thrust(f) for f in findings]
 
-    told = speed_for_coefficients(values, prepared.vehicle) if only_throttle(recordings) else values
+    scale: dict[str, tuple[float, float, float, float]] = {}
+    told = values
+    if only_throttle(recordings):
+        told = speed_for_coefficients(values, prepared.vehicle)
+        if prepared.vehicle.rotor_speed_limits_rad_s is None:
+            told, scale = throttle_scale(values, model, full_speed(recordings.runs, prepared.vehicle))
     findings = rectified(payload_or_offset(findings, values))
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
     if model.wind is None:
         nothing = Selection([], model.selection.fit)
         plain_values = wrong_values(model.search.regression, model.search, nothing, None, size_of_value(model))
-    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
-    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in told.items()})
+    plain_fit, moved = settled(prepared, model, plain_values, ())
+    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **plain_values}.items()})
+    fit, moved = settled(prepared, model, values, model.selection.active)
+    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
+    for _, full, _, _ in scale.values():
+        improved = improved.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
     notes += run_scale_notes(model)
     if found is not None and found[0].lag_alone is not None:
         notes.append(lag_alone_note(found[0].lag_alone))
-    delivered = delivered_residuals(model, values, plain_values)
-    traces = make_traces(prepared, model, found, measured, plain_values, values, delivered)
+    delivered = residuals_of(model, fit)
+    traces = make_traces(prepared, model, found, measured, residuals_of(model, plain_fit), delivered)
     findings, told = with_square_term(findings, told, model)
     told = without_values_in_question(findings, told)
+    if commanded and any(f.id == "battery_sag" and f.status in ("established", "ambiguous") for f in findings):
+        # At which voltage the believed values hold is not stated: the largest in the set is only a guess.
+        told = without_common_scale(told)
     before, after, depends = dependence(prepared, model, segments, noisy)
     claimed = bool(values) or any(f.status in ("established", "ambiguous") for f in findings)
-    left = leftover(prepared, model, segments, noisy, after, depends, delivered if claimed else None)
+    strained = claimed and beyond_trust(model, values, model.selection.active)
+    left = leftover(prepared, model, segments, noisy, after, depends, delivered if strained else None)
     findings = together(findings)
     fly = next_flight(findings, prepared, model.noise)
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}
@@ -151,7 +166,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         refitted=refitted,
         improved=improved,
         findings=tuple(findings),
-        values=contract_values(prepared.vehicle, told),
+        values={**contract_values(prepared.vehicle, told), **scale},
         not_testable={k: v for k, v in reasons.items() if k not in known},
         traces=traces,
         noise_floor=noise_floors(prepared, model, found, measured),
@@ -166,6 +181,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         next_sigma=fly.sigma,
         force_source=segments[0].force_source,
         notes=tuple(notes),
+        put_right=within_trust.in_words(moved),
     )
 
 
@@ -413,6 +429,27 @@ def speed_for_coefficients(values: dict, vehicle: Vehicle) -> dict:
     return {**rest, "speed": (float(factor - 1.0), float(0.5 / factor / np.sqrt(weight.sum())))}
 
 
+def throttle_scale(values: Values, model: WrenchModel, full_rad_s: float):
+    """Values less what only says how fast rotors turn at full throttle, and that speed, which nobody stated.
+
+    The scale of the throttle rests on the believed thrust coefficient and mass: it is known as well as they are.
+    """
+    trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
+    full = full_rad_s * float(np.sqrt(1 + values.get("thrust", (0.0, 0.0))[0]))
+    reach = 1.96 * full * 0.5 * float(np.hypot(trust.get("thrust", 0.0), trust.get("mass", 0.0)))
+    return without_common_scale(values), {PARAMETER_NAMES["speed"]: (float("nan"), full, full - reach, full + reach)}
+
+
+def without_common_scale(values: Values) -> Values:
+    """Values where the scale of the rotors' speed is not known: a thrust, and a torque less its part in the scale."""
+    (thrust, thrust_sd), (torque, torque_sd) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "torque"))
+    kept = {k: v for k, v in values.items() if k not in ("thrust", "torque", "speed")}
+    change, sd = (1 + torque) / (1 + thrust) - 1, float(np.hypot(thrust_sd, torque_sd))
+    if "torque" in values and abs(change) > max(VALUE_Z * sd, SMALLEST_CHANGE):
+        kept["torque"] = (change, sd)
+    return kept
+
+
 def throttle_or_thrust(finding: Finding) -> Finding:
     """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
     if finding.id != "thrust_curve" or finding.status not in ("established", "ambiguous"):
@@ -496,23 +533,17 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
 
 
 def make_traces(
-    prepared, model: WrenchModel, found, measured: bool, plain_values: dict, values: dict, delivered: list[np.ndarray]
+    prepared, model: WrenchModel, found, measured: bool, refitted: list[np.ndarray], delivered: list[np.ndarray]
 ) -> tuple[Trace, ...]:
-    """Residual of every channel before refitting, after refitting and with the effects (`delivered`, (n, 12) each).
-
-    Only values that are clearly wrong are refitted: the others stay as believed, as in the improved vehicle.
-    """
-    regression = model.regression
-    loose = {k: WIDEST_TRUST for k in (*plain_values, *values)}
-    plain = regression.fit(regression.keys_of("nuisance") + list(plain_values), loose=loose)
+    """Residual of every channel before refitting, after refitting and with the effects, (n, 12) each per stretch."""
     believed_left = believed_residuals(prepared, model, found is not None and not measured)
     out = []
-    for r, segment, before, after in zip(model.rows, prepared.segments, believed_left, delivered, strict=True):
-        refitted = r.y - r.x[:, :, plain.columns] @ plain.beta
+    parts = (model.rows, prepared.segments, believed_left, refitted, delivered)
+    for r, segment, before, plain, after in zip(*parts, strict=True):
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
                 unit = UNITS[CHANNELS[c].split("_")[0]]
-                out.append(Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], refitted[:, c], after[:, c]))
+                out.append(Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c]))
         if found is not None and measured:
             result: SpeedResult = found[0]
             path = commanded_path(segment, result.fit.chain, result.fit.values, result.fit.shift_s, *found[1:])

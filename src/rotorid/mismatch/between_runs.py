@@ -40,7 +40,11 @@ def apart(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float, nois
 
 
 def compared(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float) -> tuple[dict[str, float], float]:
-    """Mean of each run's stretches (n,), and the p-value that all are one; 1 where there is nothing to compare."""
+    """Mean of each run's stretches (n,), and the p-value that all are one; 1 where there is nothing to compare.
+
+    Of three runs and more each may be left out (the p-value counts every trial): in the run in which something changed
+    the blocks differ too, and would pass for a noise that walks.
+    """
     size = max(2, int(BLOCK_S * rate_hz))
     blocks: dict[str, list[np.ndarray]] = {}
     for run, part in zip(runs, parts, strict=True):
@@ -48,16 +52,24 @@ def compared(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float) -
         if count:
             blocks.setdefault(run, []).append(part[: count * size].reshape(count, size).mean(axis=1))
     means = {run: float(np.concatenate(own).mean()) for run, own in blocks.items()}
+    trials = [blocks]
+    if len(blocks) > 2:
+        trials += [{run: own for run, own in blocks.items() if run != out} for out in blocks]
+    return means, min(1.0, len(trials) * min(_alike(trial, means) for trial in trials))
+
+
+def _alike(blocks: Mapping[str, list[np.ndarray]], means: Mapping[str, float]) -> float:
+    """p-value that means of blocks, by run and stretch, vary between runs as they do within."""
     counts = np.array([sum(len(b) for b in own) for own in blocks.values()])
     freedom = int(counts.sum() - len(counts))
-    if len(means) < 2 or freedom < 3:
-        return means, 1.0
+    if len(blocks) < 2 or freedom < 3:
+        return 1.0
     rest = [b - means[run] for run, own in blocks.items() for b in own]
     within = sum(float(r @ r) for r in rest) / freedom
     lagged = sum(float(r[1:] @ r[:-1]) for r in rest)
     correlation = float(np.clip(lagged / max(within * freedom, 1e-300), 0.0, 0.9))
     within *= (1 + correlation) / (1 - correlation)
-    values = np.array(list(means.values()))
+    values = np.array([means[run] for run in blocks])
     middle = counts @ values / counts.sum()
     between = float(counts @ (values - middle) ** 2) / (len(values) - 1)
-    return means, float(f_distribution.sf(between / max(within, 1e-300), len(values) - 1, freedom))
+    return float(f_distribution.sf(between / max(within, 1e-300), len(values) - 1, freedom))

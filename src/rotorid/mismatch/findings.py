@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -102,3 +103,10 @@ class Analysis:
     """Kinds `stand` and `bench`: loads and readings as analysed, rotor speeds as the improved model has them."""
     notes: tuple[str, ...] = field(default_factory=tuple)
     """Things a reader must know (what was derived, what was corrected)."""
+    put_right: tuple[str, ...] = ()
+    """Values put right within what was believed of them, in words: `thrust coefficient −0.7 %`."""
+
+    @property
+    def wrong_values(self) -> dict[str, tuple[float, float, float, float]]:
+        """Those of `values` that were believed to be something else; a scale that nobody stated is no mismatch."""
+        return {name: v for name, v in self.values.items() if math.isfinite(v[0])}

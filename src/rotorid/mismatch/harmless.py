@@ -7,7 +7,7 @@ channel by channel, with the values that are called wrong and the named effects 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,18 +32,21 @@ REASON = "what is delivered with it is worse on the held-out runs than the belie
 Values = dict[str, tuple[float, float]]
 
 
-def delivered_fit(model: WrenchModel, values: Values, also: Values | None = None) -> Fit:
-    """The fit of what is delivered: effects, wrong values (and those of `also` as free as they), nuisances."""
+def delivered_fit(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
+    """The fit of some effects, the wrong values and the nuisances."""
     always = model.regression.keys_of("nuisance", "wind")
-    loose = {k: WIDEST_TRUST for k in (*(also or {}), *values)}
-    return model.regression.fit(always + list(values) + model.selection.active, loose=loose)
+    return model.regression.fit([*always, *values, *active], loose={k: WIDEST_TRUST for k in values})
 
 
-def delivered_residuals(model: WrenchModel, values: Values, also: Values | None = None) -> list[np.ndarray]:
-    """What wrong values and named effects leave of every stretch, (n, 12); empirical terms stay out."""
-    fit = delivered_fit(model, values, also)
+def residuals_of(model: WrenchModel, fit: Fit) -> list[np.ndarray]:
+    """What values and named effects of a fit leave of every stretch, (n, 12); empirical terms stay out."""
     named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
     return [r.y - r.x[:, :, fit.columns] @ named for r in model.rows]
+
+
+def delivered_residuals(model: WrenchModel, values: Values) -> list[np.ndarray]:
+    """What wrong values and named effects leave of every stretch, (n, 12)."""
+    return residuals_of(model, delivered_fit(model, values, model.selection.active))
 
 
 def believed_residuals(prepared: Prepared, model: WrenchModel, commanded: bool) -> list[np.ndarray]:

@@ -57,6 +57,8 @@ AT_WORK = 0.03
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
 LOUDER = 4.0
 """Energy of a window beside the usual, below which louder noise is not called a mismatch."""
+WILD = 4.0
+"""Whitened residual beyond which a single sample counts no more."""
 SHIFTED = 0.4
 """Mean of a window beside the residual's usual size, below which a shift does not matter."""
 HELD_BACK = 3.0
@@ -88,7 +90,7 @@ def locate(analysis: Analysis) -> list[Location]:
     segments = segments_of(analysis)
     stated = _stated(analysis)
     found: list[Interval] = []
-    if with_status(analysis, "established", "ambiguous", "absorbed") or analysis.values:
+    if with_status(analysis, "established", "ambiguous", "absorbed") or analysis.wrong_values:
         partial, throughout = _explained(analysis, segments)
         spoken_for = {loc.channel for loc in stated}
         found += [i for i in partial if i.trace.channel not in spoken_for]
@@ -212,7 +214,7 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interv
     formless = {c for f in at_work if f.form is None and not f.windows for c in f.channels}
     causes.append({c: x for c, x in rest.items() if c in formless})
     partial, throughout = [], []
-    if analysis.values:
+    if analysis.wrong_values:
         for channel in rest.keys() - formless:
             masks = _acting(channels[channel], rest[channel])
             if masks is not None:
@@ -328,7 +330,8 @@ def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
         parts = [np.nan_to_num(t.after) for t in traces]
         taps = autoregression(parts)
         white = [lfilter(taps, [1.0], p) for p in parts]
-        white = _evened(traces, white, hard)
+        # One or two wild samples are a glitch; a mismatch lasts.
+        white = [np.clip(w, -WILD, WILD) for w in _evened(traces, white, hard)]
         for w in white:
             w[: len(taps)] = 0.0
         found += _louder(traces, white, limit) + _shifted(traces, white, parts, limit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -187,12 +188,14 @@ def build_segments(
     shift_s: dict[str, float] | None = None,
     noise: dict[str, float] | None = None,
     rng: np.random.Generator | None = None,
+    full_speed_rad_s: float | None = None,
 ) -> list[Segment]:
     """Evenly sampled stretches of a run in which every column needed for the analysis is there.
 
     `shift_s` moves a sensor's columns in time: a positive value says that the sensor's stamps are late by it.
     Keys: `accelerometer`, `gyroscope`, `attitude`, `velocity`, `position`, `rotors`. `noise` adds white noise of
-    that one-sigma per sample to a sensor's columns (same keys), to learn what noise does to the analysis.
+    that one-sigma per sample to a sensor's columns (same keys), to learn what noise does to the analysis. A throttle
+    is one of `full_speed_rad_s` (`full_speed` of the run alone where None).
     """
     shift_s, noise = shift_s or {}, noise or {}
     t = run.time_s
@@ -216,8 +219,7 @@ def build_segments(
     if command is None:
         throttle = take(c.rotor_columns("throttle", count), "commands", smooth=False)
         if throttle is not None:
-            limits = vehicle.rotor_speed_limits_rad_s
-            command = throttle * (limits[1] if limits else estimated_full_speed(vehicle, throttle))
+            command = throttle * (full_speed_rad_s or full_speed((run,), vehicle))
     measured = speed is not None
     used_speed = speed if measured else command
     gyro = take(c.ANGULAR_VELOCITY, "gyroscope")
@@ -331,6 +333,15 @@ def held_through_gaps(values: np.ndarray) -> np.ndarray | None:
         return None
     index = np.arange(len(values))
     return np.interp(index, index[known], values[known])
+
+
+def full_speed(runs: Sequence[Run], vehicle: Vehicle) -> float | None:
+    """Rotor speed at full throttle, rad/s: the limit stated, else estimated from all runs; None without throttle."""
+    if vehicle.rotor_speed_limits_rad_s:
+        return vehicle.rotor_speed_limits_rad_s[1]
+    names = c.rotor_columns("throttle", vehicle.rotor_count)
+    throttle = [run.array(names) for run in runs if names and run.has(*names)]
+    return estimated_full_speed(vehicle, np.concatenate(throttle)) if throttle else None
 
 
 def estimated_full_speed(vehicle: Vehicle, throttle: np.ndarray) -> float:

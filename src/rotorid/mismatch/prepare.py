@@ -10,7 +10,7 @@ from scipy.signal import welch
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, not_testable_reason
-from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments
+from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments, full_speed
 from rotorid.mismatch.rows import (
     OFFSETS,
     PARAMETER_NAMES,
@@ -222,10 +222,10 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
     rate_hz, cutoff = analysis_rate_hz(recordings.runs, vehicle, cutoff_hz)
     noise = sensor_noise(recordings.runs, vehicle)
     rng = np.random.default_rng(0)
-    segments, noisy = [], []
+    segments, noisy, full = [], [], full_speed(recordings.runs, vehicle)
     for run in recordings.runs:
-        segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s)
-        noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng)
+        segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
+        noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng, full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     segments = representative(without_noise(segments))
     prepared = Prepared(recordings, vehicle, split, segments, noisy, Thinner(rate_hz, cutoff), noise, [])

@@ -10,7 +10,7 @@ from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.findings import Analysis, Finding
 from rotorid.mismatch.instrument.columns import form_reading
-from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments
+from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments, full_speed
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.rows import project
 
@@ -24,7 +24,8 @@ def segments_of(analysis: Analysis) -> list[Segment] | list[Loading]:
         return list(analysis.loadings)
     runs, vehicle = analysis.recordings.runs, analysis.believed
     rate_hz, cutoff_hz = analysis_rate_hz(runs, vehicle, HIGHEST_CUTOFF_HZ)
-    return [s for run in runs for s in build_segments(run, vehicle, rate_hz, cutoff_hz)]
+    full = full_speed(runs, vehicle)
+    return [s for run in runs for s in build_segments(run, vehicle, rate_hz, cutoff_hz, full_speed_rad_s=full)]
 
 
 def fitted_part(analysis: Analysis) -> Callable[[str, np.ndarray], np.ndarray]:

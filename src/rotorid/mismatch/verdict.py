@@ -306,7 +306,7 @@ def with_status(analysis: Analysis, *statuses: str) -> list[Finding]:
 
 def verdict_word(analysis: Analysis, locations: Sequence[Location]) -> str:
     """One of the four words, from what was found and the share that is left."""
-    found = with_status(analysis, "established", "ambiguous") or analysis.values
+    found = with_status(analysis, "established", "ambiguous") or analysis.wrong_values
     share = analysis.unexplained_share
     if not found:
         return "unexplained" if share > OFF_SHARE or locations else "no_mismatch"
@@ -322,7 +322,7 @@ def plain_sentence(
     if word == "no_mismatch":
         return _agreement(analysis, channels)
     established = with_status(analysis, "established")
-    claimed_else = analysis.values or with_status(analysis, "ambiguous")
+    claimed_else = analysis.wrong_values or with_status(analysis, "ambiguous")
     if word == "explained" and not claimed_else and all(_concerns_the_recording(f) for f in established):
         said = [capital(f.sentence.rstrip(".")) + "." for f in established]
         return " ".join([*said, _agreement(analysis, channels, "Apart from that the believed vehicle")])
@@ -331,8 +331,8 @@ def plain_sentence(
     parts += [_left_out(f, k == 0) for k, f in enumerate(established)]
     parts += [_either(f, analysis) for f in one_per_class(with_status(analysis, "ambiguous"))]
     parts += [_wrong(name, values) for name, values in analysis.values.items()]
-    if with_status(analysis, "established", "ambiguous") or analysis.values:
-        parts.append(_better(main, channels))
+    if with_status(analysis, "established", "ambiguous") or analysis.wrong_values:
+        parts.append(_better(main, channels, analysis.put_right))
     if word != "explained":
         parts.append(_rest(analysis, locations))
     return " ".join(p for p in parts if p)
@@ -361,13 +361,13 @@ def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Ma
     """
     inverse = [t.channel for t in analysis.traces]
     named = [c for f in with_status(analysis, "established", "ambiguous") for c in f.channels if c in channels]
-    left = [] if analysis.values else [c for c in analysis.unexplained_channels if c in channels]
+    left = [] if analysis.wrong_values else [c for c in analysis.unexplained_channels if c in channels]
     pool = named or left or [loc.channel for loc in locations if loc.channel in channels] or inverse
 
     def excess(name):
         errors = channels[name].rmse.training
         before, after = errors.before or 0.0, errors.after or 0.0
-        removed = math.sqrt(max(before**2 - after**2, 0.0)) if named or analysis.values else before
+        removed = math.sqrt(max(before**2 - after**2, 0.0)) if named or analysis.wrong_values else before
         return removed / max(channels[name].noise_floor or after or 1e-12, 1e-12)
 
     return max(dict.fromkeys(pool), key=excess) if pool else ""
@@ -461,7 +461,7 @@ def _wrong(name: str, values: tuple[float, float, float, float]) -> str:
     return f"The {words} is {plus_minus(refitted, low, high)}{space}, not the {number(believed, 4)}{space} believed."
 
 
-def _better(main: str, channels: Mapping[str, Channel]) -> str:
+def _better(main: str, channels: Mapping[str, Channel], put_right: Sequence[str] = ()) -> str:
     if not main:
         return ""
     channel = channels[main]
@@ -472,14 +472,15 @@ def _better(main: str, channels: Mapping[str, Channel]) -> str:
             f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
             f"{number(errors.after)} {channel.unit} after."
         )
+    also = f", and what was believed put right within its trust ({listed(list(put_right))})," if put_right else ""
     return (
-        f"With this the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
+        f"With this{also} the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
         f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."
     )
 
 
 def _rest(analysis: Analysis, locations: Sequence[Location]) -> str:
-    found = with_status(analysis, "established", "ambiguous") or analysis.values
+    found = with_status(analysis, "established", "ambiguous") or analysis.wrong_values
     depends = [regime_words(v)[0] for v in analysis.unexplained_depends_on]
     if found:
         text = f"{100 * analysis.unexplained_share:.0f} % of the mismatch remains unexplained"
@@ -495,7 +496,7 @@ def _agreement(analysis: Analysis, channels: Mapping[str, Channel], who: str = "
     chosen = shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]
     left = listed(
         [
-            f"{number(_either_split(channels[c])[0].before)} {channels[c].unit} in the {channel_words(c)} "
+            f"{number(_either_split(channels[c])[0].after)} {channels[c].unit} in the {channel_words(c)} "
             f"(the sensors' own noise: {number(channels[c].noise_floor)})"
             for c in chosen
         ]
@@ -503,8 +504,9 @@ def _agreement(analysis: Analysis, channels: Mapping[str, Channel], who: str = "
     if not left:
         return f"{who} leaves out nothing that was found."
     where = _either_split(channels[chosen[0]])[1]
+    moved = f", put right within its trust ({listed(list(analysis.put_right))})," if analysis.put_right else ""
     return (
-        f"{who} describes these recordings: the error that is left {where}, {left}, does not depend on "
+        f"{who}{moved} describes these recordings: the error that is left {where}, {left}, does not depend on "
         "how it was flown."
     )
 

@@ -54,3 +54,12 @@ def test_a_bias_that_walks_is_no_change_between_flights():
 
 def test_one_run_has_nothing_to_be_compared_with():
     assert compared(["a", "a"], left(np.random.default_rng(4), (0.0, 5.0)), RATE_HZ)[1] == 1.0
+
+
+def test_a_change_in_the_middle_of_a_run_is_seen_in_the_runs_after():
+    """By 2 from the middle of the second run on: its blocks alone would make of it a noise that walks."""
+    rng = np.random.default_rng(5)
+    parts = left(rng, (0.0, 0.0, 2.0, 2.0))
+    parts[1][600:] += 2.0
+    found = apart(("a", "b", "c", "d"), parts, RATE_HZ, 1.0)
+    assert found is not None and found.means["b"] == pytest.approx(1.0, abs=0.15)

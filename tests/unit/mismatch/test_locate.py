@@ -81,3 +81,20 @@ def test_samples_that_a_sensor_lost_are_located_where_no_residual_is_left():
         for start_s, stop_s in ((4.0, 5.5), (9.0, 9.5))
     }
     assert [f.energy_share for f in found if f.channel == "rotor_speed_2"] == pytest.approx([0.75, 0.25])
+
+
+def test_two_wild_samples_are_no_mismatch():
+    """Ten times the noise, as a reading gone wrong; half a second of four times the noise is one."""
+    made = analysis()
+
+    def spoiled(count, size):
+        traces = []
+        for t in made.traces:
+            after = t.after.copy()
+            if (t.run, t.channel) == ("b", "moment_y"):
+                after[400 : 400 + count] += size * made.noise_floor[t.channel]
+            traces.append(replace(t, after=after))
+        return replace(made, traces=tuple(traces))
+
+    assert not locate(spoiled(2, 10.0))
+    assert [(f.run, f.channel) for f in locate(spoiled(40, 4.0))] == [("b", "moment_y")]

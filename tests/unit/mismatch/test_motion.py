@@ -13,6 +13,7 @@ from rotorid.mismatch.motion import (
     build_segments,
     continuous,
     estimated_full_speed,
+    full_speed,
     fresh_samples,
     own_rate_hz,
     rates_from_attitude,
@@ -164,3 +165,13 @@ def test_height_from_the_ground_and_unknown_columns_kept(run):
     # Less the flutter of the position, which is below a centimetre.
     np.testing.assert_allclose(segment.motion.height, 0.5 - segment.motion.position[:, 2], atol=0.01)
     assert list(segment.extra) == ["payload_state"] and len(segment.extra["payload_state"]) == segment.motion.size
+
+
+def test_one_full_speed_for_all_runs(run):
+    """Throttles of 0.4 and 0.6 in two runs: their mean square of 0.26 carries the weight, not each by itself."""
+    names = [f"throttle_{i}" for i in range(1, 5)]
+    runs = [Run(n, run.table.assign(**dict.fromkeys(names, u))) for n, u in (("a", 0.4), ("b", 0.6))]
+    hover = np.sqrt(0.652 * GRAVITY / (4 * 1.3877e-6))
+    assert full_speed(runs, quad()) == pytest.approx(hover / np.sqrt(0.26))
+    assert full_speed(runs, quad(rotor_speed_limits_rad_s=[0, 2500])) == 2500.0
+    assert full_speed([run], quad()) is None

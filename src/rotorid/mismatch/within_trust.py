@@ -1,0 +1,80 @@
+"""Believed values as the recordings have them, where they stay within what was believed.
+
+No laboratory knows its thrust coefficient to a percent, and a percent of the weight is ten times a good sensor's noise.
+Such a value is not wrong and is not called so; what is delivered holds it as the recordings do, all values at once and
+each held by its trust.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotorid.mismatch.decide import WIDEST_TRUST, coefficients, relative_change
+from rotorid.mismatch.harmless import Values, delivered_fit, growth, held_out_masks, residuals_of
+from rotorid.mismatch.prepare import Prepared
+from rotorid.mismatch.regression import Fit
+from rotorid.mismatch.rows import PARAMETER_NAMES
+from rotorid.mismatch.words import parameter_words
+from rotorid.mismatch.wrench import WrenchModel
+
+BEYOND_TRUST = 2.0
+"""Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it."""
+BETTER_RATIO = 0.95
+"""Held-out error beside that with the values as believed which some channel must reach for the values to move."""
+WORSE_RATIO = 1.01
+LEAST_Z = 2.0
+"""Standard errors over blocks of a second by which squares must have changed, either way."""
+WORTH_A_WORD = 0.002
+
+
+def all_values(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
+    """The fit with every value free: those called wrong (`values`) widely, the others within their trust."""
+    regression = model.regression
+    keys = [*regression.keys_of("nuisance", "wind"), *regression.keys_of("value"), *active]
+    return regression.fit(keys, loose={k: WIDEST_TRUST for k in values})
+
+
+def beyond_trust(model: WrenchModel, values: Values, active: Sequence[str]) -> bool:
+    """Whether the recordings ask a value not called wrong to move further than its trust allows."""
+    moved = changes(model, all_values(model, values, active))
+    trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
+    return any(abs(moved[k][0]) > BEYOND_TRUST * sd for k, sd in trust.items() if k not in values)
+
+
+def changes(model: WrenchModel, fit: Fit) -> Values:
+    """Relative change and one-sigma of every believed value in a fit."""
+    out = {}
+    for key in model.regression.keys_of("value"):
+        beta, covariance = coefficients(model.regression, fit, key)
+        out[key] = relative_change(key, float(beta[0]), float(np.sqrt(covariance[0, 0])))
+    return out
+
+
+def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:
+    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong.
+
+    Those move together, and only if held-out error falls by it in some channel, grows in none, and none of them would
+    move beyond its trust.
+    """
+    plain = delivered_fit(model, values, active)
+    if beyond_trust(model, values, active):
+        return plain, {}
+    free = all_values(model, values, active)
+    held = held_out_masks(prepared, model, model.segments)
+    per = max(2, int(prepared.thinner.rate_hz))
+    ratio, z = growth(residuals_of(model, plain), residuals_of(model, free), held, per)
+    worse, better = (ratio > WORSE_RATIO) & (z > LEAST_Z), (ratio < BETTER_RATIO) & (z < -LEAST_Z)
+    if worse.any() or not better.any():
+        return plain, {}
+    return free, {k: change for k, change in changes(model, free).items() if k not in values}
+
+
+def in_words(moved: Values) -> tuple[str, ...]:
+    """What was put right and is not called wrong: `thrust coefficient −0.7 ± 0.2 %`."""
+    return tuple(
+        f"{parameter_words(PARAMETER_NAMES[k])[0]} {100 * change:+.1f} ± {196 * sd:.1f} %".replace("-", "−")
+        for k, (change, sd) in moved.items()
+        if abs(change) > max(WORTH_A_WORD, sd)
+    )

@@ -1,0 +1,81 @@
+"""Believed values move within their trust, without a word, where flights not used for fitting bear them out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rotorid.mismatch import within_trust
+from rotorid.mismatch.within_trust import beyond_trust, in_words, settled
+
+TRUST = {"thrust": 0.05, "mass": 0.005}
+
+
+@dataclass(frozen=True)
+class Fitted:
+    columns: np.ndarray
+    beta: np.ndarray
+    covariance: np.ndarray
+
+
+def model_of(monkeypatch, thrust: float, helps: bool = True):
+    """A model whose only value to move is the thrust, by `thrust`; moving it halves the force's error if it `helps`."""
+    terms = [SimpleNamespace(key=k, kind="value", prior_sd=(sd,)) for k, sd in TRUST.items()]
+    where = {"thrust": 0, "mass": 1}
+
+    class Regression:
+        def keys_of(self, *kinds):
+            return list(TRUST) if kinds == ("value",) else []
+
+        def columns(self, keys):
+            return np.array([where[k] for k in keys])
+
+        def fit(self, keys, loose):
+            columns = self.columns(keys).astype(int)
+            beta = np.array([thrust if c == 0 else 0.0 for c in columns])
+            return Fitted(columns, beta, 1e-8 * np.eye(len(columns)))
+
+    made = Regression()
+    made.terms = terms
+    model = SimpleNamespace(regression=made, segments=[], selection=SimpleNamespace(active=[]))
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((4000, 12))
+
+    def residuals(_, fit):
+        better = len(fit.columns) == len(TRUST)
+        return [noise * (0.5 if better and helps else 1.0)]
+
+    monkeypatch.setattr(within_trust, "residuals_of", residuals)
+    monkeypatch.setattr(within_trust, "held_out_masks", lambda *_: [np.ones(4000, bool)])
+    return SimpleNamespace(thinner=SimpleNamespace(rate_hz=40.0)), model
+
+
+def test_a_thrust_within_its_trust_is_put_right(monkeypatch):
+    """By −3 % of a trust of 5 %: both values move together, and one of them is worth a word."""
+    prepared, model = model_of(monkeypatch, -0.03)
+    fit, moved = settled(prepared, model, {}, ())
+    assert len(fit.columns) == 2 and moved["thrust"][0] == pytest.approx(-0.03) and moved["mass"][0] == 0.0
+    assert in_words(moved) == ("thrust coefficient −3.0 ± 0.0 %",)
+
+
+def test_a_value_called_wrong_is_not_told_twice(monkeypatch):
+    prepared, model = model_of(monkeypatch, -0.03)
+    _, moved = settled(prepared, model, {"thrust": (-0.03, 0.001)}, ())
+    assert list(moved) == ["mass"]
+
+
+def test_beyond_trust_something_else_is_missing(monkeypatch):
+    """By 11 % of a trust of 5 %: more than two standard deviations, and nothing is moved."""
+    prepared, model = model_of(monkeypatch, 0.11)
+    assert beyond_trust(model, {}, ()) and not beyond_trust(model, {"thrust": (0.11, 0.001)}, ())
+    fit, moved = settled(prepared, model, {}, ())
+    assert moved == {} and len(fit.columns) == 0
+
+
+def test_values_that_help_no_held_out_channel_stay(monkeypatch):
+    prepared, model = model_of(monkeypatch, -0.03, helps=False)
+    fit, moved = settled(prepared, model, {}, ())
+    assert moved == {} and len(fit.columns) == 0
