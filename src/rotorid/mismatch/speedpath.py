@@ -524,7 +524,9 @@ def at_its_bounds(form: SpeedForm, values: np.ndarray) -> bool:
     it would go on."""
     if form.stage not in (CURVE_STAGE, LIMIT_STAGE):
         return False
-    near = [min(v - p.low, p.high - v) < AT_BOUND * (p.high - p.low) for p, v in zip(form.parameters, values, strict=True)]
+    near = [
+        min(v - p.low, p.high - v) < AT_BOUND * (p.high - p.low) for p, v in zip(form.parameters, values, strict=True)
+    ]
     return any(near)
 
 
