@@ -22,7 +22,14 @@ from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.gusts import gust_finding, with_gusts
 from rotorid.mismatch.harmless import REASON as HARM
-from rotorid.mismatch.harmless import Values, believed_residuals, held_out_masks, residuals_of, without_harm
+from rotorid.mismatch.harmless import (
+    Values,
+    believed_residuals,
+    held_out_masks,
+    residuals_of,
+    without_harm,
+    without_useless,
+)
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
@@ -31,7 +38,7 @@ from rotorid.mismatch.prepare import Prepared, prepare
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER, Selection
-from rotorid.mismatch.speedpath import SpeedFit, SpeedResult, commanded_path, nothing_between
+from rotorid.mismatch.speedpath import SpeedFit, SpeedResult, commanded_path, nothing_between, taken_back
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.within_trust import beyond_trust, settled
 from rotorid.mismatch.wrench import (
@@ -96,9 +103,16 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     model, values, harm = without_harm(prepared, model, values_called_wrong, commanded)
     if harm and commanded and found[0].fit.chain:
         # Fitted with every value free, a curve of the throttle may need values that nothing else bears out.
-        model = refined_model(prepared, prepared.segments, prepared.noisy_segments)
-        found = (nothing_between(found[0], HARM), *found[1:])
-        model, values, _ = without_harm(prepared, model, values_called_wrong, commanded)
+        for result in taken_back(found[0], HARM):
+            found = (result, *found[1:])
+            segments, noisy = prepared.segments, prepared.noisy_segments
+            if result.fit.chain:
+                segments, noisy = (path_segments(s, *found, cutoff) for s in (segments, noisy))
+            model = refined_model(prepared, segments, noisy)
+            model, values, harm = without_harm(prepared, model, values_called_wrong, commanded)
+            if not harm:
+                break
+    model, values = without_useless(prepared, model, values, values_called_wrong)
 
     segments, noisy = model.segments, model.noisy_segments
     if model.wind is not None:

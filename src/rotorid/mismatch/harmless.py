@@ -1,8 +1,11 @@
-"""Nothing is delivered that makes a channel worse on the held-out part than the believed vehicle leaves it.
+"""Nothing is delivered that makes a channel worse on the held-out part than the believed vehicle leaves it, and no
+effect that makes none of its channels better there.
 
 The search weighs all channels together, each by its noise: where a smooth moment seems to be known to a thousandth, it
 may buy a tilt of twenty degrees at the cost of the force. What is delivered is therefore looked at as its reader will:
-channel by channel, with the values that are called wrong and the named effects alone.
+channel by channel, with the values that are called wrong and the named effects alone. For the same reason an effect
+may win the search by what it does where noise is low, and be of no use to its reader: what is established lowers an
+error.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.decide import WIDEST_TRUST
+from rotorid.mismatch.decide import WIDEST_TRUST, coefficients, main_channels
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, training_rule
 from rotorid.mismatch.regression import Fit
@@ -25,9 +28,15 @@ HARM_RATIO = 1.1
 HARM_Z = 2.0
 """Standard errors over blocks of a second by which its squares must have grown, too: the burden of proof is the
 effect's, and squares of a short flight are widely spread."""
+HELP_Z = 0.5
+"""Standard errors by which the squares of one channel that an effect acts in must grow without it: it has been found
+already, in the runs fitted, so doubt is not held against it beyond the coin's."""
+LEAST_EXCITED = 0.1
+"""Mean square of an effect on the held-out part, beside that on the fitted one, from which the former can judge it."""
 LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
 REASON = "what is delivered with it is worse on the held-out runs than the believed vehicle"
+USELESS = "without it the held-out error is no larger in any channel that it acts in"
 
 Values = dict[str, tuple[float, float]]
 
@@ -83,7 +92,7 @@ def growth(
             parts = np.array_split(rows, len(rows) // per)
             squares = [x[:, :CHANNELS_OF_WRENCH] ** 2 for x in (b, a)]
             blocks += [[s[p].mean(axis=0) for s in squares] for p in parts]
-    if len(blocks) < LEAST_BLOCKS:
+    if not long_enough(held, per):
         return np.ones(CHANNELS_OF_WRENCH), np.zeros(CHANNELS_OF_WRENCH)
     was, now = np.array(blocks).transpose(1, 0, 2)
     change = now - was
@@ -92,19 +101,55 @@ def growth(
     return np.nan_to_num(ratio, nan=1.0), np.nan_to_num(change.mean(axis=0) / np.maximum(doubt, 1e-300))
 
 
+def excited(parts: list[np.ndarray], held: list[np.ndarray]) -> bool:
+    """Whether contributions (n,) to a channel are large enough on the held-out rows beside the others."""
+    squares = [
+        np.concatenate([p[m] ** 2 for p, m in zip(parts, masks, strict=True)]) for masks in (held, inverted(held))
+    ]
+    here, there = (float(s.mean()) if len(s) else 0.0 for s in squares)
+    return here >= LEAST_EXCITED * there
+
+
+def inverted(masks: list[np.ndarray]) -> list[np.ndarray]:
+    return [~mask for mask in masks]
+
+
+def about_means(runs: list[str], parts: list[np.ndarray], held: list[np.ndarray]) -> list[np.ndarray]:
+    """Residuals (n, 12) of stretches less the mean of the held-out rows of their run."""
+    means = {}
+    for run in dict.fromkeys(runs):
+        rows = [p[mask] for r, p, mask in zip(runs, parts, held, strict=True) if r == run and mask.any()]
+        means[run] = np.concatenate(rows).mean(axis=0) if rows else 0.0
+    return [p - means[r] for r, p in zip(runs, parts, strict=True)]
+
+
+def long_enough(held: list[np.ndarray], per: int) -> bool:
+    """Whether there are LEAST_BLOCKS of `per` rows held out."""
+    return sum(int(mask.sum()) // per for mask in held) >= LEAST_BLOCKS
+
+
 def harmed(ratio: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Mask of the channels that are worse."""
     return (ratio > HARM_RATIO) & (z > HARM_Z)
 
 
-def without(model: WrenchModel, key: str) -> WrenchModel:
+def helps(ratio: np.ndarray, z: np.ndarray, channels: list[int]) -> float:
+    """How surely the error of one of some channels grows without an effect: `growth` from with it to without.
+
+    Infinite without a channel: what shows in the comparison of two sensors alone is not judged by the wrench, nor what
+    does not act on the held-out part.
+    """
+    return max((float(z[c]) if ratio[c] > 1.0 else 0.0 for c in channels), default=np.inf)
+
+
+def without(model: WrenchModel, key: str, reason: str = REASON) -> WrenchModel:
     """The model with one effect less, all else fitted anew."""
     search, old = model.search, model.selection
     active = [k for k in old.active if k != key]
     regression = search.regression
     fit = regression.fit(search.always + active, jackknife=True)
     p_values = {k: regression.wald(fit, regression.columns([k]), search.blocks) for k in active}
-    reasons = {**old.not_established, search.terms[key].effect: REASON}
+    reasons = {**old.not_established, search.terms[key].effect: reason}
     return replace(model, selection=replace(old, active=active, fit=fit, p_values=p_values, not_established=reasons))
 
 
@@ -134,4 +179,41 @@ def without_harm(
         if best is None or best[0] >= ratio[worse].sum():
             return model, values, True
         model = best[2]
+        values = values_of(model)
+
+
+def without_useless(
+    prepared: Prepared, model: WrenchModel, values: Values, values_of: Callable[[WrenchModel], Values]
+) -> tuple[WrenchModel, Values]:
+    """The model less the effects that lower the held-out error of no channel that they act in, and its wrong values.
+
+    An error counts as it is or about its mean in each run: what differs between flights is told by itself, and must
+    not decide about an effect that is right about everything else. The least useful goes first, and the others are
+    looked at again without it. Where too little is held out to say anything, or an effect hardly acts (no landing, no
+    turn), nothing goes.
+    """
+    held = held_out_masks(prepared, model, model.segments)
+    per = max(2, int(prepared.thinner.rate_hz))
+    runs = [r.run for r in model.rows]
+    if not long_enough(held, per):
+        return model, values
+    while True:
+        with_it = delivered_residuals(model, values)
+        options = []
+        for key in model.selection.active:
+            term = model.search.terms[key]
+            if term.effect in UNKNOWNS or term.run:
+                continue
+            beta, _ = coefficients(model.regression, model.selection.fit, key)
+            cols = model.regression.columns([key])
+            wrench = [c for c in main_channels(model.rows, cols, beta, model.noise) if c < CHANNELS_OF_WRENCH]
+            wrench = [c for c in wrench if excited([r.x[:, c, cols] @ beta for r in model.rows], held)]
+            fewer = without(model, key, USELESS)
+            left = delivered_residuals(fewer, values)
+            pairs = (with_it, left), tuple(about_means(runs, part, held) for part in (with_it, left))
+            options.append((max(helps(*growth(*pair, held, per), wrench) for pair in pairs), key, fewer))
+        least = min(options, key=lambda o: o[0], default=None)
+        if least is None or least[0] >= HELP_Z:
+            return model, values
+        model = least[2]
         values = values_of(model)

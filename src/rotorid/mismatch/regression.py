@@ -367,11 +367,17 @@ class Regression:
 
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
         """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
+        return self.own_part(keys, key, beta)[1]
+
+    def own_part(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[float, float]:
+        """Share of a term's energy along `beta` that the others of `keys` could not take over, and the share of that
+        which is noise of the regressors."""
         cols, direction = self.beyond([k for k in keys if k != key], key, beta)
         gram, bias = self._total_gram, self.bias_gram * self.training.mean()
-        energy = direction @ gram[np.ix_(cols, cols)] @ direction
-        noise = direction @ bias[np.ix_(cols, cols)] @ direction
-        return float(NOISE_SAFETY * noise / max(energy, 1e-300))
+        own, grid = self.columns([key]), np.ix_(cols, cols)
+        whole = beta @ gram[np.ix_(own, own)] @ beta
+        energy, noise = direction @ gram[grid] @ direction, direction @ bias[grid] @ direction
+        return float(energy / max(whole, 1e-300)), float(NOISE_SAFETY * noise / max(energy, 1e-300))
 
     def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
         """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""

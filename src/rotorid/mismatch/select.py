@@ -57,7 +57,9 @@ class Candidate:
     gain: float
     inflation: float
     physical: bool
-    """Coefficients inside their bounds, and regressors that are more than their own noise."""
+    """Coefficients inside their bounds, regressors that are more than their own noise, and a contribution of which the
+    others could not take over all but what its form is wrong by (SHARE_OF_LARGEST): such a one is whatever its sum
+    with the others is, and two of them grow against each other without end."""
     named: bool = True
     """Whether it is of the catalogue."""
 
@@ -121,7 +123,9 @@ class Search:
         statistic = quadratic_form(beta, covariance)
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
-        physical = physical and self.regression.noise_share(keys, key, beta) < MOST_ATTENUATION
+        if physical:
+            own, noise = self.regression.own_part(keys, key, beta)
+            physical = own > SHARE_OF_LARGEST**2 and noise < MOST_ATTENUATION
         physical = physical and not self.strains(fit, base)
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 

@@ -28,7 +28,12 @@ COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
 LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
-LIMIT_STAGE = 2
+LIFT = (0.5, 2.0)
+"""Bounds of mean thrust over mean weight: who flies is carried by his rotors, and no believed value is off by more. The
+noise of a hover says little of its mean, so a curve without any thrust would explain moments that do not respond."""
+CURVE_STAGE, LIMIT_STAGE = 0, 2
+AT_BOUND = 1e-3
+"""Share of a parameter's range from its bound within which the bound holds it."""
 
 Chain = tuple[tuple[str, SpeedForm], ...]
 
@@ -77,6 +82,8 @@ class SpeedResult:
     """One-sigma of the rotor speed residual, where speeds are measured."""
     lag_alone: SpeedFit | None = None
     """Where a lag shares its lateness with a delay or a curve: the lag as it would be with neither beside it."""
+    without: dict[str, SpeedFit] = field(default_factory=dict)
+    """The chain fitted with one id less."""
 
 
 def commanded_path(
@@ -99,6 +106,19 @@ def nothing_between(result: SpeedResult, why: str = "the differences between the
     """The result (`SpeedResult`) of a search that found nothing, and why: rotors turn as commanded."""
     fit = SpeedFit((), np.zeros(0), 0.0, result.fit.cost, np.zeros((0, 0)))
     return SpeedResult(fit, {}, {}, {}, {**result.dropped, **{k: why for k, _ in result.fit.chain}}, None)
+
+
+def taken_back(result: SpeedResult, why: str) -> list[SpeedResult]:
+    """The result with one id less, the least sure first, and at last with nothing between command and speed."""
+    ids = sorted((k for k, _ in result.fit.chain), key=lambda k: -result.p_values[k])
+    fewer = []
+    for gone in ids if len(ids) > 1 else []:
+        p_values, alternatives, sizes = (
+            {k: v for k, v in of.items() if k != gone} for of in (result.p_values, result.alternatives, result.sizes)
+        )
+        dropped = {**result.dropped, gone: why}
+        fewer.append(SpeedResult(result.without[gone], p_values, alternatives, sizes, dropped, result.noise_rad_s))
+    return [*fewer, nothing_between(result, why)]
 
 
 class SpeedProblem:
@@ -201,12 +221,31 @@ class MeasuredSpeed(SpeedProblem):
 class WrenchOnly(SpeedProblem):
     """Response: force and moment; `residual_of(segment, speed)` gives thinned rows (n, c) and columns (n, c, q)."""
 
-    def __init__(self, segments, full_speed, full_voltage, rate_hz, residual_of: Callable, precision: np.ndarray):
+    def __init__(
+        self,
+        segments,
+        full_speed,
+        full_voltage,
+        rate_hz,
+        residual_of: Callable,
+        precision: np.ndarray,
+        force_z: int | None = None,
+    ):
+        """`force_z` is the channel of the force along the rotors' axis, if there is one."""
         super().__init__(segments, full_speed, full_voltage)
+        self.force_z = force_z
         self.rate_hz, self.residual_of, self.precision = rate_hz, residual_of, precision
         self.columns = [residual_of(s, s.command, True)[1] for s in segments]
         rows = np.concatenate([residual_of(s, s.command, False)[0] for s in segments])
         self.scale = np.maximum(rows.std(axis=0), 1e-12)
+
+    def lift(self, fit: SpeedFit) -> float:
+        """Mean thrust over mean weight, both along the rotors' axis, with the believed mass and C_F."""
+        if self.force_z is None:
+            return 1.0
+        still = np.concatenate([self.residual_of(s, 0.0 * s.command, False)[0] for s in self.segments])
+        turning = np.concatenate(self.raw(fit.chain, fit.values, fit.shift_s))
+        return 1.0 - float(turning[:, self.force_z].mean() / still[:, self.force_z].mean())
 
     def refresh(self, fit: SpeedFit) -> None:
         """Recompute the believed values' columns at the path found."""
@@ -382,9 +421,10 @@ class SpeedSearch:
         current = self._pruned(current, dropped)
         if current.covariance is None:
             current = self.problem.with_covariance(current)
-        p_values, alternatives, sizes = {}, {}, {}
+        p_values, alternatives, sizes, fewer = {}, {}, {}, {}
         for key, _ in current.chain:
             base = self._without(current, key)
+            fewer[key] = self.problem.with_covariance(base) if base.chain else base
             p_values[key] = self.judge(base, current, key)[0]
             sizes[key] = self.size(current, key)
             alternatives[key] = self._alternatives(current, base, key)
@@ -392,7 +432,8 @@ class SpeedSearch:
         if isinstance(self.problem, MeasuredSpeed):
             parts = self.problem.raw(current.chain, current.values, current.shift_s)
             noise = float(np.sqrt(np.mean([np.mean(p**2) for p in parts])))
-        return SpeedResult(current, p_values, alternatives, sizes, dropped, noise, self._lag_alone(current))
+        lag = self._lag_alone(current)
+        return SpeedResult(current, p_values, alternatives, sizes, dropped, noise, lag, fewer)
 
     def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
         """A lag of one constant and nothing beside it: what most publications fit."""
@@ -403,13 +444,18 @@ class SpeedSearch:
         return self.problem.with_covariance(self.problem.fit((("motor_lag", form),), np.array([start])))
 
     def responds(self, fit: SpeedFit) -> bool:
-        """Whether rotors still follow their commands: a flat curve would explain any difference between them."""
+        """Whether rotors still follow their commands and carry the vehicle: a flat curve would explain any difference
+        between them, one without thrust any moment that does not respond."""
+        if any(at_its_bounds(form, fit.values[fit.slice_of(key)]) for key, form in fit.chain):
+            return False
+        if isinstance(self.problem, WrenchOnly) and not LIFT[0] <= self.problem.lift(fit) <= LIFT[1]:
+            return False
         low = min(float(s.command.min()) for s in self.problem.segments)
         high = max(float(s.command.max()) for s in self.problem.segments)
         grid = np.linspace(low, high, 9)[:, None]
         path = SpeedPath(grid, 0.01 * np.arange(9.0), self.problem.full_speed)
         for key, form in fit.chain:
-            if form.stage == 0:
+            if form.stage == CURVE_STAGE:
                 speed = form.apply(path, fit.values[fit.slice_of(key)])
                 slope = np.diff(speed, axis=0) / np.maximum(np.diff(grid, axis=0), 1e-9)
                 if (slope < LEAST_RESPONSE * (speed / np.maximum(grid, 1e-9))[1:]).any():
@@ -471,6 +517,17 @@ class SpeedSearch:
             if lost < 9.0 and base.cost - tried.cost > 0.5 * own:
                 found.append(other)
         return tuple(found)
+
+
+def at_its_bounds(form: SpeedForm, values: np.ndarray) -> bool:
+    """Whether a curve or a limit of the command has a parameter at the edge of what is physical: that is no estimate,
+    it would go on."""
+    if form.stage not in (CURVE_STAGE, LIMIT_STAGE):
+        return False
+    near = [
+        min(v - p.low, p.high - v) < AT_BOUND * (p.high - p.low) for p, v in zip(form.parameters, values, strict=True)
+    ]
+    return any(near)
 
 
 def negligible(fit: SpeedFit, key: str) -> bool:

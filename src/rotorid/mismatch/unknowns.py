@@ -120,3 +120,20 @@ DEPENDS_ON = {
     "unknown_swing": ("specific_force", "time_s"),
 }
 """Regime variables that each depends on, for the verdict."""
+LEAST_TURN_RAD = 0.25
+"""Spread of the heading (one sigma) from which a moment that keeps its direction in the world differs from one that
+turns with the vehicle: 14 degrees move a quarter of it elsewhere."""
+
+
+def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:
+    """Whether flights with these attitudes, (n, 3, 3) each, could tell an empirical effect from a named one.
+
+    On a vehicle that keeps its heading a moment fixed in the world is one fixed in the body: it would take the place
+    of a centre of mass or a rotor that is off.
+    """
+    if effect_id != HEADING.id or any(r is None for r in rotations):
+        return True
+    noses = np.concatenate([r[:, 0, 0] + 1j * r[:, 1, 0] for r in rotations])
+    noses = noses / np.maximum(np.abs(noses), 1e-12)
+    # Of a normally spread heading the mean nose is exp(-sigma² / 2) long.
+    return bool(np.abs(noses.mean()) < np.exp(-0.5 * LEAST_TURN_RAD**2))

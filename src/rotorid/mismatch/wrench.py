@@ -326,7 +326,9 @@ def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None =
                         parts[name] = parts[name] - getattr(extra, name)
             return np.concatenate([prepared.thinner(parts[g]) for g in groups], axis=1), None
 
-        problem = WrenchOnly(segments, full_speed, full_voltage, prepared.thinner.rate_hz, residual_of, precision)
+        force_z = 2 if "force" in groups else None
+        rate_hz = prepared.thinner.rate_hz
+        problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z)
     return SpeedSearch(problem, candidate_forms(segments, full_voltage is not None)).run(), full_speed, full_voltage
 
 

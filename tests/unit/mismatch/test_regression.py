@@ -221,6 +221,15 @@ def test_what_a_term_does_beyond_the_others():
     np.testing.assert_allclose(beta, [-2.0, 2.0], rtol=1e-6)
 
 
+def test_the_share_of_a_term_that_is_its_own():
+    """x2 = x1 + z with z orthogonal and as large: half of its energy is its own, alone all of it."""
+    one = np.tile([1.0, 1.0, -1.0, -1.0], 200)
+    z = np.tile([1.0, -1.0, 1.0, -1.0], 200)
+    found = regression([rows_of(one, one, one + z)], ["one", "two"])
+    assert found.own_part(["one", "two"], "two", np.array([2.0]))[0] == pytest.approx(0.5, rel=1e-6)
+    assert found.own_part(["two"], "two", np.array([2.0]))[0] == pytest.approx(1.0, rel=1e-6)
+
+
 def test_the_gain_expected_on_held_out_blocks_is_what_a_right_model_gains():
     rng = np.random.default_rng(8)
     n = 4000

@@ -120,6 +120,22 @@ def test_copies_of_a_column_are_alternatives_and_others_are_not():
     assert {search.terms[active].effect, *search.alternatives(active, selection.active)} == {"com", "rotors"}
 
 
+def test_two_that_cancel_are_not_both_claimed_where_the_rest_is_what_their_forms_are_wrong_by():
+    """y = x1 + 0.02 z, and x2 = x1 + 0.02 z': x1 − x2 is 2 % of either, less than any form is known by.
+
+    Free, they would grow against each other to explain a bend of x1 that looks like z'.
+    """
+    rng = np.random.default_rng(7)
+    noise, x = case(rng, 1, size=2400)
+    bends = [coloured(2400, 1.0, rng, pole=0.95) for _ in x]
+    x = [[100 * c[0], 100 * (c[0] + 0.02 * bend)] for c, bend in zip(x, bends, strict=True)]
+    y = [n + columns[0] + 4 * bend for n, columns, bend in zip(noise, x, bends, strict=True)]
+    search = search_of([term("one"), term("two")], y, x)
+    beta = search.regression.fit(["one/form", "two/form"]).beta
+    np.testing.assert_allclose(beta, [-1.0, 2.0], atol=0.2)
+    assert len(search.run().active) == 1
+
+
 def test_a_pair_that_masks_each_other_is_found_together():
     """y = 2 (x1 − x2) with x1 and x2 nearly alike: each alone explains next to nothing."""
     rng = np.random.default_rng(7)

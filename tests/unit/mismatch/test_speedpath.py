@@ -12,11 +12,15 @@ from rotorid.effects.contract import SpeedPath
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
+    SpeedFit,
     SpeedSearch,
+    WrenchOnly,
+    at_its_bounds,
     candidate_forms,
     commanded_path,
     smoothed_acceleration,
     starts_of,
+    taken_back,
 )
 
 from .test_rows import still
@@ -142,3 +146,39 @@ def test_accelerations_of_a_ramp_at_full_length():
     out = smoothed_acceleration(ramp, RATE_HZ, 20.0)
     assert out.shape == ramp.shape
     np.testing.assert_allclose(out, 300.0, rtol=1e-9)
+
+
+def test_a_curve_at_the_edge_of_what_is_physical_is_no_estimate():
+    curve, lag = form("throttle_curve", "power of the throttle"), form("motor_lag", "one constant")
+    assert at_its_bounds(curve, np.array([0.2])) and not at_its_bounds(curve, np.array([0.5]))
+    assert at_its_bounds(form("command_saturation", "upper limit"), np.array([0.3000001]))
+    # A lag of nothing is the absence of one, and is judged by its size.
+    assert not at_its_bounds(lag, np.array([lag.parameters[0].low]))
+
+
+def test_what_harms_is_taken_back_one_at_a_time_the_least_sure_first():
+    voltage = np.linspace(12.4, 10.0, 2000)
+    both = recorded(1, voltage=voltage, motor_lag=("one constant", [0.05]), battery_sag=("power of voltage", [1.0]))
+    result = replace(searched(both), p_values={"motor_lag": 1e-30, "battery_sag": 1e-9})
+    chains = [[k for k, _ in r.fit.chain] for r in taken_back(result, "harm")]
+    assert chains == [["motor_lag"], ["battery_sag"], []]
+    first = taken_back(result, "harm")[0]
+    assert first.dropped == {**result.dropped, "battery_sag": "harm"} and set(first.p_values) == {"motor_lag"}
+    assert first.fit.covariance.shape == (len(first.fit.values),) * 2
+
+
+def test_a_curve_without_thrust_does_not_carry_the_vehicle():
+    """Weight 6.06 N, carried at the commanded 900 and 1100 rad/s: at half the speed a quarter of it is."""
+    segment = replace(recorded(2), command=np.repeat([[900.0] * 4, [1100.0] * 4], 200, axis=0))
+
+    def residual_of(moving, speed, columns):
+        force = np.zeros((len(speed), 3))
+        force[:, 2] = -6.06 + 1.5e-6 * (speed**2).sum(axis=1)
+        return force + 1e-3 * np.random.default_rng(0).standard_normal(force.shape), np.zeros((len(speed), 3, 1))
+
+    problem = WrenchOnly([segment], FULL, None, RATE_HZ, residual_of, np.ones(1), 2)
+    curve = form("throttle_curve", "affine")
+    for slope, lift in ((0.0, 1.0), (-0.5, 0.25), (0.2, 1.44)):
+        fit = SpeedFit((("throttle_curve", curve),), np.array([0.0, slope]), 0.0, 0.0)
+        assert problem.lift(fit) == pytest.approx(lift, abs=1e-3)
+        assert SpeedSearch(problem, []).responds(fit) is (lift > 0.5)
