@@ -13,7 +13,15 @@ from rotorid.effects.loading import Loading
 from rotorid.mismatch.instrument.columns import rows_of, term_columns
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
 from rotorid.mismatch.prepare import training_rule
-from rotorid.mismatch.regression import Regression, autoregression, build, chi2_p, full_fit_residuals, ridge_inverse
+from rotorid.mismatch.regression import (
+    Regression,
+    autoregression,
+    build,
+    chi2_p,
+    full_fit_residuals,
+    limited_bias,
+    ridge_inverse,
+)
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import (
     COST_PER_EFFECT,
@@ -118,11 +126,13 @@ class ReadingSearch(Search):
             self.terms = every
 
     def worth(self, keys):
-        """As for flights, from the summed Gram matrix alone: there is no noise of regressors to correct here."""
+        """As for flights, from the summed Gram matrix alone and without limits of believed values."""
         reg = self.regression
         cols = reg.columns(self.always + keys)
         gram, cross = self.total_gram[np.ix_(cols, cols)], self.total_cross[cols]
-        beta = ridge_inverse(gram + np.diag(reg.precision[cols])) @ cross
+        share = reg.training.mean()
+        bias = limited_bias(gram, share * reg.bias_gram[np.ix_(cols, cols)])
+        beta = ridge_inverse(gram - bias + np.diag(reg.precision[cols])) @ (cross - share * reg.bias_cross[cols])
         gain = float(2 * cross @ beta - beta @ gram @ beta)
         return gain - COST_PER_PARAMETER * sum(self.terms[k].size for k in keys) - COST_PER_EFFECT * len(keys)
 
@@ -302,12 +312,15 @@ def reading_model(
     setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None
 ) -> ReadingModel:
     """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept."""
+    whole = whole_reading(terms, active)
+    # Measured speeds are the load: their noise is in regressors and residual, and is learnt by adding it once more.
+    noisy = rows_of(setup, terms, setup.noisier, whole) if loadings is None and setup.noisier is not None else None
     loadings = setup.loadings if loadings is None else loadings
-    rows = rows_of(setup, terms, loadings, whole_reading(terms, active))
+    rows = rows_of(setup, terms, loadings, whole)
     noise, taps = noise_and_filters(setup, terms, rows) if filters is None else filters
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
-    regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz)
+    regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
     sizes = size_function(rows, regression, noise, max(1, int(setup.rate_hz)) if not short else 1)
     search = ReadingSearch(regression, sizes, np.zeros(6))
     selection = search.run(active)
