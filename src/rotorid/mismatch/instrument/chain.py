@@ -253,8 +253,10 @@ class Problem:
     def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
-        for _, form in chain:
-            low += [p.low for p in form.parameters]
+        for key, form in chain:
+            # Rotors do not turn before they are told: a wrench that is early beyond a sample is on another clock.
+            early = -SUB_SAMPLE / self.setup.instrument.rate_hz if key == "delay" and not self.measured else -np.inf
+            low += [max(p.low, early) for p in form.parameters]
             high += [p.high for p in form.parameters]
         reach = MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])

@@ -48,6 +48,8 @@ MAIN_SHARE = 0.2
 ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
+NOISE_IN_A_PLAY = 0.1
+"""Share of a play's own part that may be noise of measured speeds."""
 REFUTED = 12.0
 """Whitened squares by which another effect may do worse on the runs held out before it is no alternative."""
 LEAST_HELD_OUT = 4
@@ -82,12 +84,17 @@ class ReadingSearch(Search):
         return super().physical(term, beta, error)
 
     def judge(self, key, active, base, jackknife=False):
-        """As for flights, and nothing that makes the reading smoothed and early at once.
+        """As for flights; no play in the noise of speeds; nothing that makes the reading smoothed and early at once.
 
-        A low-pass delays. Smoothing without delay is what takes the noise out of measured rotor speeds: it makes the
-        load quieter and says nothing of the reading.
+        Noise is taken off as far as a regressor is linear in it, which a play is not: one of which a tenth may be noise
+        says nothing. A low-pass delays. Smoothing without delay is what takes the noise out of measured rotor speeds:
+        it makes the load quieter and says nothing of the reading.
         """
         judged = super().judge(key, active, base, jackknife)
+        if self.terms[key].effect == "hysteresis" and self.regression.bias_gram.any():
+            keys = self.always + [k for k in active if k != key] + [key]
+            if self.regression.noise_share(keys, key, judged.beta) > NOISE_IN_A_PLAY:
+                return replace(judged, physical=False)
         terms = {self.terms[k].effect: self.terms[k] for k in (*active, key)}
         early = "delay" in terms and terms["delay"].values and terms["delay"].values[0] < 0
         if early and "amplifier_filter" in terms and self.terms[key].effect in ("delay", "amplifier_filter"):
