@@ -8,8 +8,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
-from rotorid.effects.loading import Loading
+from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.instrument.columns import rows_of, term_columns
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
 from rotorid.mismatch.prepare import training_rule
@@ -483,24 +484,40 @@ def active_values(model: ReadingModel, key: str) -> np.ndarray:
     return values
 
 
-def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
-    """One-sigma of every parameter of a term with nonlinear ones, (p,): its slopes join the regression."""
+@dataclass(frozen=True)
+class Linearised:
+    """A form fitted around given parameter values, by its slopes and its linear parameters."""
+
+    values: np.ndarray
+    deviation: np.ndarray
+    """One-sigma of every parameter, (p,)."""
+    left: float
+    """Whitened squares left on the training blocks."""
+
+
+def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, loadings=None) -> Linearised:
+    """A form in the place of a term at work: a step from `values`, everything else free."""
     setup, term = model.setup, model.search.terms[key]
-    values = active_values(model, key)
+    values = np.asarray(values, float)
+    size = max(1, len(form.linear))
+    own = replace(term, form=form, values=tuple(values), size=size, prior_sd=(np.inf,) * size)
     at_work = [
-        replace(t, values=tuple(active_values(model, t.key))) if t.key in model.selection.active else t
+        own
+        if t.key == key
+        else replace(t, values=tuple(active_values(model, t.key)))
+        if t.key in model.selection.active
+        else t
         for t in model.terms
     ]
     chosen = [t for t in at_work if t.kind != "effect" or t.key in model.selection.active]
-    own = replace(term, values=tuple(values))
     slopes = [
-        Term(f"{key}/slope{i}", "slope", term.effect, term.form, tuple(values), 1, (np.inf,), slope_of=i)
-        for i in term.form.nonlinear
+        Term(f"{key}/slope{i}", "slope", term.effect, form, tuple(values), 1, (np.inf,), slope_of=i)
+        for i in form.nonlinear
     ]
-    if not term.form.linear:
+    if not form.linear:
         chosen = [t for t in chosen if t.key != key]
     rows = rows_of(setup, [*chosen, *slopes], loadings, whole_reading(at_work, model.selection.active))
-    if not term.form.linear:
+    if not form.linear:
         # The form itself, at gain one, is in the model: only its slopes are fitted.
         known = rows_of(setup, [own], loadings)
         rows = [Rows(r.run, r.time_s, r.y - k.x[:, :, 0], r.x) for r, k in zip(rows, known, strict=True)]
@@ -510,11 +527,41 @@ def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndar
     )
     fit = regression.fit([t.key for t in (*chosen, *slopes)], jackknife=True)
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    at = {c: s for c, s in zip(fit.columns, sd, strict=True)}
-    out = np.zeros(len(values))
-    for i, slope in zip(term.form.nonlinear, slopes, strict=True):
-        out[i] = at[regression.columns([slope.key])[0]]
-    if term.form.linear:
-        for i, c in zip(term.form.linear, regression.columns([key]), strict=True):
-            out[i] = at[c]
-    return out
+    at = {c: (b, s) for c, b, s in zip(fit.columns, fit.beta, sd, strict=True)}
+    out, deviation = values.copy(), np.zeros(len(values))
+    for i, slope in zip(form.nonlinear, slopes, strict=True):
+        step, deviation[i] = at[regression.columns([slope.key])[0]]
+        out[i] += step
+    if form.linear:
+        for i, c in zip(form.linear, regression.columns([key]), strict=True):
+            out[i], deviation[i] = at[c]
+    return Linearised(out, deviation, float(fit.residual_square[regression.training].sum()))
+
+
+def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
+    """One-sigma of every parameter of a term with nonlinear ones, (p,): its slopes join the regression."""
+    form = model.search.terms[key].form
+    return linearised(model, key, form, active_values(model, key), loadings).deviation
+
+
+def doubt_of_form(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
+    """One-sigma of every parameter (p,) by which other forms of the same id and the same parameters say otherwise.
+
+    Each form counts by its likelihood, exp(−½ whitened squares left), as in Buckland, Burnham and Augustin, Model
+    selection: an integral part of inference, Biometrics 53, 1997: an image rotor and its inverse square differ by
+    more than their errors where the recordings hardly tell them apart.
+    """
+    form, values = model.search.terms[key].form, active_values(model, key)
+    named = [(p.symbol, p.unit) for p in form.parameters]
+    others = [
+        f
+        for f in forms_of(catalogue()[model.search.terms[key].effect], model.setup.instrument)
+        if f.name != form.name and [(p.symbol, p.unit) for p in f.parameters] == named
+    ]
+    if not others:
+        return np.zeros(len(values))
+    own = linearised(model, key, form, values, loadings)
+    found = [linearised(model, key, f, values, loadings) for f in others]
+    weights = np.exp(np.clip([0.5 * (own.left - x.left) for x in found], -50.0, 50.0))
+    away = np.array([(x.values - values) ** 2 for x in found])
+    return np.sqrt(weights @ away / (1.0 + weights.sum()))
