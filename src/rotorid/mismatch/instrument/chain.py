@@ -108,11 +108,13 @@ def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, f
 
     ω(t − δ) + ½ v (ω(t + dt) − 2 ω(t) + ω(t − dt))/dt²: rotors take a command that is late or spread as it comes.
     """
+    out = speed[::finer]
     if len(moments) > 1:
-        speed = between_samples(speed, np.arange(len(speed)) - moments[0] / dt_s * finer)
-    out = speed[::finer].copy()
+        out = between_samples(speed, (np.arange(len(out)) - moments[0] / dt_s) * finer)
     if len(moments) and len(out) > 2:
-        out[1:-1] += 0.5 * moments[-1] / dt_s**2 * np.diff(speed[::finer], 2, axis=0)
+        spread = np.diff(out, 2, axis=0)
+        out = out.copy()
+        out[1:-1] += 0.5 * moments[-1] / dt_s**2 * spread
     return out
 
 
