@@ -58,6 +58,8 @@ MOST_AT_ONCE = 6
 """More causes than this at once are not told apart by six channels: what they leave is stated as unexplained."""
 MOST_OF_A_FORM = 6
 """Parameters of a form from which it joins in the second round only."""
+LATER = ("thrust and torque apart",)
+"""Forms of fewer parameters that could swallow several causes as well: they join in the second round, too."""
 
 
 class ReadingSearch(Search):
@@ -71,7 +73,9 @@ class ReadingSearch(Search):
         self.total_cross = regression.cross[regression.training].sum(axis=0)
 
     def _allowed(self, term: Term) -> bool:
-        return self.rich or term.size <= MOST_OF_A_FORM or "own in each run" in term.key
+        if self.rich or "own in each run" in term.key:
+            return True
+        return term.size <= MOST_OF_A_FORM and (term.form is None or term.form.name not in LATER)
 
     def physical(self, term, beta, error):
         """Also no nonlinear parameter at its bound, and none that is below what an instrument resolves."""
