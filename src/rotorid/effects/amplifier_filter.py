@@ -5,13 +5,13 @@ from scipy.signal import lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.creep import followed
-from rotorid.effects.loading import change_of_load, unsmoothed
+from rotorid.effects.loading import since_the_first, unsmoothed
 from rotorid.effects.structural_resonance import resonance
 
 
 def first_order(loading, vehicle, values):
     """y = F / (1 + i f/f_c)."""
-    load = change_of_load(loading)
+    load = since_the_first(loading)
     return Contribution(reading=followed_now(load, 1.0 / (2 * np.pi * max(values[0], 1e-3)), loading.dt_s) - load)
 
 
@@ -30,7 +30,7 @@ def followed_now(load, tau_s, dt_s):
 
 def second_order(loading, vehicle, values):
     """Butterworth of second order with cutoff f_c: as a structure with a damping ratio of √½."""
-    load = change_of_load(loading)
+    load = since_the_first(loading)
     return Contribution(reading=resonance(load, values[0], np.sqrt(0.5), loading.dt_s) - load)
 
 

@@ -34,17 +34,22 @@ def other_rate(loading, vehicle, values):
     return at_other_times(loading, values[0] * loading.run_time_s)
 
 
+def other_rate_and_start(loading, vehicle, values):
+    """y(t) = F(t − T − e t), t from the run's start."""
+    return at_other_times(loading, values[1] + values[0] * loading.run_time_s)
+
+
 def reading_forms(instrument):
+    dt = 1.0 / instrument.rate_hz
     rate = 1.0 / max(instrument.rate_hz * instrument.duration_s, 10.0)
     starts = tuple(s * k * rate for k in (3.0, 15.0, 60.0) if k * rate < 0.1 for s in (-1, 1))
+    skew = Parameter("e", "1", -0.1, 0.1, True, starts, "seconds lost per second", negligible=rate)
+    at_start = tuple(k * dt for k in (-4.0, 4.0))
+    late = Parameter("T", "s", -30 * dt, 60 * dt, True, at_start, "lateness at the start of a run", negligible=2 * dt)
+    text = "y(t) = F(t − T − e t)"
     return (
-        Form(
-            "other rate",
-            "y(t) = F(t − e t)",
-            (Parameter("e", "1", -0.1, 0.1, True, starts, "seconds lost per second", negligible=rate),),
-            other_rate,
-            excited_by=("load_change",),
-        ),
+        Form("other rate", "y(t) = F(t − e t)", (skew,), other_rate, excited_by=("load_change",)),
+        Form("other rate and start", text, (skew, late), other_rate_and_start, excited_by=("load_change",)),
     )
 
 

@@ -235,3 +235,8 @@ def weights_of_four(place):
 def change_of_load(loading: Loading) -> np.ndarray:
     """Load less what rested on the sensor before, (n, 6)."""
     return loading.load - loading.rest
+
+
+def since_the_first(loading: Loading) -> np.ndarray:
+    """Load less the first, (n, 6): what is over within seconds has settled on that."""
+    return loading.load - loading.load[0]

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import change_of_load, unsmoothed
+from rotorid.effects.loading import since_the_first, unsmoothed
 
 
 def resonance(signal, frequency_hz, damping, dt_s):
@@ -25,7 +25,7 @@ def recursion(frequency_hz, damping, dt_s):
 
 def ringing(loading, vehicle, values):
     """y = H(s) F, so y − F = (H − 1) F."""
-    load = change_of_load(loading)
+    load = since_the_first(loading)
     return Contribution(reading=resonance(load, values[0], values[1], loading.dt_s) - load)
 
 

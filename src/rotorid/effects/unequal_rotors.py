@@ -1,5 +1,7 @@
 """Rotors that are not alike: thrust or torque coefficients differ between them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
@@ -75,11 +77,41 @@ def forms(vehicle):
     )
 
 
+def apart(motion, vehicle, values):
+    """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i): another twist or a chip changes the two by shares of their own."""
+    thrust, torque = np.split(np.asarray(values, float), 2)
+    wrench = _thrust(motion, vehicle, np.append(thrust, -thrust.sum()))
+    return Contribution(wrench.force, wrench.moment + _torque(motion, vehicle, np.append(torque, -torque.sum())))
+
+
+def reading_forms(instrument):
+    """The forms of a flight, and on a stand, which reads the torque itself, thrust and torque apart."""
+    if instrument.bench:
+        return ()
+    vehicle = instrument.vehicle
+
+    def on_stand(form):
+        return replace(form, contribution=lambda loading, own, values: form.contribution(loading.motion, own, values))
+
+    found = [*forms(vehicle)]
+    count = vehicle.rotor_count
+    if count > 1 and 5 in instrument.channels and vehicle.torque_coefficients_n_m_s2().any():
+        free = tuple(
+            Parameter(f"{s}_{i + 1}", "1", -0.9, 2.0, meaning=f"excess of the {what} of rotor {i + 1}")
+            for s, what in (("d", "thrust"), ("q", "torque"))
+            for i in range(count - 1)
+        )
+        text = "C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i), Σ d_i = Σ q_i = 0"
+        found.append(Form("thrust and torque apart", text, free, apart, ("rotor_speed",)))
+    return tuple(on_stand(form) for form in found)
+
+
 EFFECT = Effect(
     id="unequal_rotors",
     name="a difference between the rotors",
     sentence="one or more rotors give more or less thrust than the others",
     forms=forms,
+    reading_forms=reading_forms,
     source="rotor coefficients per rotor, no further assumption; catalogue F17",
     sign="positive d_i: rotor i gives more than the coefficient believed",
     validity="the same share over all speeds; equal shares of all rotors are a wrong coefficient (under parameters)",

@@ -32,6 +32,22 @@ def recirculation(loading, vehicle, values):
     return Contribution(reading=thrust_part(gain, loading, vehicle))
 
 
+def of_all_rotors(largest_n):
+    """Contribution T_i = C_F ω_i² (1 − c LP_τ(Σ T)/T_max), T_max the largest total thrust, N.
+
+    All rotors stir the same air: what it takes from each is a share that goes as the momentum all have thrown out.
+    """
+
+    def contribution(loading, vehicle, values):
+        total = (vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2).sum(axis=1, keepdims=True)
+        late = followed(total, values[1], loading.dt_s) / largest_n
+        return Contribution(
+            reading=thrust_part(np.broadcast_to(-values[0] * late, (loading.size, 1)), loading, vehicle)
+        )
+
+    return contribution
+
+
 def by_distance(loading, vehicle, values):
     """T_i = (1 + c (R/d)²) C_F ω_i², d the distance to the wall."""
     ratio = (rotor_radius_m(vehicle) / np.maximum(loading.distance, 1e-3)) ** 2
@@ -45,20 +61,14 @@ def reading_forms(instrument):
     span, shortest = instrument.duration_s, max(0.5, 10.0 / instrument.rate_hz)
     if span > 4 * shortest:
         starts = tuple(t for t in (2.0, 6.0, 15.0, 40.0) if shortest <= t <= span) or (0.5 * span,)
-        forms.append(
-            Form(
-                "recirculation",
-                "T = C_F ω² − c C_F ω (ω after a lag of τ)",
-                (
-                    Parameter("c", "1", 0.0, 0.5, meaning="share of the thrust"),
-                    Parameter(
-                        "tau", "s", shortest, 3 * span, nonlinear=True, starts=starts, meaning="time to come round"
-                    ),
-                ),
-                recirculation,
-                ("rotor_speed",),
-            )
-        )
+        tau = Parameter("tau", "s", shortest, 3 * span, nonlinear=True, starts=starts, meaning="time to come round")
+        share = Parameter("c", "1", 0.0, 0.5, meaning="share of the thrust")
+        text = "T = C_F ω² − c C_F ω (ω after a lag of τ)"
+        forms.append(Form("recirculation", text, (share, tau), recirculation, ("rotor_speed",)))
+        largest = Parameter("c_T", "1", 0.0, 0.5, meaning="share of the thrust when all have turned at their most")
+        text = "T = C_F ω² (1 − c_T (ΣT after a lag of τ)/T_max)"
+        together = of_all_rotors(max(instrument.largest[2], 1e-6))
+        forms.append(Form("recirculation of all rotors' air", text, (largest, tau), together, ("rotor_speed",)))
     if instrument.distance:
         forms.append(
             Form(
@@ -80,8 +90,8 @@ EFFECT = Effect(
     source="catalogue B12",
     sign="positive c of the recirculation takes thrust away; positive c by distance adds thrust near the wall",
     validity=(
-        "R/d well below 1 for the form by distance; one time constant of the recirculating air and a loss "
-        "alike on all rotors; the torque is taken as unchanged"
+        "R/d well below 1 for the form by distance; one time constant of the recirculating air, each rotor's own or "
+        "that of all together; the torque is taken as unchanged"
     ),
     excited_by=("rotor_speed",),
     confusers=("battery_sag", "creep", "ground_effect"),

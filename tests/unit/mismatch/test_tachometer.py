@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import Loading
-from rotorid.mismatch.instrument.tachometer import WIDTHS, quieter, without_noise
+from rotorid.mismatch.instrument.tachometer import WIDTHS, noise_of, quieter, without_noise
 
 RATE_HZ = 200.0
 TIME_S = np.arange(6000) / RATE_HZ
@@ -68,3 +68,11 @@ def test_the_reading_tells_noise_of_the_counter_from_unrest_of_the_rotor():
     assert quieter([noisy], [clean]) == [clean]
     assert quieter([clean], [noisy]) == [clean]
     assert quieter([clean], [clean]) == [clean]
+
+
+def test_the_size_of_a_counters_noise():
+    noise = 3.0 * np.random.default_rng(4).standard_normal(TIME_S.size)
+    found = noise_of((stepping() + noise)[:, None], RATE_HZ)[:, 0]
+    assert np.median(found) == pytest.approx(3.0, rel=0.1)
+    vibration = 20.0 * np.sin(2 * np.pi * 60.0 * TIME_S)
+    assert not noise_of((stepping() + vibration)[:, None], RATE_HZ).any()

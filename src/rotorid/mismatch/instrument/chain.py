@@ -108,11 +108,13 @@ def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, f
 
     ω(t − δ) + ½ v (ω(t + dt) − 2 ω(t) + ω(t − dt))/dt²: rotors take a command that is late or spread as it comes.
     """
+    out = speed[::finer]
     if len(moments) > 1:
-        speed = between_samples(speed, np.arange(len(speed)) - moments[0] / dt_s * finer)
-    out = speed[::finer].copy()
+        out = between_samples(speed, (np.arange(len(out)) - moments[0] / dt_s) * finer)
     if len(moments) and len(out) > 2:
-        out[1:-1] += 0.5 * moments[-1] / dt_s**2 * np.diff(speed[::finer], 2, axis=0)
+        spread = np.diff(out, 2, axis=0)
+        out = out.copy()
+        out[1:-1] += 0.5 * moments[-1] / dt_s**2 * spread
     return out
 
 
@@ -253,8 +255,10 @@ class Problem:
     def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
-        for _, form in chain:
-            low += [p.low for p in form.parameters]
+        for key, form in chain:
+            # Rotors do not turn before they are told: a wrench that is early beyond a sample is on another clock.
+            early = -SUB_SAMPLE / self.setup.instrument.rate_hz if key == "delay" and not self.measured else -np.inf
+            low += [max(p.low, early) for p in form.parameters]
             high += [p.high for p in form.parameters]
         reach = MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])

@@ -106,7 +106,14 @@ def lacks(form: Form, setup: Setup) -> str | None:
 def _reason(effect_id: str, setup: Setup) -> str:
     """Why nothing of an id could be tested."""
     vehicle = setup.vehicle
-    stand_only = ("wall_interference", "sensor_origin", "com_offset", "cable_stiffness", "mount_tilt")
+    stand_only = (
+        "wall_interference",
+        "sensor_origin",
+        "com_offset",
+        "cable_stiffness",
+        "mount_tilt",
+        "unequal_rotors",
+    )
     if setup.instrument.bench and (catalogue()[effect_id].reading_forms is None or effect_id in stand_only):
         return NO_ROTORS if effect_id not in ("sensor_origin",) else "no moment is read"
     if effect_id == "com_offset":

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.decide import estimates, held_out_gain
 from rotorid.mismatch.findings import Estimate, Finding
-from rotorid.mismatch.instrument.model import ReadingModel, active_values, in_training, nonlinear_deviation
+from rotorid.mismatch.instrument.model import (
+    ReadingModel,
+    active_values,
+    doubt_of_form,
+    in_training,
+    nonlinear_deviation,
+)
 
 SHOWS = 0.33
 """A channel counts where the contribution is at least this share of its strongest, in units of the noise."""
@@ -46,6 +54,7 @@ def findings_of(model: ReadingModel) -> list[Finding]:
             )
         else:
             parameters = estimates(model.regression, selection.fit, search, key)
+        parameters = wider(parameters, doubt_of_form(model, key, model.loadings))
         alternatives = alternatives_of(model, key)
         out.append(
             Finding(
@@ -66,6 +75,15 @@ def findings_of(model: ReadingModel) -> list[Finding]:
         name = effects[effect_id].name
         out.append(Finding(id=effect_id, status="not_established", sentence=f"{name} did not hold: {reason}"))
     return out
+
+
+def wider(parameters: tuple[Estimate, ...], doubt: np.ndarray) -> tuple[Estimate, ...]:
+    """Estimates whose intervals hold a further one-sigma each, (p,)."""
+    out = []
+    for p, sd in zip(parameters, doubt, strict=True):
+        low, high = (float(np.hypot(p.value - edge, REACH * sd)) for edge in (p.low, p.high))
+        out.append(replace(p, low=p.value - low, high=p.value + high))
+    return tuple(out)
 
 
 def alternatives_of(model: ReadingModel, key: str) -> list[str]:

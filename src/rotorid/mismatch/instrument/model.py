@@ -8,12 +8,21 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
-from rotorid.effects.loading import Loading
+from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.instrument.columns import rows_of, term_columns
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
 from rotorid.mismatch.prepare import training_rule
-from rotorid.mismatch.regression import Regression, autoregression, build, chi2_p, full_fit_residuals, ridge_inverse
+from rotorid.mismatch.regression import (
+    Regression,
+    autoregression,
+    build,
+    chi2_p,
+    full_fit_residuals,
+    limited_bias,
+    ridge_inverse,
+)
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import (
     COST_PER_EFFECT,
@@ -40,6 +49,8 @@ MAIN_SHARE = 0.2
 ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
+NOISE_IN_A_PLAY = 0.1
+"""Share of a play's own part that may be noise of measured speeds."""
 REFUTED = 12.0
 """Whitened squares by which another effect may do worse on the runs held out before it is no alternative."""
 LEAST_HELD_OUT = 4
@@ -47,6 +58,8 @@ MOST_AT_ONCE = 6
 """More causes than this at once are not told apart by six channels: what they leave is stated as unexplained."""
 MOST_OF_A_FORM = 6
 """Parameters of a form from which it joins in the second round only."""
+LATER = ("thrust and torque apart",)
+"""Forms of fewer parameters that could swallow several causes as well: they join in the second round, too."""
 
 
 class ReadingSearch(Search):
@@ -60,7 +73,9 @@ class ReadingSearch(Search):
         self.total_cross = regression.cross[regression.training].sum(axis=0)
 
     def _allowed(self, term: Term) -> bool:
-        return self.rich or term.size <= MOST_OF_A_FORM or "own in each run" in term.key
+        if self.rich or "own in each run" in term.key:
+            return True
+        return term.size <= MOST_OF_A_FORM and (term.form is None or term.form.name not in LATER)
 
     def physical(self, term, beta, error):
         """Also no nonlinear parameter at its bound, and none that is below what an instrument resolves."""
@@ -74,12 +89,17 @@ class ReadingSearch(Search):
         return super().physical(term, beta, error)
 
     def judge(self, key, active, base, jackknife=False):
-        """As for flights, and nothing that makes the reading smoothed and early at once.
+        """As for flights; no play in the noise of speeds; nothing that makes the reading smoothed and early at once.
 
-        A low-pass delays. Smoothing without delay is what takes the noise out of measured rotor speeds: it makes the
-        load quieter and says nothing of the reading.
+        Noise is taken off as far as a regressor is linear in it, which a play is not: one of which a tenth may be noise
+        says nothing. A low-pass delays. Smoothing without delay is what takes the noise out of measured rotor speeds:
+        it makes the load quieter and says nothing of the reading.
         """
         judged = super().judge(key, active, base, jackknife)
+        if self.terms[key].effect == "hysteresis" and self.regression.bias_gram.any():
+            keys = self.always + [k for k in active if k != key] + [key]
+            if self.regression.noise_share(keys, key, judged.beta) > NOISE_IN_A_PLAY:
+                return replace(judged, physical=False)
         terms = {self.terms[k].effect: self.terms[k] for k in (*active, key)}
         early = "delay" in terms and terms["delay"].values and terms["delay"].values[0] < 0
         if early and "amplifier_filter" in terms and self.terms[key].effect in ("delay", "amplifier_filter"):
@@ -118,11 +138,13 @@ class ReadingSearch(Search):
             self.terms = every
 
     def worth(self, keys):
-        """As for flights, from the summed Gram matrix alone: there is no noise of regressors to correct here."""
+        """As for flights, from the summed Gram matrix alone and without limits of believed values."""
         reg = self.regression
         cols = reg.columns(self.always + keys)
         gram, cross = self.total_gram[np.ix_(cols, cols)], self.total_cross[cols]
-        beta = ridge_inverse(gram + np.diag(reg.precision[cols])) @ cross
+        share = reg.training.mean()
+        bias = limited_bias(gram, share * reg.bias_gram[np.ix_(cols, cols)])
+        beta = ridge_inverse(gram - bias + np.diag(reg.precision[cols])) @ (cross - share * reg.bias_cross[cols])
         gain = float(2 * cross @ beta - beta @ gram @ beta)
         return gain - COST_PER_PARAMETER * sum(self.terms[k].size for k in keys) - COST_PER_EFFECT * len(keys)
 
@@ -302,12 +324,15 @@ def reading_model(
     setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None
 ) -> ReadingModel:
     """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept."""
+    whole = whole_reading(terms, active)
+    # Measured speeds are the load: their noise is in regressors and residual, and is learnt by adding it once more.
+    noisy = rows_of(setup, terms, setup.noisier, whole) if loadings is None and setup.noisier is not None else None
     loadings = setup.loadings if loadings is None else loadings
-    rows = rows_of(setup, terms, loadings, whole_reading(terms, active))
+    rows = rows_of(setup, terms, loadings, whole)
     noise, taps = noise_and_filters(setup, terms, rows) if filters is None else filters
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
-    regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz)
+    regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
     sizes = size_function(rows, regression, noise, max(1, int(setup.rate_hz)) if not short else 1)
     search = ReadingSearch(regression, sizes, np.zeros(6))
     selection = search.run(active)
@@ -463,24 +488,40 @@ def active_values(model: ReadingModel, key: str) -> np.ndarray:
     return values
 
 
-def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
-    """One-sigma of every parameter of a term with nonlinear ones, (p,): its slopes join the regression."""
+@dataclass(frozen=True)
+class Linearised:
+    """A form fitted around given parameter values, by its slopes and its linear parameters."""
+
+    values: np.ndarray
+    deviation: np.ndarray
+    """One-sigma of every parameter, (p,)."""
+    left: float
+    """Whitened squares left on the training blocks."""
+
+
+def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, loadings=None) -> Linearised:
+    """A form in the place of a term at work: a step from `values`, everything else free."""
     setup, term = model.setup, model.search.terms[key]
-    values = active_values(model, key)
+    values = np.asarray(values, float)
+    size = max(1, len(form.linear))
+    own = replace(term, form=form, values=tuple(values), size=size, prior_sd=(np.inf,) * size)
     at_work = [
-        replace(t, values=tuple(active_values(model, t.key))) if t.key in model.selection.active else t
+        own
+        if t.key == key
+        else replace(t, values=tuple(active_values(model, t.key)))
+        if t.key in model.selection.active
+        else t
         for t in model.terms
     ]
     chosen = [t for t in at_work if t.kind != "effect" or t.key in model.selection.active]
-    own = replace(term, values=tuple(values))
     slopes = [
-        Term(f"{key}/slope{i}", "slope", term.effect, term.form, tuple(values), 1, (np.inf,), slope_of=i)
-        for i in term.form.nonlinear
+        Term(f"{key}/slope{i}", "slope", term.effect, form, tuple(values), 1, (np.inf,), slope_of=i)
+        for i in form.nonlinear
     ]
-    if not term.form.linear:
+    if not form.linear:
         chosen = [t for t in chosen if t.key != key]
     rows = rows_of(setup, [*chosen, *slopes], loadings, whole_reading(at_work, model.selection.active))
-    if not term.form.linear:
+    if not form.linear:
         # The form itself, at gain one, is in the model: only its slopes are fitted.
         known = rows_of(setup, [own], loadings)
         rows = [Rows(r.run, r.time_s, r.y - k.x[:, :, 0], r.x) for r, k in zip(rows, known, strict=True)]
@@ -490,11 +531,41 @@ def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndar
     )
     fit = regression.fit([t.key for t in (*chosen, *slopes)], jackknife=True)
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    at = {c: s for c, s in zip(fit.columns, sd, strict=True)}
-    out = np.zeros(len(values))
-    for i, slope in zip(term.form.nonlinear, slopes, strict=True):
-        out[i] = at[regression.columns([slope.key])[0]]
-    if term.form.linear:
-        for i, c in zip(term.form.linear, regression.columns([key]), strict=True):
-            out[i] = at[c]
-    return out
+    at = {c: (b, s) for c, b, s in zip(fit.columns, fit.beta, sd, strict=True)}
+    out, deviation = values.copy(), np.zeros(len(values))
+    for i, slope in zip(form.nonlinear, slopes, strict=True):
+        step, deviation[i] = at[regression.columns([slope.key])[0]]
+        out[i] += step
+    if form.linear:
+        for i, c in zip(form.linear, regression.columns([key]), strict=True):
+            out[i], deviation[i] = at[c]
+    return Linearised(out, deviation, float(fit.residual_square[regression.training].sum()))
+
+
+def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
+    """One-sigma of every parameter of a term with nonlinear ones, (p,): its slopes join the regression."""
+    form = model.search.terms[key].form
+    return linearised(model, key, form, active_values(model, key), loadings).deviation
+
+
+def doubt_of_form(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
+    """One-sigma of every parameter (p,) by which other forms of the same id and the same parameters say otherwise.
+
+    Each form counts by its likelihood, exp(−½ whitened squares left), as in Buckland, Burnham and Augustin, Model
+    selection: an integral part of inference, Biometrics 53, 1997: an image rotor and its inverse square differ by
+    more than their errors where the recordings hardly tell them apart.
+    """
+    form, values = model.search.terms[key].form, active_values(model, key)
+    named = [(p.symbol, p.unit) for p in form.parameters]
+    others = [
+        f
+        for f in forms_of(catalogue()[model.search.terms[key].effect], model.setup.instrument)
+        if f.name != form.name and [(p.symbol, p.unit) for p in f.parameters] == named
+    ]
+    if not others:
+        return np.zeros(len(values))
+    own = linearised(model, key, form, values, loadings)
+    found = [linearised(model, key, f, values, loadings) for f in others]
+    weights = np.exp(np.clip([0.5 * (own.left - x.left) for x in found], -50.0, 50.0))
+    away = np.array([(x.values - values) ** 2 for x in found])
+    return np.sqrt(weights @ away / (1.0 + weights.sum()))

@@ -83,7 +83,7 @@ def without_settling(loadings: tuple[Loading, ...], channels, largest, wait_s: f
     """Stretches with the samples from just before a step until it has settled marked as not to be used."""
     out = []
     for x in loadings:
-        keep = np.ones(x.size, bool)
+        keep = np.ones(x.size, bool) if x.keep is None else x.keep.copy()
         for c in channels:
             for at in steps_of(x, c, largest[c]):
                 t = x.time_s[at]

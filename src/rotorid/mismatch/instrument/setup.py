@@ -13,17 +13,17 @@ from scipy.signal import savgol_filter
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
-from rotorid.effects.loading import CHANNELS, Instrument, Loading, at_sensor, rotation_of, weight
+from rotorid.effects.loading import CHANNELS, REST_S, Instrument, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.instrument.settling import settling_s, without_settling
-from rotorid.mismatch.instrument.tachometer import quieter, without_noise
+from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
 from rotorid.mismatch.prepare import split_runs
 from rotorid.mismatch.rows import baseline_wrench
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
 GAP_STEPS = 4.0
-"""A step of the clock longer than this many median steps begins a new stretch."""
+"""Where readings are missing for longer than this many median steps they are not compared."""
 UNEVEN = 0.3
 """Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
 SHORTEST = 4
@@ -51,6 +51,8 @@ class Setup:
     estimated_full_speed: bool = False
     settling_s: float = 0.0
     """How long after a step of the load a bench's readings are left out, s."""
+    noisier: tuple[Loading, ...] | None = None
+    """The same loadings with the noise of measured rotor speeds added once more; None where there is none."""
 
     @property
     def rate_hz(self) -> float:
@@ -105,10 +107,18 @@ def commands(run: Run, count: int) -> tuple[np.ndarray | None, bool]:
 
 
 def _pieces(time_s: np.ndarray, keep: np.ndarray, dt_s: float) -> list[np.ndarray]:
-    """Indices of stretches without a gap."""
+    """Indices of stretches: over a short gap a sensor remembers the load, after a longer one it starts from rest."""
     index = np.flatnonzero(keep)
-    cuts = np.flatnonzero(np.diff(time_s[index]) > GAP_STEPS * dt_s) + 1
-    return [p for p in np.split(index, cuts) if len(p) >= SHORTEST]
+    cuts = np.flatnonzero(np.diff(time_s[index]) > max(REST_S, GAP_STEPS * dt_s)) + 1
+    return [np.arange(p[0], p[-1] + 1) for p in np.split(index, cuts) if len(p) >= SHORTEST]
+
+
+def _within(time_s: np.ndarray, known_s: np.ndarray, longest_s: float) -> np.ndarray | None:
+    """Mask of the instants that lie in no gap between known ones longer than this; None if all are good."""
+    after = np.searchsorted(known_s, time_s).clip(1, len(known_s) - 1)
+    inside = (time_s > known_s[after - 1]) & (time_s < known_s[after])
+    good = ~(inside & (known_s[after] - known_s[after - 1] > longest_s))
+    return None if good.all() else good
 
 
 def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
@@ -128,7 +138,8 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
     keep = np.isfinite(read[:, list(channels)]).all(axis=1)
     reference = None
     if vehicle.kind == "bench":
-        reference = np.nan_to_num(run.array(c.REFERENCE_FORCE))
+        known = [_filled(run, name) for name in c.REFERENCE_FORCE]
+        reference = np.stack([np.zeros(len(run.time_s)) if x is None else x for x in known], axis=1)
         keep &= np.isfinite(run.array(c.REFERENCE_FORCE)[:, [k for k in channels]]).all(axis=1)
     count = vehicle.rotor_count
     speeds = _several(run, c.rotor_columns("rotor_speed", count)) if count else None
@@ -143,7 +154,7 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
     }
     out = []
     for piece in _pieces(run.time_s, keep, dt_s):
-        stamps = run.time_s[piece]
+        stamps, good = run.time_s[piece], keep[piece]
         grid = _even(stamps, dt_s)
 
         def at(values, piece=piece, stamps=stamps, grid=grid):
@@ -159,6 +170,7 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
         time_s = stamps if grid is None else grid
         if len(time_s) < SHORTEST:
             continue
+        reading = np.stack([np.interp(time_s, stamps[good], v) for v in read[piece][good].T], axis=1)
         own = {name: at(values) for name, values in others.items()}
         speed, ordered, tilt = at(speeds), at(command), at(attitude)
         rotation = None if tilt is None else rotation_of(tilt[:, 0], tilt[:, 1])
@@ -184,13 +196,14 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
                 time_s=time_s,
                 run_time_s=time_s - run.time_s[0],
                 load=load,
-                reading=at(read),
+                reading=reading,
                 rest=np.zeros(6),
                 motion=motion,
                 attitude=None if tilt is None else (tilt[:, 0], tilt[:, 1]),
                 temperature=None if temperature is None else temperature - others[c.TEMPERATURE][0],
                 command=ordered,
                 measured=speed is not None,
+                keep=_within(time_s, stamps[good], GAP_STEPS * dt_s),
                 extra={k: v for k, v in own.items() if k not in (c.BATTERY_VOLTAGE, c.TEMPERATURE, c.HEIGHT)},
             )
         )
@@ -204,6 +217,15 @@ def smoothed(loading: Loading) -> Loading:
     read = loading.motion.rotor_speed
     speed = without_noise(read, 1.0 / loading.dt_s)
     return replace(loading, motion=with_speed(loading.motion, speed), speed_read=read)
+
+
+def noised(loading: Loading) -> Loading:
+    """The loading with as much white noise of its measured rotor speeds once more."""
+    if not loading.measured or loading.motion.rotor_speed is None:
+        return loading
+    read = loading.motion.rotor_speed
+    draws = np.random.default_rng(1).standard_normal(read.shape)
+    return replace(loading, motion=with_speed(loading.motion, read + noise_of(read, 1.0 / loading.dt_s) * draws))
 
 
 def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
@@ -285,8 +307,12 @@ def set_up(recordings: RecordingSet) -> Setup:
     loadings = [
         loaded_by(x, vehicle) for run in recordings.runs for x in stretches_of(run, vehicle, channels, dt_s, full)
     ]
+    noisier = None
     if vehicle.kind == "stand":
-        loadings = quieter(loadings, [loaded_by(smoothed(x), vehicle) for x in loadings])
+        calm = [loaded_by(smoothed(x), vehicle) for x in loadings]
+        if quieter(loadings, calm) is calm:
+            noisier = tuple(distanced(loaded_by(smoothed(noised(x)), vehicle), recordings) for x in loadings)
+            loadings = calm
     if not loadings:
         raise InputError(f"{recordings.name}: no run has {SHORTEST} samples in a row with every channel")
     instrument = instrument_of(recordings, vehicle, channels, tuple(loadings), dt_s)
@@ -308,6 +334,7 @@ def set_up(recordings: RecordingSet) -> Setup:
         full_speed=full,
         estimated_full_speed=estimated,
         settling_s=wait_s,
+        noisier=noisier,
     )
 
 

@@ -40,6 +40,13 @@ def without_noise(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     return np.stack([_smoothed(x, rate_hz) if _noisy(x) else x for x in speed.T], axis=1)
 
 
+def noise_of(speed: np.ndarray, rate_hz: float) -> np.ndarray:
+    """One-sigma of the white noise of rotor speeds (n, k), rad/s, at every instant; 0 where it is no noise."""
+    if len(speed) < max(PIECE, 2 * WIDTHS[-1]):
+        return np.zeros_like(speed)
+    return np.stack([_spread(x, rate_hz) if _noisy(x) else np.zeros(len(x)) for x in speed.T], axis=1)
+
+
 def quieter(as_read: list[Loading], smoothed: list[Loading]) -> list[Loading]:
     """Of stretches with loads from the speeds as read and from smoothed ones those whose loads the readings follow.
 
@@ -64,12 +71,17 @@ def _noisy(speed: np.ndarray) -> bool:
     return upper > 0 and 1 / LEVEL < lower / upper < LEVEL
 
 
-def _smoothed(speed: np.ndarray, rate_hz: float) -> np.ndarray:
-    weights = [savgol_coeffs(width, 2) for width in WIDTHS]
+def _spread(speed: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Local one-sigma of white noise, (n,)."""
     quick = np.abs(speed - savgol_filter(speed, WIDTHS[0], 2))
     # Of white noise a parabola over five samples leaves 1 − 17/35 of the variance at its middle.
-    spread = 1.4826 / np.sqrt(1.0 - weights[0][WIDTHS[0] // 2])
-    sd = spread * median_filter(quick, int(LOCAL_S * rate_hz) | 1, mode="nearest")
+    spread = 1.4826 / np.sqrt(1.0 - savgol_coeffs(WIDTHS[0], 2)[WIDTHS[0] // 2])
+    return spread * median_filter(quick, int(LOCAL_S * rate_hz) | 1, mode="nearest")
+
+
+def _smoothed(speed: np.ndarray, rate_hz: float) -> np.ndarray:
+    weights = [savgol_coeffs(width, 2) for width in WIDTHS]
+    sd = _spread(speed, rate_hz)
     best, low, high = speed.copy(), speed - GAMMA * sd, speed + GAMMA * sd
     agrees = np.ones(len(speed), bool)
     for width, weight in zip(WIDTHS, weights, strict=True):
