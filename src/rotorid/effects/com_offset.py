@@ -15,25 +15,23 @@ def moment_only(motion, vehicle, values):
 
 
 def with_lever_arm(motion, vehicle, values):
-    """The same, and the accelerometer then sits at -r_c from the true centre of mass."""
-    offset = np.array([values[0], values[1], 0.0])
+    """The same, and the accelerometer then sits at -r_c from the true centre of mass; r_c in the plane or in space."""
+    offset = np.zeros(3)
+    offset[: len(values)] = values
     rate = motion.angular_velocity
     shift = np.cross(motion.angular_acceleration, -offset) + np.cross(rate, np.cross(rate, -offset))
     return Contribution(moment=moment_only(motion, vehicle, values).moment, specific_force=shift)
 
 
 def forms(vehicle):
-    plane = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xy")
-    text = "M = −r_c × F_thrust"
+    space = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xyz")
+    plane, text = space[:2], "M = −r_c × F_thrust"
+    read_too = text + ", a_m = a + dΩ × (−r_c) + Ω × (Ω × (−r_c))"
+    needs = ("rotor_speed", "angular_velocity", "angular_acceleration", "accelerometer")
     return (
         Form("moment", text, plane, moment_only, ("rotor_speed", "angular_velocity"), excited_by=("rotor_speed",)),
-        Form(
-            "moment and accelerometer",
-            text + ", a_m = a + dΩ × (−r_c) + Ω × (Ω × (−r_c))",
-            plane,
-            with_lever_arm,
-            ("rotor_speed", "angular_velocity", "angular_acceleration", "accelerometer"),
-        ),
+        Form("moment and accelerometer", read_too, plane, with_lever_arm, needs),
+        Form("moment and accelerometer, in space", read_too, space, with_lever_arm, needs, must_show=(0, 1)),
     )
 
 
@@ -69,8 +67,8 @@ EFFECT = Effect(
         "nose-down moment in hover"
     ),
     validity=(
-        "offsets in the rotor plane; a vertical offset needs side forces and is left out, as is the "
-        "change of inertia (m r², below 1 % for r under 5 mm)"
+        "offsets in the rotor plane; a vertical one shows in the accelerometer alone, as the moment of side forces is "
+        "left out, and so is the change of inertia (m r², below 1 % for r under 5 mm)"
     ),
     excited_by=("rotor_speed", "angular_velocity", "angular_acceleration"),
     reading_forms=reading_forms,

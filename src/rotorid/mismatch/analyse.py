@@ -377,12 +377,13 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     The payload would bring products of inertia along: found beside such an offset they belong to the same question.
     """
     heavier = values.get("mass", (0.0, 0.0))[0] > 0 or values.get("thrust", (0.0, 0.0))[0] < 0
-    stated = {f.id for f in findings if f.status in ("established", "ambiguous")}
-    if "com_offset" not in stated or not heavier:
+    stated = [f for f in findings if f.status in ("established", "ambiguous")]
+    offset = next((f for f in stated if "com_offset" in (f.id, *f.alternatives)), None)
+    if offset is None or not heavier:
         return findings
     out = []
     for f in findings:
-        if f.id in ("com_offset", "inertia_products") and f.id in stated:
+        if f is offset or (f.id == "inertia_products" and f in stated):
             f = replace(f, status="ambiguous", alternatives=tuple(sorted({f.id, "payload", *f.alternatives})))
         out.append(f)
     return out

@@ -459,7 +459,10 @@ class Search:
         )
 
     def alternatives(self, key: str, active: list[str]) -> list[str]:
-        """Ids that could stand in for a term: with one of them in its place the term is no longer needed."""
+        """Ids that could stand in for a term: with one of them in its place the term is no longer needed.
+
+        Nor is it where it would explain beside the other no more than what any form is wrong by.
+        """
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
         own = self.judge(key, rest, self.without(key, active))
@@ -475,6 +478,6 @@ class Search:
             if len(other.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
                 continue
             both = self.judge(key, [*rest, term.key], self.regression.fit(self.always + rest + [term.key]))
-            if both.p_value > ALTERNATIVE_P:
+            if both.p_value > ALTERNATIVE_P or both.gain < SHARE_OF_LARGEST**2 * own.gain:
                 found.append(term.effect)
         return found

@@ -458,10 +458,10 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
     sample = max(1.0 / s.rate_hz for s in signals)
     tolerance = {n: max(periods[n], 2 * sds[n]) for n in names}
     late = relative_to_most(values, groups, tolerance)
-    wrong, notes = [], []
+    wrong, notes, limits = [], [], {}
     for n in names:
         touching = [d for d in found if n in (d.late, d.over)]
-        limit = max(periods[n], sample, *(MOTOR_FORM * d.motor_s for d in touching))
+        limit = limits[n] = max(periods[n], sample, *(MOTOR_FORM * d.motor_s for d in touching))
         blocks = max(d.blocks for d in touching)
         p = float(student.sf((abs(late[n]) - limit) / sds[n], max(blocks - 2, 1)))
         if p > P_LIMIT or max(d.likelihood for d in touching) < LEAST_LIKELIHOOD:
@@ -502,6 +502,9 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
             # Measured once more from close by, where the blocks of the two sensors hold the same motion.
             rest, sd = across(again, cluster, 0)
             amount = steps + rest
+        if abs(amount) < min(limits[n] for n in cluster):
+            notes.append(f"{_listed(cluster).capitalize()}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
+            continue
         for sensor in everywhere:
             fixed = shifted(fixed, sensor, amount, 0.0)
         word = "late" if amount > 0 else "early"
