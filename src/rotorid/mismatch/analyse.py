@@ -133,6 +133,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         model.noise,
         held_out_masks(prepared, model, segments),
         nonlinear_intervals(prepared, model, segments),
+        values,
     )
 
     if found is not None and not measured:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -116,10 +117,23 @@ def wrench_findings(
     noise: np.ndarray,
     held: list[np.ndarray],
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
+    values: Iterable[str] = (),
 ) -> list[Finding]:
-    """A finding for every term that entered, and for those that looked like something and did not survive."""
+    """A finding for every term that entered, and for those that looked like something and did not survive.
+
+    `values` are the keys of the believed values that are called wrong: what a term gains on the held-out part is
+    judged as it is delivered, with those free alone and without the empirical terms.
+    """
     effects = catalogue()
     findings = []
+    loose = {k: WIDEST_TRUST for k in values}
+    kept = [k for k in search.always if search.terms[k].kind != "value" or k in loose]
+    empirical = regression.columns([k for k in selection.active if search.terms[k].effect in UNKNOWNS])
+
+    def delivered(active: list[str]) -> Fit:
+        fit = regression.fit([*kept, *active], loose=loose)
+        return replace(fit, beta=np.where(np.isin(fit.columns, empirical), 0.0, fit.beta))
+
     beside = suggested(search, selection.active)
     for key in selection.active:
         term = search.terms[key]
@@ -128,8 +142,7 @@ def wrench_findings(
         effect = effects[term.effect]
         beta, _ = coefficients(regression, selection.fit, key)
         rest = [k for k in selection.active if k != key]
-        without = regression.fit(search.always + rest)
-        with_it = regression.fit(search.always + selection.active)
+        with_it, without = delivered(selection.active), delivered(rest)
         channels = main_channels(rows, regression.columns([key]), beta, noise)
         alternatives = search.alternatives(key, selection.active)
         status = "ambiguous" if alternatives else "established"
