@@ -17,7 +17,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch import within_trust
-from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z, wrench_findings, wrong_values
+from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z, exchangeable, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.gusts import gust_finding, with_gusts
@@ -168,8 +168,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         # At which voltage the believed values hold is not stated: the largest in the set is only a guess.
         told = without_common_scale(told)
     before, after, depends = dependence(prepared, model, segments, noisy)
-    claimed = bool(values) or any(f.status in ("established", "ambiguous") for f in findings)
-    strained = claimed and beyond_trust(model, values, model.selection.active)
+    strained = beyond_trust(model, values, model.selection.active)
     left = leftover(prepared, model, segments, noisy, after, depends, delivered if strained else None)
     findings = together(findings)
     fly = next_flight(findings, prepared, model.noise)
@@ -196,6 +195,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         next_sigma=fly.sigma,
         force_source=segments[0].force_source,
         notes=tuple(notes),
+        instead=instead_of(model, values),
         put_right=within_trust.in_words(moved),
     )
 
@@ -213,6 +213,12 @@ def values_called_wrong(model: WrenchModel) -> Values:
     """Believed values that the model's recordings contradict."""
     reverse = reverse_regression(model.prepared, model, model.segments)
     return wrong_values(model.search.regression, model.search, model.selection, reverse, size_of_value(model))
+
+
+def instead_of(model: WrenchModel, values: Values) -> dict[str, tuple[str, ...]]:
+    """Contract name of a wrong value to others, in words, that would explain as much in its place."""
+    found = exchangeable(model.search.regression, model.selection, values)
+    return {PARAMETER_NAMES[key]: within_trust.in_words(others) for key, others in found.items()}
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
@@ -309,7 +315,7 @@ def wind_finding(model: WrenchModel) -> Finding:
         form=form if k_d else None,
         values=tuple(float(k_d * x) for x in w),
         equation="v_air = v − Rᵀ w",
-        sentence=effect.sentence,
+        sentence="the vehicle flew through air that moves over the ground",
         parameters=tuple(
             Estimate(f"w_{axis}", float(x), "m/s", float(x - 1.96 * s), float(x + 1.96 * s))
             for axis, x, s in zip(("north", "east"), w, sd, strict=True)

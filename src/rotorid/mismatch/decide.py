@@ -13,12 +13,14 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
-from rotorid.mismatch.select import EXPECTED_HELD_OUT, SMALLEST_SIZE, Search, Selection
+from rotorid.mismatch.select import EXPECTED_HELD_OUT, SHARE_OF_LARGEST, SMALLEST_SIZE, Search, Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
 MOST_VALUES = 3
+SHARED = 0.1
+"""Share of what two values explain together that is lost without either where they are one ratio to the recordings."""
 MOST_DISTRUST = 9.0
 WIDEST_TRUST = 0.1
 VALUE_FLOOR = 0.002
@@ -238,10 +240,14 @@ def wrong_values(
     subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]
     best_first = sorted(subsets, key=penalised, reverse=True)
     doubtful: set[str] = set()
-    while named := next(s for s in best_first if not doubtful.intersection(s)):
+    at_limits: list[list[str]] = []
+    while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
+        if (extra := spare(regression, always, named, loose)) is not None:
+            doubtful.add(extra)
+            continue
         fit = regression.fit(always + named, loose=loose)
         other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
-        certainty = {}
+        certainty, pinned = {}, False
         for key in named:
             beta, covariance = coefficients(regression, fit, key)
             change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
@@ -250,14 +256,18 @@ def wrong_values(
             agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
-            pinned = abs(change) > 0.98 * regression.limit[regression.start[key]]
+            pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
             fails = fails_held_out(regression, always, named, key, loose)
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or pinned or fails or not agrees or not matters:
-                certainty[key] = 0.0 if pinned else abs(change) / sd  # at a limit an estimate has no error of its own
-        if not certainty:
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
+                certainty[key] = abs(change) / sd
+        if pinned:
+            # Two values that run away together say nothing against either of them alone.
+            at_limits.append(named)
+        elif certainty:
+            # Without it the others are chosen anew: one in doubt must not hide one that is plainly wrong.
+            doubtful.add(min(certainty, key=certainty.get))
+        else:
             break
-        # Without it the others are chosen anew: a value at its limit must not hide one that is plainly wrong.
-        doubtful.add(min(certainty, key=certainty.get))
     if not named:
         return {}
     fit = regression.fit(always + named, jackknife=True, loose=loose)
@@ -266,6 +276,54 @@ def wrong_values(
         beta, covariance = coefficients(regression, fit, key)
         sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
         out[key] = relative_change(key, float(beta[0]), sd) if moving else (float(beta[0]), sd)
+    return out
+
+
+def spare(regression: Regression, always: list[str], named: list[str], loose: dict[str, float]) -> str | None:
+    """Of two values that share a ratio (torque over inertia) the one that the other can do without.
+
+    Without either hardly anything is lost of what the two explain together (SHARED), and without the spare one less
+    than any form is wrong by.
+    """
+
+    def gain(without: tuple[str, ...]) -> float:
+        return regression.fit(always + [k for k in named if k not in without], loose=loose).gain
+
+    whole, found = gain(()), {}
+    for pair in combinations(named, 2):
+        both = whole - gain(pair)
+        lost = {key: whole - gain((key,)) for key in pair}
+        least = min(lost, key=lost.get)
+        if max(lost.values()) < SHARED * both and lost[least] < SHARE_OF_LARGEST**2 * both:
+            found[least] = lost[least]
+    return min(found, key=found.get) if found else None
+
+
+def exchangeable(
+    regression: Regression, selection: Selection, values: Iterable[str]
+) -> dict[str, dict[str, tuple[float, float]]]:
+    """To each value called wrong others that would explain as much in its place: relative change and one-sigma.
+
+    Often a recording knows a ratio alone (thrust over mass, torque over inertia); which of two is called wrong rests
+    then on what the user trusts. As much: less than a further value must explain, or than any form is wrong by.
+    """
+    named = list(values)
+    always = regression.keys_of("nuisance", "wind") + selection.active
+    loose = dict.fromkeys(regression.keys_of("value"), WIDEST_TRUST)
+    whole = regression.fit(always + named, loose=loose)
+    out: dict[str, dict[str, tuple[float, float]]] = {}
+    for key in named:
+        rest = [k for k in named if k != key]
+        alone = whole.gain - regression.fit(always + rest, loose=loose).gain
+        for other in loose:
+            if other in named:
+                continue
+            fit = regression.fit([*always, *rest, other], loose=loose)
+            beta, covariance = coefficients(regression, fit, other)
+            pinned = abs(beta[0]) > 0.98 * regression.limit[regression.start[other]]
+            if not pinned and whole.gain - fit.gain < max(COST_PER_VALUE, SHARE_OF_LARGEST**2 * alone):
+                sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
+                out.setdefault(key, {})[other] = relative_change(other, float(beta[0]), sd)
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -103,6 +104,8 @@ class Analysis:
     """Kinds `stand` and `bench`: loads and readings as analysed, rotor speeds as the improved model has them."""
     notes: tuple[str, ...] = field(default_factory=tuple)
     """Things a reader must know (what was derived, what was corrected)."""
+    instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Wrong value to others, in words, that would explain as much in its place: `yaw inertia −9.8 ± 0.4 %`."""
     put_right: tuple[str, ...] = ()
     """Values put right within what was believed of them, in words: `thrust coefficient −0.7 %`."""
 

@@ -36,7 +36,7 @@ MOST_REMEMBERED = 2000
 MOST_EXPLAINED = 200_000
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
-VALUE_LIMITS = (0.15, 0.4)
+VALUE_LIMITS = (0.25, 0.4)
 """A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
 mismatch that needs a third of the arm is no wrong ruler."""
 MOST_OF_ACTIVE_SET = 20

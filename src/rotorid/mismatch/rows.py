@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import upfirdn
 
 from rotorid.effects.contract import Contribution, Form, Motion
@@ -32,8 +32,8 @@ PARAMETER_NAMES = {
     "speed": "rotor_speed_limits_rad_s",
 }
 
-SUSTAINED_S = 3.0
-"""No vehicle keeps up an angular acceleration for longer."""
+SUSTAINED_S = 6.0
+"""No vehicle keeps up an angular acceleration for longer: one-sigma of the mean in time that is taken away."""
 
 
 @dataclass(frozen=True)
@@ -217,8 +217,9 @@ def value_columns(
         rate = motion.angular_velocity
         predicted = (model["moment"] - np.cross(rate, rate @ inertia)) @ np.linalg.inv(inertia)
         # Body rates stay bounded: a lasting predicted acceleration is the mark of something left out.
-        window = max(3, int(round(SUSTAINED_S * segment.rate_hz)))
-        predicted = predicted - uniform_filter1d(predicted, window, axis=0, mode="nearest")
+        # (Neither a mean over a window, which makes a fifth too much of what turns a little faster than it lasts, nor
+        # ends that are held: one wild instant would then last.)
+        predicted = predicted - gaussian_filter1d(predicted, SUSTAINED_S * segment.rate_hz, axis=0, mode="reflect")
         part = np.zeros((3, 3))
         part[axis, axis] = inertia[axis, axis]
         out = {"moment": -(predicted @ part + np.cross(rate, rate @ part))}

@@ -330,7 +330,7 @@ def plain_sentence(
     parts = [_where(main, locations, channels, analysis)]
     parts += [_left_out(f, k == 0) for k, f in enumerate(established)]
     parts += [_either(f, analysis) for f in one_per_class(with_status(analysis, "ambiguous"))]
-    parts += [_wrong(name, values) for name, values in analysis.values.items()]
+    parts += [_wrong(name, values, analysis.instead.get(name, ())) for name, values in analysis.values.items()]
     if with_status(analysis, "established", "ambiguous") or analysis.wrong_values:
         parts.append(_better(main, channels, analysis.put_right))
     if word != "explained":
@@ -452,13 +452,16 @@ def _either(finding: Finding, analysis: Analysis) -> str:
     return f"{text}, but this would: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
 
 
-def _wrong(name: str, values: tuple[float, float, float, float]) -> str:
+def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = ()) -> str:
     believed, refitted, low, high = values
     words, unit = parameter_words(name)
     space = f" {unit}" if unit else ""
     if not np.isfinite(believed):
         return f"The {words} is {plus_minus(refitted, low, high)}{space}; nothing was believed about it."
-    return f"The {words} is {plus_minus(refitted, low, high)}{space}, not the {number(believed, 4)}{space} believed."
+    # Of a ratio that alone is known the least trusted value is called wrong; the reader may know better.
+    other = f" (or, what explains as much here: {listed(list(instead), 'or')})" if instead else ""
+    value = plus_minus(refitted, low, high)
+    return f"The {words} is {value}{space}, not the {number(believed, 4)}{space} believed{other}."
 
 
 def _better(main: str, channels: Mapping[str, Channel], put_right: Sequence[str] = ()) -> str:

@@ -72,7 +72,7 @@ def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequ
 
 
 def in_words(moved: Values) -> tuple[str, ...]:
-    """What was put right and is not called wrong: `thrust coefficient −0.7 ± 0.2 %`."""
+    """Changes that are worth a word: `thrust coefficient −0.7 ± 0.2 %`."""
     return tuple(
         f"{parameter_words(PARAMETER_NAMES[k])[0]} {100 * change:+.1f} ± {196 * sd:.1f} %".replace("-", "−")
         for k, (change, sd) in moved.items()
