@@ -305,23 +305,28 @@ def exchangeable(
     """To each value called wrong others that would explain as much in its place: relative change and one-sigma.
 
     Often a recording knows a ratio alone (thrust over mass, torque over inertia); which of two is called wrong rests
-    then on what the user trusts. As much: less than a further value must explain, or than any form is wrong by.
+    then on what the user trusts. As much: beside the other it explains less than a further value must, or than any form
+    is wrong by.
     """
     named = list(values)
     always = regression.keys_of("nuisance", "wind") + selection.active
     loose = dict.fromkeys(regression.keys_of("value"), WIDEST_TRUST)
-    whole = regression.fit(always + named, loose=loose)
+
+    def fitted(keys: list[str]) -> Fit:
+        return regression.fit([*always, *keys], loose=loose)
+
     out: dict[str, dict[str, tuple[float, float]]] = {}
     for key in named:
         rest = [k for k in named if k != key]
-        alone = whole.gain - regression.fit(always + rest, loose=loose).gain
+        alone = fitted(named).gain - fitted(rest).gain
         for other in loose:
             if other in named:
                 continue
-            fit = regression.fit([*always, *rest, other], loose=loose)
+            fit = fitted([*rest, other])
             beta, covariance = coefficients(regression, fit, other)
             pinned = abs(beta[0]) > 0.98 * regression.limit[regression.start[other]]
-            if not pinned and whole.gain - fit.gain < max(COST_PER_VALUE, SHARE_OF_LARGEST**2 * alone):
+            still = fitted([*named, other]).gain - fit.gain
+            if not pinned and still < max(COST_PER_VALUE, SHARE_OF_LARGEST**2 * alone):
                 sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
                 out.setdefault(key, {})[other] = relative_change(other, float(beta[0]), sd)
     return out

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorid.mismatch.decide import SMALLEST_CHANGE, held_out_gain, main_channels, relative_change, wrong_values
+from rotorid.mismatch.decide import (
+    SMALLEST_CHANGE,
+    WIDEST_TRUST,
+    exchangeable,
+    held_out_gain,
+    main_channels,
+    relative_change,
+    spare,
+    wrong_values,
+)
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import Search, Selection
@@ -166,3 +175,34 @@ def test_a_value_in_doubt_makes_room_for_the_one_that_is_plainly_wrong():
     found = wrong_values(made, search, nothing, back, lambda key, change: 1.0)
     assert list(found) == ["torque"]
     assert found["torque"][0] == pytest.approx(0.12, abs=0.01)
+
+
+def fitted(share: float, size: int = 4000):
+    """A torque 12 % off and a mass 5 %; the inertia's column is the torque's but for a `share` of its own."""
+    rng = np.random.default_rng(5)
+    x = columns(size, rng)
+    x[:, 5, 3] = -(x[:, 5, 1] + share * coloured(size, 1.0, rng, pole=0.9))
+    y = np.full((size, 12), np.nan)
+    for channel, off in ((2, [0.0, 0.0, 0.05, 0.0]), (5, [0.0, 0.12, 0.0, 0.0])):
+        y[:, channel] = x[:, channel] @ np.array(off) + coloured(size, NOISE, rng, pole=0.0)
+    terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
+    filters = {c: np.array([1.0 / NOISE]) for c in (2, 5)}
+    return build([Rows("a", np.arange(size) / RATE_HZ, y, x)], terms, filters, lambda run, t: True, 1.0, RATE_HZ)
+
+
+def test_of_two_values_that_share_a_ratio_one_is_spare():
+    """With 1 % of its own the inertia can be done without (10⁻⁴ of what both explain is lost); with 30 % it cannot."""
+    loose = dict.fromkeys(TRUST, WIDEST_TRUST)
+    assert spare(fitted(0.01), [], ["torque", "inertia_zz"], loose) in ("torque", "inertia_zz")
+    assert spare(fitted(0.3), [], ["torque", "inertia_zz"], loose) == "inertia_zz"
+    # Nothing that explains another channel is spare, however small beside the first.
+    assert spare(fitted(0.3), [], ["torque", "mass"], loose) is None
+
+
+def test_what_would_explain_as_much_is_told():
+    """12 % more torque or 12 % less of the inertia's coefficient: 1/(1 + 0.12) − 1 = −10.7 % of it."""
+    made = fitted(0.001)
+    found = exchangeable(made, Selection([], made.fit(list(TRUST))), ["torque", "mass"])
+    assert {k: list(v) for k, v in found.items()} == {"torque": ["inertia_zz"], "mass": ["thrust"]}
+    assert found["torque"]["inertia_zz"][0] == pytest.approx(-0.107, abs=0.005)
+    assert exchangeable(fitted(0.3), Selection([], made.fit(list(TRUST))), ["torque"]) == {}
