@@ -168,13 +168,13 @@ def test_a_moment_of_inertia_that_is_one_percent_off_leaves_one_percent_of_its_c
 @pytest.mark.parametrize("frequency_hz", [0.15, 0.45])
 def test_an_inertia_shows_in_what_turns_slowly_and_not_in_what_never_ends(frequency_hz):
     """To and fro in 7 or in 2 seconds: the column is the moment; of one that lasts all along nothing is left."""
-    vehicle, t = thesis_vehicle(), np.arange(6000) / 100.0
-    flown = one(still(6000, time_s=t))
-    turning = np.zeros((6000, 3))
+    vehicle, t = thesis_vehicle(), np.arange(12000) / 100.0
+    flown = one(still(12000, time_s=t))
+    turning = np.zeros((12000, 3))
     turning[:, 2] = 1e-3 * np.sin(2 * np.pi * frequency_hz * t)
-    lasting = np.tile([0.0, 0.0, 1e-3], (6000, 1))
+    lasting = np.tile([0.0, 0.0, 1e-3], (12000, 1))
     column = value_columns("inertia_zz", flown, vehicle, ("moment",), {"moment": turning + lasting})["moment"]
-    np.testing.assert_allclose(column[1000:-1000, 2], -turning[1000:-1000, 2], atol=2e-5)
+    np.testing.assert_allclose(column[3000:-3000, 2], -turning[3000:-3000, 2], atol=2e-5)
 
 
 def test_a_late_rotor_speed_leaves_its_slope_times_the_lateness():
