@@ -238,7 +238,7 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
             break
     model = with_wind(prepared, model, segments, noisy, terms)
     if model.wind is not None:
-        terms = [t for t in model.terms if not t.run]
+        terms = list(model.terms)
     return with_gusts(prepared, model, terms)
 
 
