@@ -15,6 +15,8 @@ from rotorid.mismatch.unknowns import DEPENDS_ON, UNKNOWNS
 
 MOST_BY_VALUES = 0.8
 """Share up to which mismatch that some believed value would explain counts as left over: its kind is known."""
+UNCLAIMED = 3.0
+"""Energy beside the noise's from which what only free values explain speaks by itself, without any claim beside it."""
 LEAST_NOISE = 0.1
 """Share of what a flexible regression leaves that is noise, whatever else moves in it."""
 
@@ -69,17 +71,18 @@ class Leftover:
     description: str = ""
 
 
-def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None) -> Leftover:
+def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None, claimed=True) -> Leftover:
     """What no named effect explains of the force and moment channels.
 
     Five things count: empirical terms that won against the catalogue, what a ridge regression on all inputs and
     their products ("whatever could be explained") still finds, fitted on the training runs and judged held out,
     slow changes that no sensor's noise can have made, means that differ between runs, and what the residuals
-    `delivered` ((n, 12) per stretch; None where nothing is claimed) keep because no believed value by itself could
-    be called wrong. `p_after` and `depends` are those of `dependence`.
+    `delivered` ((n, 12) per stretch; None where values stay within their trust) keep because no believed value by itself could
+    be called wrong (where nothing is `claimed` only as much as makes the error twice the noise's). `p_after` and
+    `depends` are those of `dependence`.
     """
     slow = slow_excess(prepared, model, segments, noisy)
-    channels = channels_of(prepared, model, segments, slow, p_after, delivered)
+    channels = channels_of(prepared, model, segments, slow, p_after, delivered, 1.0 if claimed else UNCLAIMED)
     total = sum(c.explainable / c.noise for c in channels)
     left = [c for c in channels if c.counts]
     if not left or total <= 0:
@@ -99,8 +102,11 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None)
     )
 
 
-def channels_of(prepared, model, segments, slow, p_after, delivered) -> list[Channel]:
-    """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others."""
+def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> list[Channel]:
+    """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others.
+
+    `least` is how much of the noise's energy must be kept by values to count.
+    """
     _, inputs = standardised(prepared, segments)
     full = model.full_fit()
     unnamed = model.unnamed(full.columns)
@@ -145,7 +151,7 @@ def channels_of(prepared, model, segments, slow, p_after, delivered) -> list[Cha
                 slow=moving,
                 between=between,
                 shifted=shifted,
-                by_values=kept_by_values(told, energy + outside, flexible),
+                by_values=kept_by_values(told, energy + outside, flexible, least),
             )
         )
     return out
@@ -173,10 +179,13 @@ def description(
     return f"{'; '.join(parts)} (a plain empirical term would lower {', '.join(c.gain for c in channels)})"
 
 
-def kept_by_values(delivered: float, fitted: float, noise: float) -> float:
-    """Energy that what is delivered leaves beyond the model with every value free (`fitted`); 0 below the noise's."""
+def kept_by_values(delivered: float, fitted: float, noise: float, least: float = 1.0) -> float:
+    """Energy that what is delivered leaves beyond the model with every value free (`fitted`).
+
+    Nothing below `least` times the noise's: in a calm flight free values make up for much of the noise.
+    """
     kept = delivered - fitted
-    return kept if kept > noise else 0.0
+    return kept if kept > least * noise else 0.0
 
 
 def _differing(channel: str, between: Apart) -> str:

@@ -116,6 +116,7 @@ def test_what_free_values_explain_and_no_wrong_value_tells_is_left_over():
     """A residual of 5 where the fit with every value free leaves 2, noise of 1: 3 are kept; of 2.5, nothing."""
     assert kept_by_values(5.0, 2.0, 1.0) == 3.0
     assert kept_by_values(2.5, 2.0, 1.0) == 0.0
+    assert kept_by_values(4.9, 2.0, 1.0, least=3.0) == 0.0 and kept_by_values(5.1, 2.0, 1.0, least=3.0) > 3.0
 
 
 def test_a_fit_that_leaves_more_than_there_was_is_not_believed():
