@@ -77,9 +77,9 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     Five things count: empirical terms that won against the catalogue, what a ridge regression on all inputs and
     their products ("whatever could be explained") still finds, fitted on the training runs and judged held out,
     slow changes that no sensor's noise can have made, means that differ between runs, and what the residuals
-    `delivered` ((n, 12) per stretch; None where values stay within their trust) keep because no believed value by itself could
-    be called wrong (where nothing is `claimed` only as much as makes the error twice the noise's). `p_after` and
-    `depends` are those of `dependence`.
+    `delivered` ((n, 12) per stretch; None where values stay within their trust) keep because no believed value by
+    itself could be called wrong (where nothing is `claimed` only as much as makes the error twice the noise's).
+    `p_after` and `depends` are those of `dependence`.
     """
     slow = slow_excess(prepared, model, segments, noisy)
     channels = channels_of(prepared, model, segments, slow, p_after, delivered, 1.0 if claimed else UNCLAIMED)
