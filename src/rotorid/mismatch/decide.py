@@ -19,6 +19,9 @@ from rotorid.mismatch.unknowns import UNKNOWNS
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
 MOST_VALUES = 3
+LEAST_ROOM = 0.25
+"""A value that is asked whether it is wrong may be so by this share at least; in the search it has less room, or it
+would take physics up."""
 SHARED = 0.1
 """Share of what two values explain together that is lost without either where they are one ratio to the recordings."""
 MOST_DISTRUST = 9.0
@@ -218,6 +221,8 @@ def wrong_values(
     matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is False
     on a stand, where a mass only weighs.
     """
+    regression = regression.with_room(LEAST_ROOM)
+    reverse = None if reverse is None else reverse.with_room(LEAST_ROOM)
     nuisance = regression.keys_of("nuisance", "wind")
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active

@@ -36,7 +36,7 @@ MOST_REMEMBERED = 2000
 MOST_EXPLAINED = 200_000
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
-VALUE_LIMITS = (0.25, 0.4)
+VALUE_LIMITS = (0.15, 0.4)
 """A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
 mismatch that needs a third of the arm is no wrong ruler."""
 MOST_OF_ACTIVE_SET = 20
@@ -138,6 +138,12 @@ class Regression:
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
         self._explained: dict[tuple[str, ...], float] = {}
         self._fits: dict[tuple[tuple[str, ...], bool], Fit] = {}
+
+    def with_room(self, least: float) -> Regression:
+        """The same with believed values that may move by at least a share `least`."""
+        wider = replace(self)  # fits remembered are those of the narrower limits
+        wider.limit = np.maximum(self.limit, least)
+        return wider
 
     def without_winds(self) -> Regression:
         """The same without the winds of single runs: every other column less what they take of it.

@@ -461,7 +461,7 @@ class Search:
     def alternatives(self, key: str, active: list[str]) -> list[str]:
         """Ids that could stand in for a term: with one of them in its place the term is no longer needed.
 
-        Nor is it where it would explain beside the other no more than what any form is wrong by.
+        Nor is it where beside another of fewer parameters it would explain no more than what any form is wrong by.
         """
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
@@ -478,6 +478,7 @@ class Search:
             if len(other.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
                 continue
             both = self.judge(key, [*rest, term.key], self.regression.fit(self.always + rest + [term.key]))
-            if both.p_value > ALTERNATIVE_P or both.gain < SHARE_OF_LARGEST**2 * own.gain:
+            alike = len(other.beta) < len(own.beta) and both.gain < SHARE_OF_LARGEST**2 * own.gain
+            if both.p_value > ALTERNATIVE_P or alike:
                 found.append(term.effect)
         return found
