@@ -38,7 +38,11 @@ def all_values(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit
 
 def beyond_trust(model: WrenchModel, values: Values, active: Sequence[str]) -> bool:
     """Whether the recordings ask a value not called wrong to move further than its trust allows."""
-    moved = changes(model, all_values(model, values, active))
+    return strained(model, values, changes(model, all_values(model, values, active)))
+
+
+def strained(model: WrenchModel, values: Values, moved: Values) -> bool:
+    """Whether one of the changes of values not called wrong is beyond its trust."""
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
     return any(abs(moved[k][0]) > BEYOND_TRUST * sd for k, sd in trust.items() if k not in values)
 
@@ -59,16 +63,17 @@ def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequ
     move beyond its trust.
     """
     plain = delivered_fit(model, values, active)
-    if beyond_trust(model, values, active):
-        return plain, {}
     free = all_values(model, values, active)
+    moved = changes(model, free)
+    if strained(model, values, moved):
+        return plain, {}
     held = held_out_masks(prepared, model, model.segments)
     per = max(2, int(prepared.thinner.rate_hz))
     ratio, z = growth(residuals_of(model, plain), residuals_of(model, free), held, per)
     worse, better = (ratio > WORSE_RATIO) & (z > LEAST_Z), (ratio < BETTER_RATIO) & (z < -LEAST_Z)
     if worse.any() or not better.any():
         return plain, {}
-    return free, {k: change for k, change in changes(model, free).items() if k not in values}
+    return free, {k: change for k, change in moved.items() if k not in values}
 
 
 def in_words(moved: Values) -> tuple[str, ...]:
