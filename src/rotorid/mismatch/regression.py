@@ -497,24 +497,33 @@ def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.n
     return y[start:], x[start:]
 
 
-def full_fit_residuals(rows: list[Rows], precision: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Residuals (n, 12) of every term fitted at once, channels weighted by their own spread (two rounds)."""
+def full_fit_residuals(
+    rows: list[Rows], precision: np.ndarray, colours: dict[int, np.ndarray] | None = None
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Residuals (n, 12) of every term fitted at once, channels weighted by their own spread (two rounds).
+
+    `colours` are whitening filters of channels whose columns are plain only through them: weighed evenly over all
+    frequencies, their noise would be fitted and what they explain be left, to be taken for the channel's own noise.
+    """
+    colours = colours or {}
     channels = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
-    weight = {c: 1.0 / (np.concatenate([r.y[:, c] for r in rows]).std() + 1e-12) for c in channels}
     size = rows[0].x.shape[2]
     beta = np.zeros(size)
+    left = [r.y for r in rows]
     for _ in range(2):
         gram, cross = np.zeros((size, size)), np.zeros(size)
-        for r in rows:
-            for c in channels:
-                x = r.x[:, c] * weight[c]
+        for c in channels:
+            taps = colours.get(c, np.ones(1))
+            weight = 1.0 / (np.concatenate([lfilter(taps, [1.0], part[:, c]) for part in left]).std() + 1e-12)
+            for r in rows:
+                y, x = whiten(r, c, taps, 0) if c in colours else (r.y[:, c], r.x[:, c])
+                x = x * weight
                 gram += x.T @ x
-                cross += x.T @ (r.y[:, c] * weight[c])
+                cross += x.T @ (y * weight)
         gram += np.diag(precision)
         scale = inverse_root(np.diag(gram))
         beta = scale * np.linalg.solve(gram * np.outer(scale, scale) + 1e-7 * np.eye(size), cross * scale)
         left = [r.y - r.x @ beta for r in rows]
-        weight = {c: 1.0 / (np.concatenate([r[:, c] for r in left]).std() + 1e-12) for c in channels}
     return left, beta
 
 

@@ -111,10 +111,11 @@ def wrench_model(
     noisy_segments = prepared.noisy_segments if noisy_segments is None else noisy_segments
     rows = assemble_rows(prepared, terms, segments, effects)
     noisy = assemble_rows(prepared, terms, noisy_segments, effects) if noisy_segments else None
+    colours = {}
     if noisy is not None:
-        rows, noisy = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
+        colours = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
-    left, _ = full_fit_residuals(rows, precision)
+    left, _ = full_fit_residuals(rows, precision, colours)
     model = searched(prepared, terms, rows, noisy, left, start, segments, known_sizes)
     # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
     # thrust and a deaf gyroscope): such a channel would weigh as if it were exact, and pull at all values.
@@ -205,28 +206,51 @@ def spoils_a_channel(
     return bool((gains.mean(axis=0) < -HARM_Z * np.maximum(doubt, 1e-300)).any())
 
 
-def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float):
-    """Rows (and their noisy copies) in which a column that is mostly noise in a channel says nothing there.
+def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float) -> dict[int, np.ndarray]:
+    """Make columns say nothing in channels where they are mostly noise, in rows and noisy copies (in place).
+
+    Returns the whitening filters of the noise in channels where some column is plain through them alone.
 
     In a calm flight, say, the rotors' moment is noise that the residual has with the other sign: a free believed
     value (or a scale error) would take it away and call itself wrong. How much noise there is, is measured where
-    little else is: near the cutoff.
+    little else is: near the cutoff. A column passes as it is or weighed by the colour of the channel's own noise:
+    the acceleration of a rotor with a noisy tachometer is all noise at 20 Hz, where the channel is too, and still
+    plain below 2 Hz.
     """
     band = tuple(share * cutoff_hz for share in NOISE_BAND)
-    more = np.ones(12)
-    for c in np.flatnonzero(np.isfinite(rows[0].y).all(axis=0)):
-        found = band_power([r.y[:, c] for r in rows], rate_hz, band)
-        added = band_power([b.y[:, c] - a.y[:, c] for a, b in zip(rows, noisy, strict=True)], rate_hz, band)
-        more[c] = max(1.0, found / added) if added > 0 else 1.0
     seen = np.zeros(rows[0].x.shape[1:], bool)
+    colours = {}
     for c in range(12):
-        energy = sum((r.x[:, c] ** 2).sum(axis=0) for r in rows)
-        noise = sum(((b.x[:, c] - a.x[:, c]) ** 2).sum(axis=0) for a, b in zip(rows, noisy, strict=True))
-        seen[c] = more[c] * noise <= MOST_NOISE * energy
+        added = [b.y[:, c] - a.y[:, c] for a, b in zip(rows, noisy, strict=True)]
+        more = 1.0
+        if all(np.isfinite(r.y[:, c]).all() for r in rows):
+            power = band_power(added, rate_hz, band)
+            more = max(1.0, band_power([r.y[:, c] for r in rows], rate_hz, band) / power) if power > 0 else 1.0
+        columns = np.flatnonzero(np.any([r.x[:, c].any(axis=0) for r in rows], axis=0))
+        seen[c, columns] = noise_of_columns(rows, noisy, c, columns) * more <= MOST_NOISE
+        doubtful = columns[~seen[c, columns]]
+        if len(doubtful) and np.isfinite(np.concatenate(added)).all():
+            taps = autoregression(added)
+            seen[c, doubtful] = noise_of_columns(rows, noisy, c, doubtful, taps) * more <= MOST_NOISE
+            if seen[c, doubtful].any():
+                colours[c] = taps
     # In place: the columns are the largest arrays of the whole analysis.
     for r in (*rows, *noisy):
         np.multiply(r.x, seen, out=r.x)
-    return rows, noisy
+    return colours
+
+
+def noise_of_columns(rows, noisy, channel: int, columns: np.ndarray, taps: np.ndarray | None = None) -> np.ndarray:
+    """Share of the energy of columns (k,) in a channel that is noise, after a whitening filter if one is given."""
+    energy, noise = np.zeros(len(columns)), np.zeros(len(columns))
+    for a, b in zip(rows, noisy, strict=True):
+        x = a.x[:, channel][:, columns]
+        added = b.x[:, channel][:, columns] - x
+        if taps is not None:
+            x, added = lfilter(taps, [1.0], x, axis=0), lfilter(taps, [1.0], added, axis=0)
+        energy += (x**2).sum(axis=0)
+        noise += (added**2).sum(axis=0)
+    return noise / np.maximum(energy, 1e-300)
 
 
 def band_power(parts: list[np.ndarray], rate_hz: float, band: tuple[float, float]) -> float:

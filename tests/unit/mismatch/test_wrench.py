@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.mismatch.regression import Fit
+from rotorid.mismatch.regression import Fit, full_fit_residuals
 from rotorid.mismatch.rows import Rows
-from rotorid.mismatch.wrench import Seconds, inflated_channels, sizes_of_parts, spoils_a_channel
+from rotorid.mismatch.wrench import Seconds, inflated_channels, sizes_of_parts, spoils_a_channel, without_unseen
 
 
 def fit_of(*beta: float) -> Fit:
@@ -70,3 +70,39 @@ def test_sizes_of_several_columns_and_stretches():
     cols, beta, noise = np.array([4, 0, 3]), rng.normal(size=3), np.full(12, 2.0)
     expected = sizes_of_parts([r.x[:, :, cols] @ beta for r in stretches], noise, 40)
     np.testing.assert_allclose(Seconds(stretches, noise, 40).sizes(cols, beta), expected, rtol=1e-12)
+
+
+def with_blue_noise(slow: float) -> tuple[Rows, Rows]:
+    """A column `slow` times a sine of 0.5 Hz, read with noise that grows with frequency, in a channel with the same.
+
+    The response holds the true column (2 of it) and noise of its own, as the copy with noise added once more does.
+    """
+    rng = np.random.default_rng(2)
+    size, rate_hz = 8000, 40.0
+    time_s = np.arange(size) / rate_hz
+    blue = [np.diff(rng.normal(size=size + 2), n=2) for _ in range(4)]
+    signal = slow * np.sin(np.pi * time_s)
+    y, x = np.full((size, 12), np.nan), np.zeros((size, 12, 1))
+    y[:, 5], x[:, 5, 0] = 2 * signal + blue[0], signal + blue[1]
+    rows = Rows("b", time_s, y, x)
+    y, x = y.copy(), x.copy()
+    y[:, 5] += blue[2]
+    x[:, 5, 0] += blue[3]
+    return rows, Rows("b", time_s, y, x)
+
+
+def test_a_slow_column_is_seen_through_noise_of_higher_frequency():
+    """Noise has six times the sine's energy, but hardly any at its frequency: the fit holds all of it."""
+    rows, noisy = with_blue_noise(1.4)
+    colours = without_unseen([rows], [noisy], 40.0, 20.0)
+    assert rows.x[:, 5].any() and list(colours) == [5]
+    _, coefficient = full_fit_residuals([rows], np.zeros(1), colours)
+    assert abs(coefficient[0] - 2) < 0.1
+    _, attenuated = full_fit_residuals([rows], np.zeros(1))
+    assert attenuated[0] < 0.5
+
+
+def test_a_column_that_is_all_noise_says_nothing():
+    rows, noisy = with_blue_noise(0.0)
+    assert without_unseen([rows], [noisy], 40.0, 20.0) == {}
+    assert not rows.x.any() and not noisy.x.any()
