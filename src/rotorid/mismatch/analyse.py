@@ -7,7 +7,7 @@ each id: established, ambiguous, absorbed or not established.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -100,7 +100,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
             found = (nothing_between(found[0]), *found[1:])
 
     commanded = found is not None and not measured
-    model, values, harm = without_harm(prepared, model, values_called_wrong, commanded)
+    model, values, values_of, harm = without_harm(prepared, model, values_called_wrong, commanded)
     if harm and commanded and found[0].fit.chain:
         # Fitted with every value free, a curve of the throttle may need values that nothing else bears out.
         for result in taken_back(found[0], HARM):
@@ -109,10 +109,10 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
             if result.fit.chain:
                 segments, noisy = (path_segments(s, *found, cutoff) for s in (segments, noisy))
             model = refined_model(prepared, segments, noisy)
-            model, values, harm = without_harm(prepared, model, values_called_wrong, commanded)
+            model, values, values_of, harm = without_harm(prepared, model, values_called_wrong, commanded)
             if not harm:
                 break
-    model, values = without_useless(prepared, model, values, values_called_wrong)
+    model, values = without_useless(prepared, model, values, values_of)
 
     segments, noisy = model.segments, model.noisy_segments
     if model.wind is not None:
@@ -210,10 +210,11 @@ def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:
     return size
 
 
-def values_called_wrong(model: WrenchModel) -> Values:
-    """Believed values that the model's recordings contradict."""
-    reverse = reverse_regression(model.prepared, model, model.segments)
-    return wrong_values(model.search.regression, model.search, model.selection, reverse, size_of_value(model))
+def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
+    """Believed values that the model's recordings contradict, less those refused."""
+    reverse, search = reverse_regression(model.prepared, model, model.segments), model.search
+    size = size_of_value(model)
+    return wrong_values(search.regression, search, model.selection, reverse, size, refused=refused)
 
 
 def instead_of(model: WrenchModel, values: Values) -> dict[str, tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from itertools import combinations
 
@@ -211,6 +211,7 @@ def wrong_values(
     reverse: Regression | None,
     size_of: Callable[[str, float], float],
     moving: bool = True,
+    refused: Collection[str] = (),
 ) -> dict[str, tuple[float, float]]:
     """The fewest believed values that must change: relative change and one-sigma.
 
@@ -219,7 +220,7 @@ def wrong_values(
     sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
     side (`reverse`: measured moments as regressors) agrees, where it survives on the held-out part, and where it
     matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is False
-    on a stand, where a mass only weighs.
+    on a stand, where a mass only weighs; `refused` values are not called wrong.
     """
     regression = regression.with_room(LEAST_ROOM)
     reverse = None if reverse is None else reverse.with_room(LEAST_ROOM)
@@ -244,7 +245,7 @@ def wrong_values(
 
     subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]
     best_first = sorted(subsets, key=penalised, reverse=True)
-    doubtful: set[str] = set()
+    doubtful = set(refused)
     at_limits: list[list[str]] = []
     while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
         if (extra := spare(regression, always, named, loose)) is not None:
@@ -263,6 +264,10 @@ def wrong_values(
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
             fails = fails_held_out(regression, always, named, key, loose)
+            if not fails and search.harms is not None:
+                # A thrust that mends the moment and spoils the force is none: something else is missing there.
+                without = regression.fit(always + [k for k in named if k != key], loose=loose)
+                fails = search.harms(key, fit, without)
             if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:

@@ -39,6 +39,8 @@ REASON = "what is delivered with it is worse on the held-out runs than the belie
 USELESS = "without it the held-out error is no larger in any channel that it acts in"
 
 Values = dict[str, tuple[float, float]]
+ValuesOf = Callable[[WrenchModel, Sequence[str]], Values]
+"""The believed values that a model's recordings contradict, less those refused."""
 
 
 def delivered_fit(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
@@ -154,36 +156,44 @@ def without(model: WrenchModel, key: str, reason: str = REASON) -> WrenchModel:
 
 
 def without_harm(
-    prepared: Prepared, model: WrenchModel, values_of: Callable[[WrenchModel], Values], commanded: bool
-) -> tuple[WrenchModel, Values, bool]:
-    """The model less the effects that make a channel worse on the held-out part, its wrong values, and whether harm
-    is left (by the values, or by what lies between command and speed)."""
-    values = values_of(model)
+    prepared: Prepared, model: WrenchModel, values_of: ValuesOf, commanded: bool
+) -> tuple[WrenchModel, Values, ValuesOf, bool]:
+    """The model less what makes a channel worse on the held-out part, its wrong values, and whether harm is left.
+
+    What goes is the effect or the wrong value without which the channels are best. `values_of` is returned without the
+    values that went. Harm that is left is of what lies between command and speed.
+    """
+    values = values_of(model, ())
     before = believed_residuals(prepared, model, commanded)
     held = held_out_masks(prepared, model, model.segments)
     per = max(2, int(prepared.thinner.rate_hz))
+    refused: tuple[str, ...] = ()
     while True:
         ratio, z = growth(before, delivered_residuals(model, values), held, per)
         worse = harmed(ratio, z)
         if not worse.any():
-            return model, values, False
+            return model, values, less(values_of, refused), False
         options = []
         for key in model.selection.active:
             term = model.search.terms[key]
             if term.effect in UNKNOWNS or term.run:
                 continue
-            fewer = without(model, key)
-            left = growth(before, delivered_residuals(fewer, values), held, per)[0]
-            options.append((float(left[worse].sum()), key, fewer))
-        best = min(options, key=lambda o: o[0], default=None)
-        if best is None or best[0] >= ratio[worse].sum():
-            return model, values, True
-        model = best[2]
-        values = values_of(model)
+            options.append((without(model, key), values, refused))
+        options += [(model, {k: v for k, v in values.items() if k != key}, (*refused, key)) for key in values]
+        left = [growth(before, delivered_residuals(*option[:2]), held, per)[0][worse].sum() for option in options]
+        if not options or min(left) >= ratio[worse].sum():
+            return model, values, less(values_of, refused), True
+        model, _, refused = options[int(np.argmin(left))]
+        values = values_of(model, refused)
+
+
+def less(values_of: ValuesOf, refused: tuple[str, ...]) -> ValuesOf:
+    """The function of a model and refused values that gives its wrong values, with these refused always."""
+    return lambda model, more: values_of(model, (*refused, *more))
 
 
 def without_useless(
-    prepared: Prepared, model: WrenchModel, values: Values, values_of: Callable[[WrenchModel], Values]
+    prepared: Prepared, model: WrenchModel, values: Values, values_of: ValuesOf
 ) -> tuple[WrenchModel, Values]:
     """The model less the effects that lower the held-out error of no channel that they act in, and its wrong values.
 
@@ -216,4 +226,4 @@ def without_useless(
         if least is None or least[0] >= HELP_Z:
             return model, values
         model = least[2]
-        values = values_of(model)
+        values = values_of(model, ())

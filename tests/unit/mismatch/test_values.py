@@ -36,7 +36,9 @@ def columns(size: int, rng) -> np.ndarray:
     return x
 
 
-def judged(changes: dict[str, float], seed: int = 0, reverse: bool = True, size: int = 4000) -> dict:
+def judged(
+    changes: dict[str, float], seed: int = 0, reverse: bool = True, size: int = 4000, harms=None, refused=()
+) -> dict:
     """What is said of a recording in which some values are off by relative changes."""
     rng = np.random.default_rng(seed)
     x = columns(size, rng)
@@ -56,8 +58,8 @@ def judged(changes: dict[str, float], seed: int = 0, reverse: bool = True, size:
         column = x[:, :, list(TRUST).index(key)]
         return float(np.sqrt((column**2).mean(axis=0)).max() * abs(change) / NOISE)
 
-    search = Search(made, lambda key, b: np.full(12, size_of(key, b[0])))
-    return wrong_values(made, search, Selection([], made.fit(list(TRUST))), back, size_of)
+    search = Search(made, lambda key, b: np.full(12, size_of(key, b[0])), harms=harms)
+    return wrong_values(made, search, Selection([], made.fit(list(TRUST))), back, size_of, refused=refused)
 
 
 def test_a_wrong_torque_coefficient_is_named_with_its_interval():
@@ -92,6 +94,20 @@ def test_a_change_that_no_laboratory_could_tell_is_not_named():
 
 def test_a_value_that_the_other_side_contradicts_is_not_named():
     assert judged({"torque": 0.12}, reverse=False) == {}
+
+
+def test_a_value_that_spoils_a_channel_is_not_named():
+    """The other one that is wrong too, and spoils none, still is."""
+    changes = {"torque": 0.1, "thrust": -0.05}
+    assert sorted(judged(changes, harms=lambda key, with_it, without: False)) == ["thrust", "torque"]
+    spoils = ("thrust", "mass")
+    assert list(judged(changes, harms=lambda key, with_it, without: key in spoils)) == ["torque"]
+
+
+def test_a_value_that_was_refused_is_not_named_again():
+    """Without the thrust the mass stands for it: the two share a column."""
+    assert list(judged({"torque": 0.1, "thrust": -0.05}, refused=("torque",))) == ["thrust"]
+    assert sorted(judged({"torque": 0.1, "thrust": -0.05}, refused=("thrust",))) == ["mass", "torque"]
 
 
 def test_the_held_out_gain_is_the_ratio_of_errors_with_and_without():
