@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -41,6 +42,12 @@ EXPECTED_HELD_OUT = 25.0
 MOST_STRAIN = 4.0
 """Standard deviations of trust that an effect may push a believed value to."""
 NEAR_LIMIT = 0.98
+MOST_BORROWED = 0.1
+"""Share of what a term explains that it may owe to a believed value far from its belief."""
+HELD = 1e-3
+"""Relative one-sigma of a value that is held at its belief."""
+CANCELLED = 0.1
+"""Two contributions cancel each other in a channel where their sum is this share of either."""
 """Share of the furthest that a believed value may move at which it counts as held there."""
 UNSTEADY_P = 1e-6
 UNSTEADY_SHARE = 0.4
@@ -84,17 +91,21 @@ class Selection:
 class Search:
     """Forward search with replacement of forms, backward checks and pair moves."""
 
-    def __init__(self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None, harms=None):
+    def __init__(
+        self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None, harms=None, joint_sizes=None
+    ):
         """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
 
         `known_sizes`, same shape, are of effects that are in the model already (between command and rotor speed).
         `harms(key, with_it, without)` says whether a term makes one of its channels worse on the held-out rows.
+        `joint_sizes(columns, beta)` gives the size of a contribution as it is, of one term or several together, (12,).
         """
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.sizes_of = sizes_of
         self.harms = harms
+        self.joint_sizes = joint_sizes
         self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
@@ -126,11 +137,16 @@ class Search:
         if physical:
             own, noise = self.regression.own_part(keys, key, beta)
             physical = own > SHARE_OF_LARGEST**2 and noise < MOST_ATTENUATION
-        physical = physical and not self.strains(fit, base)
+        physical = physical and not self.strains(keys, key, fit, base)
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
-    def strains(self, fit: Fit, base: Fit) -> bool:
-        """Whether a term needs a believed value far from its belief that the model without it does not need."""
+    def strains(self, keys: list[str], key: str, fit: Fit, base: Fit) -> bool:
+        """Whether a term needs a believed value far from its belief that the model without it does not need.
+
+        Needs: held at its belief the value takes more than MOST_BORROWED of what the term explains with it. A value
+        that the recordings hardly know may drift along with anything.
+        """
+        far = {}
         for term in self.regression.terms:
             if term.kind != "value":
                 continue
@@ -139,8 +155,11 @@ class Search:
             with_it = abs(fit.beta[fit.columns == column][0])
             without = abs(base.beta[base.columns == column][0])
             if with_it > most and with_it > without + term.prior_sd[0]:
-                return True
-        return False
+                far[term.key] = HELD
+        if not far:
+            return False
+        alone = [self.regression.fit(k, loose=far).gain for k in (keys, [k for k in keys if k != key])]
+        return alone[0] - alone[1] < (1 - MOST_BORROWED) * (fit.gain - base.gain)
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
@@ -346,7 +365,34 @@ class Search:
             return unsteady, "it differs from run to run"
         if (leaning := self.leaning(active)) is not None:
             return leaning, "it only cancels a cause without a name"
+        if (cancelling := self.cancelling(active)) is not None:
+            return cancelling, "where it is strongest it only cancels another"
         return None
+
+    def cancelling(self, active: list[str]) -> str | None:
+        """The term of least worth that in its strongest channel is cancelled by another.
+
+        Something the catalogue lacks is in a channel where noise is low: a tilt of ten degrees is bought there, and
+        an accelerometer that is turned by ten degrees hides it in the force.
+        """
+        if self.joint_sizes is None or len(active) < 2:
+            return None
+        fit = self.regression.fit(self.always + active)
+        named = [k for k in active if self.terms[k].effect not in UNKNOWNS and not self.terms[k].run]
+
+        def sizes(keys: list[str]) -> np.ndarray:
+            cols = self.regression.columns(keys)
+            return self.joint_sizes(cols, fit.beta[[list(fit.columns).index(c) for c in cols]])
+
+        alone, found = {k: sizes([k]) for k in named}, set()
+        for pair in combinations(named, 2):
+            both = sizes(list(pair))
+            for key in pair:
+                c = int(np.argmax(alone[key]))
+                least = min(alone[k][c] for k in pair)
+                if least > SMALLEST_SIZE and both[c] < CANCELLED * least:
+                    found.add(key)
+        return min(found, key=lambda k: fit.gain - self.without(k, active).gain, default=None)
 
     def _jackknifed(self, active: list[str], dropped: dict[str, str], trail: list[str]):
         """The final fit and p-values, after terms that hang on single blocks are taken out of `active`."""

@@ -176,7 +176,7 @@ def searched(
         return spoils_a_channel(rows, held, regression.columns([key]), with_it, without, noise, per)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
-    search = Search(regression.without_winds(), sizes_of, known_sizes, harms)
+    search = Search(regression.without_winds(), sizes_of, known_sizes, harms, seconds.sizes)
     return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise, noise)
 
 

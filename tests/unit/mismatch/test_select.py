@@ -31,12 +31,11 @@ def search_of(terms: list[Term], y: list[np.ndarray], x: list[list[np.ndarray]],
     held = rows[-1].run
     regression = build(rows, terms, {0: autoregression(left)}, lambda run, t: run != held, 1.0, RATE_HZ)
 
-    def sizes(key, beta):
-        own = regression.columns([key])
+    def joint(own, beta):
         strength = np.sqrt(np.mean(np.concatenate([r.x[:, 0][:, own] @ beta for r in rows]) ** 2))
         return np.array([strength / noise, *[0.0] * 11])
 
-    return Search(regression, sizes)
+    return Search(regression, lambda key, beta: joint(regression.columns([key]), beta), joint_sizes=joint)
 
 
 def case(rng, columns: int, runs: int = 3, size: int = 1200):
@@ -193,3 +192,51 @@ def test_what_columns_explain_with_others_left_out_is_computed_by_hand():
     shifted = replace(fit, beta=np.array([3.0, -1.0]))
     used = regression.gram[regression.training][:, 0, 0].sum()
     assert np.isclose(regression.gain_at(shifted, np.array([0]), np.array([1])), 3 * used)
+
+
+def test_of_two_effects_that_cancel_each_other_one_goes():
+    """Columns alike but for a twentieth: y needs 20 of their difference, and no term is 20 times what it does."""
+    rng = np.random.default_rng(11)
+    noise, x = case(rng, 2)
+    x = [[a, a + 0.05 * b] for a, b in x]
+    y = [n + 20 * (columns[1] - columns[0]) for n, columns in zip(noise, x, strict=True)]
+    search = search_of([term("e0"), term("e1")], y, x)
+    assert search.cancelling(["e0/form", "e1/form"]) in ("e0/form", "e1/form")
+
+
+def test_effects_that_add_up_are_left_alone():
+    rng = np.random.default_rng(12)
+    noise, x = case(rng, 2)
+    y = [n + 2 * columns[0] - 1.5 * columns[1] for n, columns in zip(noise, x, strict=True)]
+    assert search_of([term("e0"), term("e1")], y, x).cancelling(["e0/form", "e1/form"]) is None
+
+
+def values_and_a_term(rng, share: float) -> Search:
+    """Two believed values of one column (an arm and an inertia), and a term.
+
+    The response is the term's column and `share` of the values', which the term's own column holds too.
+    """
+    noise, x = case(rng, 2)
+    x = [[20 * a, -20 * a + 0.02 * b, b + 20 * share * a] for a, b in x]
+    y = [n + 3 * (columns[2] - share * columns[0]) for n, columns in zip(noise, x, strict=True)]
+    terms = [Term("arm", "value", prior_sd=(0.03,)), Term("inertia_xx", "value", prior_sd=(0.03,)), term("e")]
+    return search_of(terms, y, x)
+
+
+def test_a_term_that_owes_what_it_explains_to_a_value_far_off_strains_it():
+    search = values_and_a_term(np.random.default_rng(13), 0.3)
+    judged = search.judge("e/form", ["e/form"], search.without("e/form", ["e/form"]))
+    keys = [*search.always, "e/form"]
+    fit, base = search.regression.fit(keys), search.regression.fit(search.always)
+    assert search.strains(keys, "e/form", fit, base) and not judged.physical
+
+
+def test_a_value_that_only_drifts_along_is_no_strain():
+    """Two values of one column move against each other by any amount; held at their belief the term is as good."""
+    search = values_and_a_term(np.random.default_rng(13), 0.0)
+    keys = [*search.always, "e/form"]
+    fit, base = search.regression.fit(keys), search.regression.fit(search.always)
+    drifted = replace(fit, beta=np.where(np.isin(fit.columns, [0, 1]), 0.14, fit.beta))
+    assert not search.strains(keys, "e/form", drifted, base)
+    # The same drift, were the term to explain ten times as much with it, would be needed.
+    assert search.strains(keys, "e/form", replace(drifted, gain=10 * fit.gain), base)
