@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.scale import scale
+from rotorid.effects.scale import LEAST_ROTOR_SHARE, scale
 
 
 def reaction(motion, vehicle, values):
@@ -14,11 +14,13 @@ def reaction(motion, vehicle, values):
 
 
 def forms(vehicle):
+    inertia = scale(vehicle).inertia_kg_m2
+    least = LEAST_ROTOR_SHARE * inertia
     return (
         Form(
             "reaction",
             "M_z = J_r Σ y_i dω_i/dt",
-            (Parameter("J_r", "kg m2", 0.0, scale(vehicle).inertia_kg_m2 / 4, meaning="inertia of one rotor"),),
+            (Parameter("J_r", "kg m2", 0.0, inertia / 4, meaning="inertia of one rotor", negligible=least),),
             reaction,
             ("rotor_acceleration",),
         ),

@@ -7,6 +7,8 @@ from rotorid.effects.scale import scale
 
 SQUARE = "Δc_2"
 """Symbol of a squared term's excess over the coefficient believed."""
+NO_CURVE = 0.003
+"""Share of the hover thrust below which a term is none: no propeller is square to that."""
 
 
 def linear_term(motion, vehicle, values):
@@ -43,10 +45,14 @@ def forms(vehicle):
     needs = ("rotor_speed",)
     size = scale(vehicle)
     thrust, speed = size.thrust_n, size.hover_speed_rad_s
+
+    def term(symbol: str, unit: str, bound: float, size: float, meaning: str) -> Parameter:
+        return Parameter(symbol, unit, -bound, bound, meaning=meaning, negligible=NO_CURVE * size)
+
     # A rotor at rest does not carry half the vehicle.
-    c0 = Parameter("c_0", "N", -0.5 * thrust, 0.5 * thrust, meaning="thrust beyond the square at any speed")
-    c1 = Parameter("c_1", "N s/rad", -thrust / speed, thrust / speed, meaning="thrust beyond the square per speed")
-    c3 = Parameter("c_3", "N s3/rad3", -thrust / speed**3, thrust / speed**3, meaning="cubic thrust")
+    c0 = term("c_0", "N", 0.5 * thrust, thrust, "thrust beyond the square at any speed")
+    c1 = term("c_1", "N s/rad", thrust / speed, thrust / speed, "thrust beyond the square per speed")
+    c3 = term("c_3", "N s3/rad3", thrust / speed**3, thrust / speed**3, "cubic thrust")
     # A curve far from a square takes its squared term far from the coefficient believed, beyond any trust in it.
     # It stays positive: thrust rises with speed.
     c2 = Parameter(SQUARE, "N s2/rad2", -0.8 * thrust / speed**2, thrust / speed**2, meaning="squared term beyond C_F")

@@ -145,15 +145,15 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         told = speed_for_coefficients(values, prepared.vehicle)
         if prepared.vehicle.rotor_speed_limits_rad_s is None:
             told, scale = throttle_scale(values, model, full_speed(recordings.runs, prepared.vehicle))
-    findings = rectified(payload_or_offset(findings, values))
+    fit, moved = settled(prepared, model, values, model.selection.active)
+    findings = rectified(payload_or_offset(findings, {**moved, **values}))
     findings += absorbed_findings(model, values, findings)
     plain_values = {}
     if model.wind is None:
         nothing = Selection([], model.selection.fit)
         plain_values = wrong_values(model.search.regression, model.search, nothing, None, size_of_value(model))
-    plain_fit, moved = settled(prepared, model, plain_values, ())
-    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **plain_values}.items()})
-    fit, moved = settled(prepared, model, values, model.selection.active)
+    plain_fit, plainly = settled(prepared, model, plain_values, ())
+    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**plainly, **plain_values}.items()})
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
     for _, full, _, _ in scale.values():
         improved = improved.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})

@@ -12,6 +12,7 @@ from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, left_b
 from rotorid.mismatch.rows import CHANNELS
 from rotorid.mismatch.slow_changes import slow_excess
 from rotorid.mismatch.unknowns import DEPENDS_ON, UNKNOWNS
+from rotorid.mismatch.wrench import channel_floor
 
 MOST_BY_VALUES = 0.8
 """Share up to which mismatch that some believed value would explain counts as left over: its kind is known."""
@@ -119,6 +120,7 @@ def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> l
     gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
     weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
     runs = [r.run for r in model.rows]
+    least_noise = channel_floor(segments, prepared.vehicle)
     out = []
     for c, name in enumerate(CHANNELS[:6]):
         if name not in p_after:
@@ -127,11 +129,13 @@ def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> l
         empirical = [r.x[:, c][:, full.columns[unnamed]] @ full.beta[unnamed] for r in model.rows]
         cross = sum(f.T @ e for f, e, t in zip(features, left, training, strict=True) if t)
         beta = np.linalg.solve(weights, cross)
+        count = sum(len(left[i]) for i in judged)
         energy = _energy(left[i] for i in judged)
         start = _energy(model.rows[i].y[:, c] for i in judged)
         outside = _energy(empirical[i] for i in judged)
-        count = sum(len(left[i]) for i in judged)
         flexible = min(_energy(left[i] - features[i] @ beta for i in judged), energy)
+        # A simulator without noise leaves nothing, and any share of nothing is large.
+        flexible = max(flexible, count * least_noise[c] ** 2)
         diffuse = p_after[name] < ALARM_P and energy - flexible > SMALLEST_SHARE_OF_NOISE**2 * flexible
         between = apart(runs, left, prepared.thinner.rate_hz, float(model.noise[c]))
         # The runs held out may be like each other: all runs are judged by their means.
@@ -139,7 +143,7 @@ def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> l
         moving = count * slow[name][0] ** 2 if name in slow else 0.0
         told = energy if delivered is None else _energy(delivered[i][:, c] for i in judged)
         # What moves slowly, or between runs, is no noise: shares are of what the named effects could have explained.
-        noise = max(flexible - moving - shifted, LEAST_NOISE * flexible)
+        noise = max(flexible - moving - shifted, LEAST_NOISE * flexible, 1e-300)
         out.append(
             Channel(
                 name,

@@ -403,7 +403,7 @@ class SpeedSearch:
             for score, p, key, fit in options:
                 if score <= 0:
                     break
-                if p > ENTER_P or negligible(fit, key) or not self.responds(fit):
+                if p > ENTER_P or self.negligible(fit, key) or not self.responds(fit):
                     continue
                 size = self.size(fit, key)
                 if size < SMALLEST_SIZE:
@@ -462,6 +462,14 @@ class SpeedSearch:
                     return False
         return True
 
+    def negligible(self, fit: SpeedFit, key: str) -> bool:
+        """Whether an id's parameters are all closer to changing nothing than their own limits; of a lag, than half a
+        sample: from one command to the next nobody recorded what happened."""
+        form, values = fit.of(key)
+        least = 0.5 / self.problem.segments[0].rate_hz if key == "motor_lag" else 0.0
+        limits = [max(p.negligible, least) for p in form.parameters]
+        return all(abs(v - n) < limit for v, n, limit in zip(values, form.neutral, limits, strict=True))
+
     def _without(self, fit: SpeedFit, key: str) -> SpeedFit:
         where = fit.slice_of(key)
         chain = tuple((k, f) for k, f in fit.chain if k != key)
@@ -494,9 +502,9 @@ class SpeedSearch:
                 if fit.covariance is None:
                     fit = self.problem.with_covariance(fit)
                 p, score, _ = self.judge(base, fit, key)
-                if p > ENTER_P or score <= 0 or negligible(fit, key):
+                if p > ENTER_P or score <= 0 or self.negligible(fit, key):
                     dropped[key] = (
-                        "it is too slight to matter" if negligible(fit, key) else f"p = {p:.2g} beside the others"
+                        "it is too slight to matter" if self.negligible(fit, key) else f"p = {p:.2g} beside the others"
                     )
                     fit, changed = self.problem.with_covariance(base) if base.chain else base, True
                     break
@@ -528,13 +536,6 @@ def at_its_bounds(form: SpeedForm, values: np.ndarray) -> bool:
         min(v - p.low, p.high - v) < AT_BOUND * (p.high - p.low) for p, v in zip(form.parameters, values, strict=True)
     ]
     return any(near)
-
-
-def negligible(fit: SpeedFit, key: str) -> bool:
-    """Whether an id's parameters are all closer to changing nothing than their own limits."""
-    form, values = fit.of(key)
-    limits = [p.negligible for p in form.parameters]
-    return all(abs(v - n) < limit for v, n, limit in zip(values, form.neutral, limits, strict=True))
 
 
 def smoothed_acceleration(speed: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:

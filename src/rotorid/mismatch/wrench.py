@@ -19,7 +19,7 @@ from rotorid.mismatch.regression import (
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.rows import Rows, Term, residual, winds_last
+from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, winds_last
 from rotorid.mismatch.select import FINAL_P, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
@@ -31,12 +31,16 @@ from rotorid.mismatch.speedpath import (
     smoothed_acceleration,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.recordings import Vehicle
 
 LONGEST_BLOCKS = 400
 NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is told from motion."""
 MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
+SAME_WRENCH = 0.004
+"""Share of the spread of the rotors' force or moment to which no model and no recording of them are known."""
+SIDEWAYS = 0.25
 MEMORY_GRID = 37
 """Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
@@ -90,9 +94,20 @@ def block_seconds(rows: list[Rows], rate_hz: float) -> float:
     return max(1.0 if seconds > 40 else 0.5, seconds / LONGEST_BLOCKS)
 
 
-def channel_floor() -> np.ndarray:
-    """Smallest noise ever assumed per channel: what two instruments must differ by to be worth a word."""
+def channel_floor(segments: list[Segment], vehicle: Vehicle) -> np.ndarray:
+    """One-sigma per channel (12,) below which nothing is told apart.
+
+    Of a force or moment a share (SAME_WRENCH) of how the rotors' own changes: held commands and the steps of an
+    integrator are so much off in simulators without any noise.
+    """
     floor = np.zeros(12)
+    parts = [baseline_wrench(s.motion, vehicle) for s in segments if s.motion.rotor_speed is not None]
+    if parts:
+        force = np.concatenate([force for force, _, _ in parts])
+        moment = np.concatenate([arm + torque for _, arm, torque in parts])
+        floor[:6] = SAME_WRENCH * np.nanstd(np.hstack([force, moment]), axis=0)
+        # Along the rotors' axis a command held late is felt at once, sideways by what the vehicle turns meanwhile.
+        floor[:3] = np.maximum(floor[:3], SIDEWAYS * floor[:3].max())
     floor[6:9], floor[9:12] = AGREEMENT["accelerometer"], AGREEMENT["gyroscope"]
     return floor
 
@@ -149,7 +164,7 @@ def searched(
 ) -> WrenchModel:
     """The search with residuals `left` (n, 12) of every stretch taken for the noise."""
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
-    floor = channel_floor()
+    floor = channel_floor(segments, prepared.vehicle)
     filters = {c: autoregression([r[:, c] for r in left], floor[c]) for c in present}
     noise = np.full(12, np.nan)
     for c in present:

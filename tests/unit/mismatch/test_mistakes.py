@@ -280,6 +280,20 @@ def test_one_column_that_rests_for_a_tenth_of_a_second_is_no_dropout(sound):
     assert "sensor_dropout" not in ids(find_mistakes(with_table(sound, spoil))[1])
 
 
+def test_a_reading_without_noise_may_stand_still():
+    """A simulator hovers for two seconds, then swings: the rate leaves zero without a jump. With noise, or a jump of
+    fifty of its steps, standing still is a dropout; so is a run of it where other runs show noise."""
+    t = np.arange(2000) / 100.0
+    swing = np.where(t < 2.0, 0.0, 1.0 - np.cos(t - 2.0))
+    held = lambda values, **known: dropout.held(t, values[:, None], **known)  # noqa: E731
+    assert held(swing) == []
+    noisy = np.where(t < 2.0, 0.0, swing + 0.01 * np.random.default_rng(6).standard_normal(t.size))
+    assert len(held(noisy)) == 1
+    frozen = np.where((t > 8.0) & (t < 10.0), swing[800], swing)
+    assert len(held(frozen)) == 1
+    assert held(np.zeros(2000)) == [] and len(held(np.zeros(2000), noisy=True)) == 1
+
+
 def test_a_slow_sensor_that_loses_packets_is_no_dropout():
     """25 Hz in a log of 250 Hz, one in five packets lost: stretches of two to five periods are its habit."""
     rng = np.random.default_rng(5)

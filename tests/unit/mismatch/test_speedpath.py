@@ -84,6 +84,13 @@ def test_a_lag_is_found_with_its_time_constant(tau):
     assert result.noise_rad_s == pytest.approx(10.0, rel=0.1)
 
 
+def test_a_lag_of_less_than_half_a_sample_is_none():
+    """4 ms at 100 Hz: what commands do between two samples nobody recorded."""
+    assert searched(recorded(1, noise=0.01, motor_lag=("one constant", (0.004,)))).fit.chain == ()
+    ((effect_id, _),) = searched(recorded(1, noise=0.01, motor_lag=("one constant", (0.008,)))).fit.chain
+    assert effect_id == "motor_lag"
+
+
 def test_up_and_down_have_their_own_time_constants():
     result = searched(recorded(3, motor_lag=("up and down", (0.03, 0.06))))
     ((_, found),) = result.fit.chain

@@ -4,9 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import Fit, full_fit_residuals
 from rotorid.mismatch.rows import Rows
-from rotorid.mismatch.wrench import Seconds, inflated_channels, sizes_of_parts, spoils_a_channel, without_unseen
+from rotorid.mismatch.wrench import (
+    SAME_WRENCH,
+    Seconds,
+    channel_floor,
+    inflated_channels,
+    sizes_of_parts,
+    spoils_a_channel,
+    without_unseen,
+)
+from rotorid.recordings import Vehicle
+
+from .test_rows import still
 
 
 def fit_of(*beta: float) -> Fit:
@@ -106,3 +118,16 @@ def test_a_column_that_is_all_noise_says_nothing():
     rows, noisy = with_blue_noise(0.0)
     assert without_unseen([rows], [noisy], 40.0, 20.0) == {}
     assert not rows.x.any() and not noisy.x.any()
+
+
+def test_no_channel_is_known_better_than_a_share_of_the_rotors_own_changes():
+    """Rotors of C_F = 1e-6 at x = ±0.1 m; one turns at 1000 and 2000 rad/s in turn: 1.5 N of spread, and a tenth of it."""
+    vehicle = Vehicle(
+        name="two", kind="flight", mass_kg=1.0, inertia_kg_m2={"xx": 0.01, "yy": 0.01, "zz": 0.02},
+        rotors=[{"x_m": 0.1, "y_m": 0.0, "spin": "ccw"}, {"x_m": -0.1, "y_m": 0.0, "spin": "cw"}],
+        thrust_coefficient_n_s2=1e-6, torque_coefficient_n_m_s2=1e-8,
+    )  # fmt: skip
+    speed = np.tile([[1000.0, 1000.0], [2000.0, 1000.0]], (200, 1))
+    segment = Segment("run", 100.0, still(400, rotor_speed=speed), "accelerometer")
+    floor = channel_floor([segment], vehicle)
+    np.testing.assert_allclose(floor[:6], SAME_WRENCH * np.array([0.375, 0.375, 1.5, 0.0, 0.15, 0.015]), atol=1e-12)

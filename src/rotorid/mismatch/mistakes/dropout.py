@@ -25,6 +25,10 @@ IMPLAUSIBLE_THRUST = 0.45
 """A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read."""
 LARGEST_UNTOUCHED_SHARE = 0.5
 CHANCE = 1e-9
+SMOOTH = 0.3
+"""Second differences of a reading without noise are this share of its first ones at most; white noise has 1.7."""
+LEAST_JUMP = 5.0
+"""A reading without noise that was held jumps at the end by this many of its usual steps."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,8 @@ class Stretch:
 
 def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     """The set with dropouts blanked, and the finding."""
-    stretches_found = [s for run in recordings.runs for s in in_run(run, recordings.vehicle)]
+    noisy = noisy_columns(recordings)
+    stretches_found = [s for run in recordings.runs for s in in_run(run, recordings.vehicle, noisy)]
     if not stretches_found:
         return recordings, None
 
@@ -76,8 +81,8 @@ def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     return replace_columns(recordings, change), finding
 
 
-def in_run(run: Run, vehicle: Vehicle) -> list[Stretch]:
-    """Every dropout of a run, column by column."""
+def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
+    """Every dropout of a run, column by column; `noisy` columns are known to have noise of their own."""
     found = []
     for sensor, names in sensor_columns(vehicle).items():
         present = [n for n in names if run.has(n)]
@@ -86,7 +91,8 @@ def in_run(run: Run, vehicle: Vehicle) -> list[Stretch]:
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
         frozen = []
         if len(present) > 1 and not zero:
-            frozen = held(run.time_s, run.array(tuple(present)), SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS)
+            alive = not noisy.isdisjoint(present)
+            frozen = held(run.time_s, run.array(tuple(present)), SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS, alive)
         for name in present:
             values = run.column(name)
             blank = missing(run.time_s, values)
@@ -95,7 +101,7 @@ def in_run(run: Run, vehicle: Vehicle) -> list[Stretch]:
                 blank = blank & ~zero[name]
             found += _as_stretches(run, name, sensor, "missing", blank, 0.0)
             rest = np.where(zero.get(name, np.zeros(len(values), bool)), np.nan, values)
-            for mask, p in [*held(run.time_s, rest[:, None]), *frozen]:
+            for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy), *frozen]:
                 found += _as_stretches(run, name, sensor, "held", mask, p)
     return found
 
@@ -132,11 +138,16 @@ def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def held(
-    time_s: np.ndarray, values: np.ndarray, shortest_s: float = SHORTEST_GAP_S, periods: int = SHORTEST_GAP_PERIODS
+    time_s: np.ndarray,
+    values: np.ndarray,
+    shortest_s: float = SHORTEST_GAP_S,
+    periods: int = SHORTEST_GAP_PERIODS,
+    noisy: bool = False,
 ) -> list[tuple[np.ndarray, float]]:
     """Stretches in which changing columns (n, k) all repeat one reading far longer than chance and habit allow.
 
     At least `shortest_s` seconds and `periods` of the sensor's own periods long. Each as a mask (n,) with its p-value.
+    `noisy` says that other runs show noise of the sensor's own.
     """
     index = np.flatnonzero(np.isfinite(values).all(axis=1))
     if len(index) < 100:
@@ -147,7 +158,8 @@ def held(
     if not runs:
         return []
     lengths = np.array([b - a for a, b in runs])
-    period = float(np.median(np.diff(t[~same] if same.mean() > 0.4 else t)))
+    read = t[~same] if same.mean() > 0.4 else t
+    period = float(np.median(np.diff(read if len(read) > 1 else t)))
     out = []
     for (a, b), length in zip(runs, lengths, strict=True):
         duration = t[b - 1] - t[a]
@@ -158,13 +170,52 @@ def held(
         habit = np.quantile(others, 0.99) if len(others) > 20 else 1
         repeat = (others - 1).sum() / len(v)
         p = float(min(1.0, len(v) * max(repeat, 1.0 / len(v)) ** (length / max(habit, 1))))
-        if p > CHANCE or length < 8 * habit:
+        if p > CHANCE or length < 8 * habit or may_stand(v, a, b, noisy):
             continue
         mask = np.zeros(len(values), bool)
         # The first of the repeated readings is a true one.
         mask[index[a] + 1 : index[b - 1] + 1] = True
         out.append((mask, p))
     return out
+
+
+def may_stand(values: np.ndarray, start: int, stop: int, noisy: bool = False) -> bool:
+    """Whether columns (n, k) that repeat one reading from `start` to `stop` may truly have stood still.
+
+    A sensor's own noise never does; `noisy` says that other runs show it. A simulator without noise hovers, or flies in
+    a plane, with readings that are exactly constant, and leaves them without a jump.
+    """
+    outside = [values[: start + 1], values[stop:]]
+    usual, bend = steps_and_bends(outside)
+    if usual == 0.0:
+        return not noisy
+    if bend > SMOOTH * usual:
+        return False
+    jump = float(np.abs(values[stop] - values[stop - 1]).max()) if stop < len(values) else 0.0
+    return jump < LEAST_JUMP * usual
+
+
+def steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
+    """Median size of the first and second differences of columns (n, k), where they move; 0 where they never do."""
+    steps = [np.abs(np.diff(part, axis=0)).max(axis=1) for part in parts if len(part) > 2]
+    bends = [np.abs(np.diff(part, n=2, axis=0)).max(axis=1) for part in parts if len(part) > 2]
+    step = np.concatenate([s[s > 0] for s in steps]) if steps else np.zeros(0)
+    bend = np.concatenate([b[s[1:] > 0] for b, s in zip(bends, steps, strict=True)]) if steps else np.zeros(0)
+    return tuple(float(np.median(x)) if len(x) else 0.0 for x in (step, bend))
+
+
+def noisy_columns(recordings: RecordingSet) -> set[str]:
+    """Columns that in some run show noise of their own."""
+    found = set()
+    for names in sensor_columns(recordings.vehicle).values():
+        for run in recordings.runs:
+            for name in names:
+                if run.has(name) and name not in found:
+                    values = run.column(name)
+                    usual, bend = steps_and_bends([values[np.isfinite(values)][:, None]])
+                    if usual > 0 and bend > SMOOTH * usual:
+                        found.add(name)
+    return found
 
 
 def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[str, np.ndarray]:
