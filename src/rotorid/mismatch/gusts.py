@@ -16,6 +16,7 @@ from scipy.stats import chi2
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.louder import NOISE_BAND
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import Fit, Regression, build
@@ -23,7 +24,6 @@ from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import BURST_SIZE
 from rotorid.mismatch.wrench import (
     FEELS_THE_AIR,
-    NOISE_BAND,
     WrenchModel,
     after_residual,
     band_power,

@@ -12,7 +12,7 @@ from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, left_b
 from rotorid.mismatch.rows import CHANNELS
 from rotorid.mismatch.slow_changes import slow_excess
 from rotorid.mismatch.unknowns import DEPENDS_ON, UNKNOWNS
-from rotorid.mismatch.wrench import channel_floor
+from rotorid.mismatch.wrench import WORTH_TELLING, channel_floor
 
 MOST_BY_VALUES = 0.8
 """Share up to which mismatch that some believed value would explain counts as left over: its kind is known."""
@@ -120,7 +120,7 @@ def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> l
     gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
     weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
     runs = [r.run for r in model.rows]
-    least_noise = channel_floor(segments, prepared.vehicle)
+    least_noise = WORTH_TELLING * channel_floor(segments, prepared.vehicle)
     out = []
     for c, name in enumerate(CHANNELS[:6]):
         if name not in p_after:

@@ -10,6 +10,7 @@ from scipy.signal import welch
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, not_testable_reason
+from rotorid.mismatch.louder import louder
 from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments, full_speed
 from rotorid.mismatch.rows import (
     OFFSETS,
@@ -228,9 +229,15 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
     for run in recordings.runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng, full)
+    thinner = Thinner(rate_hz, cutoff)
+    if len(noisy) == len(segments) and (factors := louder(segments, noisy, vehicle, thinner)):
+        noise = {k: v * factors.get(k, 1.0) for k, v in noise.items()}
+        noisy = []
+        for run in recordings.runs:
+            noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng, full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     segments = representative(without_noise(segments))
-    prepared = Prepared(recordings, vehicle, split, segments, noisy, Thinner(rate_hz, cutoff), noise, [])
+    prepared = Prepared(recordings, vehicle, split, segments, noisy, thinner, noise, [])
     terms, reasons = make_terms(vehicle, segments, prepared.groups)
     return replace(prepared, terms=terms, not_testable=reasons)
 

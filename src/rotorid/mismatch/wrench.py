@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter, welch
 
 from rotorid.effects.contract import Form
+from rotorid.mismatch.louder import NOISE_BAND
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
@@ -34,13 +35,13 @@ from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 
 LONGEST_BLOCKS = 400
-NOISE_BAND = (0.5, 0.85)
-"""Band, as shares of the cutoff, in which noise is told from motion."""
 MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 SAME_WRENCH = 0.004
 """Share of the spread of the rotors' force or moment to which no model and no recording of them are known."""
 SIDEWAYS = 0.25
+WORTH_TELLING = 3.0
+"""Times that share which counts as noise where it is asked whether something matters."""
 MEMORY_GRID = 37
 """Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
@@ -175,7 +176,9 @@ def searched(
     )
     per = max(2, int(rate))
 
-    values, seconds = [t.key for t in terms if t.kind == "value"], Seconds(rows, noise, per)
+    values = [t.key for t in terms if t.kind == "value"]
+    told = np.concatenate([WORTH_TELLING * floor[:6], floor[6:]])
+    seconds = Seconds(rows, np.maximum(noise, told), per)
 
     def sizes_of(key: str, beta: np.ndarray) -> np.ndarray:
         # What refitted values would absorb of a term does not count as its size.

@@ -121,7 +121,7 @@ def test_a_column_that_is_all_noise_says_nothing():
 
 
 def test_no_channel_is_known_better_than_a_share_of_the_rotors_own_changes():
-    """Rotors of C_F = 1e-6 at x = ±0.1 m; one turns at 1000 and 2000 rad/s in turn: 1.5 N of spread, and a tenth of it."""
+    """C_F = 1e-6, rotors at x = ±0.1 m; one turns at 1000 and 2000 rad/s in turn: 1.5 N of spread, and a tenth."""
     vehicle = Vehicle(
         name="two", kind="flight", mass_kg=1.0, inertia_kg_m2={"xx": 0.01, "yy": 0.01, "zz": 0.02},
         rotors=[{"x_m": 0.1, "y_m": 0.0, "spin": "ccw"}, {"x_m": -0.1, "y_m": 0.0, "spin": "cw"}],
