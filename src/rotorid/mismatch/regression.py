@@ -240,7 +240,8 @@ class Regression:
         plain = inverse @ (gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))) @ inverse
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
         uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
-        shift = DOUBT_OF_CORRECTION * (beta - uncorrected)
+        values = np.isfinite(self.limit[cols])
+        shift = trusted(DOUBT_OF_CORRECTION * (beta - uncorrected), normal, values, precision[cols])
         covariance = at_least(robust, plain) + np.outer(shift, shift)
         rss = self.square - 2 * explained @ beta + pull @ beta
         gain = float(self.square[mask].sum() - rss[mask].sum())
@@ -411,6 +412,24 @@ def projected(
     left = cross[last] - own @ alone
     outer = cross[:kept] - mixed @ alone + follows.T @ left
     return inner, outer, square - float(alone @ (cross[last] + left))
+
+
+def trusted(shift: np.ndarray, normal: np.ndarray, values: np.ndarray, precision: np.ndarray) -> np.ndarray:
+    """A doubt about coefficients (k,) with no believed value doubted by more than its prior one-sigma.
+
+    Where a recording knows a ratio alone (thrust over mass), both values walk along it with anything; all that hangs
+    on their common scale would be as doubtful as that. What the values' share does to the others goes with it.
+    """
+    most = 1.0 / np.sqrt(np.maximum(precision[values], 1e-300))
+    walk = np.abs(shift[values])
+    factor = float(np.min(most / np.maximum(walk, most))) if values.any() else 1.0
+    if factor == 1.0:
+        return shift
+    out, others = shift.copy(), ~values
+    follows = -ridge_inverse(normal[np.ix_(others, others)]) @ normal[np.ix_(others, values)] @ shift[values]
+    out[values] *= factor
+    out[others] -= (1.0 - factor) * follows
+    return out
 
 
 def inverse_root(diagonal: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from rotorid.mismatch.regression import (
     limited_bias,
     quadratic_form,
     ridge_inverse,
+    trusted,
 )
 from rotorid.mismatch.rows import Rows, Term
 
@@ -305,3 +306,12 @@ def test_a_stretch_shorter_than_the_whitening_says_nothing():
         for rows in ([long], [long, short])
     ]
     assert fits[1].beta == pytest.approx(fits[0].beta, rel=1e-12)
+
+
+def test_a_doubt_about_a_believed_value_is_no_larger_than_the_belief():
+    """A value doubted by 0.4 of a one-sigma of 0.1: a quarter of it, and of what it does to the other (2 × 0.4)."""
+    normal = np.array([[4.0, -2.0], [-2.0, 1.0]])
+    doubt = trusted(np.array([0.4, 1.0]), normal, np.array([True, False]), np.array([100.0, 0.0]))
+    np.testing.assert_allclose(doubt, [0.1, 1.0 - 0.75 * 0.8], rtol=1e-6)
+    kept = trusted(np.array([0.05, 1.0]), normal, np.array([True, False]), np.array([100.0, 0.0]))
+    np.testing.assert_array_equal(kept, [0.05, 1.0])
