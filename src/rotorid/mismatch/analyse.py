@@ -62,6 +62,8 @@ RUN_SPREAD = 0.007
 RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
 UNITS = {"force": "N", "moment": "N m"}
+SURELY_HEAVIER = 2.0
+"""Standard errors by which a vehicle must be heavier than believed to carry a payload."""
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 IN_QUESTION = {"payload": {"mass", "thrust"}, "throttle_curve": {"thrust", "torque", "speed"}}
 """Values that an id would change by itself; thrust in a payload's is its ratio to the mass."""
@@ -385,7 +387,8 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
 
     The payload would bring products of inertia along: found beside such an offset they belong to the same question.
     """
-    heavier = values.get("mass", (0.0, 0.0))[0] > 0 or values.get("thrust", (0.0, 0.0))[0] < 0
+    sure = {key: change for key, (change, sd) in values.items() if abs(change) > SURELY_HEAVIER * sd}
+    heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in ("established", "ambiguous")]
     offset = next((f for f in stated if "com_offset" in (f.id, *f.alternatives)), None)
     if offset is None or not heavier:

@@ -58,7 +58,10 @@ def suggested(search: Search, active: list[str]) -> Fit | None:
 def estimates(
     regression: Regression, fit: Fit, search: Search, key: str, suggested: Fit | None = None
 ) -> tuple[Estimate, ...]:
-    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`."""
+    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`.
+
+    Those that nothing in the recordings shows (their columns are noise alone) are left out.
+    """
     term = search.terms[key]
     beta, covariance = coefficients(regression, fit, key)
     spread, p = regression.between_runs(fit, key)
@@ -66,7 +69,10 @@ def estimates(
     reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
     other = beta if suggested is None else coefficients(regression, suggested, key)[0]
     out = []
-    for index, value, also, sd in zip(term.form.linear, beta, other, np.sqrt(variance), strict=False):
+    shown = regression.shown(key)
+    for index, value, also, sd, seen in zip(term.form.linear, beta, other, np.sqrt(variance), shown, strict=False):
+        if not seen:
+            continue
         parameter = term.form.parameters[index]
         ends = (value, min(value, also) - reach * sd, max(value, also) + reach * sd)
         middle, low, high = (float(term.form.stated(index, x)) for x in ends)

@@ -243,8 +243,10 @@ class Regression:
         values = np.isfinite(self.limit[cols])
         shift = trusted(DOUBT_OF_CORRECTION * (beta - uncorrected), normal, values, precision[cols])
         covariance = at_least(robust, plain) + np.outer(shift, shift)
-        rss = self.square - 2 * explained @ beta + pull @ beta
-        gain = float(self.square[mask].sum() - rss[mask].sum())
+        # What the regressors' noise adds to a block is no misfit: left in, a model that shrinks them all would be best.
+        added = float(beta @ bias @ beta - 2 * beta @ bias_cross) / count
+        rss = self.square - 2 * explained @ beta + pull @ beta - added
+        gain = float((self.square - rss)[mask].sum())
         return Fit(cols, beta, covariance, rss, gain)
 
     def _fit_held_out_scales(self, cols: np.ndarray, beta: np.ndarray, mask: np.ndarray) -> None:
@@ -279,12 +281,17 @@ class Regression:
         gram, cross, bias, bias_cross = self._normal(cols, self.training)
         normal = gram - bias + np.diag(self.precision[cols])
         beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
-        return float(2 * cross @ beta - beta @ gram @ beta)
+        return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
+
+    def shown(self, key: str) -> np.ndarray:
+        """Which columns of a term act in any row fitted, (k,)."""
+        return np.diag(self._total_gram)[self.columns([key])] > 0
 
     def gain_at(self, fit: Fit, own: np.ndarray, left_out: np.ndarray) -> float:
         """Whitened squares that columns `own` explain on the training blocks with the coefficients of a fit of which
         the columns `left_out` are taken away: negative where the two only cancel."""
-        gram, cross = self._total_gram[np.ix_(fit.columns, fit.columns)], self._total_cross[fit.columns]
+        gram, cross, bias, bias_cross = self._normal(fit.columns, self.training)
+        gram, cross = gram - bias, cross - bias_cross
         rest = np.where(np.isin(fit.columns, np.concatenate([own, left_out])), 0.0, fit.beta)
         part = np.where(np.isin(fit.columns, own), fit.beta, 0.0)
         return float(2 * part @ (cross - gram @ rest) - part @ gram @ part)

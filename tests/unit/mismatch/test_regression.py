@@ -315,3 +315,19 @@ def test_a_doubt_about_a_believed_value_is_no_larger_than_the_belief():
     np.testing.assert_allclose(doubt, [0.1, 1.0 - 0.75 * 0.8], rtol=1e-6)
     kept = trusted(np.array([0.05, 1.0]), normal, np.array([True, False]), np.array([100.0, 0.0]))
     np.testing.assert_array_equal(kept, [0.05, 1.0])
+
+
+def test_the_noise_of_a_regressor_is_no_misfit():
+    """y = x + noise, x of variance 1 read with noise of variance 0.25: what x explains is 1 per row, not 0.75."""
+    rng = np.random.default_rng(21)
+    size = 20_000
+    x = coloured(size, 1.0, rng, pole=0.9)
+    y = x + rng.standard_normal(size)
+    read = x + 0.5 * rng.standard_normal(size)
+    again = read + 0.5 * rng.standard_normal(size)
+    made = regression([rows_of(y, read)], ["x"], noisy=[rows_of(y, again)])
+    fit = made.fit(["x"])
+    assert fit.beta[0] == pytest.approx(1.0, abs=0.05)
+    assert fit.gain / size == pytest.approx(np.var(x), abs=0.08)
+    assert made.explained(["x"]) == pytest.approx(fit.gain, rel=1e-9)
+    assert made.shown("x").all()
