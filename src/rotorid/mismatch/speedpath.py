@@ -32,6 +32,7 @@ LIFT = (0.5, 2.0)
 """Bounds of mean thrust over mean weight: who flies is carried by his rotors, and no believed value is off by more. The
 noise of a hover says little of its mean, so a curve without any thrust would explain moments that do not respond."""
 CURVE_STAGE, LIMIT_STAGE = 0, 2
+LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
 AT_BOUND = 1e-3
 """Share of a parameter's range from its bound within which the bound holds it."""
 
@@ -324,10 +325,20 @@ class SpeedSearch:
     def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
         """The chain of `base` plus one form, from each of the form's starts; the cheapest."""
         fits = []
-        ordered = sorted(starts_of(added), key=lambda s: self._quick(chain, np.append(base.values, s), base.shift_s))
+        ordered = sorted(self.starts(added), key=lambda s: self._quick(chain, np.append(base.values, s), base.shift_s))
         for start in ordered[:1]:
             fits.append(self.problem.fit(chain, np.append(base.values, start), base.shift_s))
         return min(fits, key=lambda f: f.cost)
+
+    def starts(self, form: SpeedForm) -> list[np.ndarray]:
+        """Starting values of a form: of a limit shares of the way from the usual command to the outermost (nothing acts
+        beyond it, and nothing says there which way to go)."""
+        if form.stage != LIMIT_STAGE:
+            return starts_of(form)
+        shares = np.concatenate([s.command.ravel() for s in self.problem.segments]) / self.problem.full_speed
+        middle = float(np.median(shares))
+        outermost = float(self.neutral(form)[0])
+        return [np.array([middle + way * (outermost - middle)]) for way in LIMIT_WAYS]
 
     def _quick(self, chain, values, shift_s) -> float:
         return sum(float((w**2).sum()) for w in self.problem.whitened(chain, values, shift_s))

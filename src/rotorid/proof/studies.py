@@ -80,7 +80,7 @@ STUDIES = (
         "imrc-brushed",
         ("motor_lag", "battery_sag", "sensor_dropout"),
         "Crazyflie, brushed; one rpm sensor drops out",
-        published=(Published("motor_lag", "tau", 0.0425, "s", "0.040 to 0.045 s per motor"),),
+        published=(Published("motor_lag", "tau", 0.072, "s", "brushed motors of the same kind: arXiv 2404.07837"),),
     ),
     Study(
         "crazyflie-arpl-log10",
