@@ -51,6 +51,8 @@ def probes(segment: Segment, prepared) -> dict[str, np.ndarray]:
             add(f"rate_{a}", motion.angular_velocity[:, i])
     if motion.height is not None and prepared.vehicle.rotor_radius_m:
         add("height", 1.0 / (1.0 + (motion.height / prepared.vehicle.rotor_radius_m) ** 2))
+    # A tank that empties, an icing rotor: no other input follows them.
+    add("time_s", motion.time_s - next(r.time_s[0] for r in prepared.recordings.runs if r.name == segment.run))
     return out
 
 

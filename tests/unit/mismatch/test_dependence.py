@@ -90,7 +90,8 @@ def test_too_few_blocks_say_nothing():
 
 def test_the_inputs_are_those_the_recording_has():
     vehicle = thesis_vehicle(rotor_radius_m=0.1)
-    prepared = SimpleNamespace(vehicle=vehicle, thinner=Thinner(100.0, 10.0))
+    recordings = SimpleNamespace(runs=[SimpleNamespace(name="run", time_s=np.array([-2.0, 0.0]))])
+    prepared = SimpleNamespace(vehicle=vehicle, thinner=Thinner(100.0, 10.0), recordings=recordings)
     velocity = np.tile([3.0, -4.0, 1.0], (400, 1))
     found = probes(one(still(400, velocity=velocity, height=np.full(400, 0.3))), prepared)
     by_hand = {
@@ -105,7 +106,10 @@ def test_the_inputs_are_those_the_recording_has():
     for name, value in by_hand.items():
         np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
     bare = probes(one(still(400, velocity=None, rotation=None, angular_velocity=None)), prepared)
-    assert set(bare) == {"rotor_speed", "thrust"}
+    assert set(bare) == {"rotor_speed", "thrust", "time_s"}
+    # Of the run, whose log began two seconds before the stretch.
+    thinned = prepared.thinner.times(np.arange(400) / 100.0)
+    np.testing.assert_allclose(found["time_s"], 2.0 + thinned, atol=1e-9)
 
 
 def test_products_of_inputs():
