@@ -12,7 +12,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS, UNITS
-from rotorid.mismatch.analyse import changed_vehicle, throttle_or_thrust
+from rotorid.mismatch.analyse import throttle_or_thrust
 from rotorid.mismatch.decide import WIDEST_TRUST, wrong_values
 from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
@@ -25,6 +25,7 @@ from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
 from rotorid.mismatch.instrument.values import without_needless
 from rotorid.mismatch.select import Selection
+from rotorid.mismatch.values import changed_vehicle
 from rotorid.recordings import RecordingSet, Vehicle
 
 ABSORBED_P = 1e-6

@@ -1,0 +1,192 @@
+"""What is fitted to a set: what lies between command and rotor speed, and the model of force, moment and sensors.
+
+1. the chain from command to speed, 2. the grouped search over force, moment and sensor effects with the believed
+values free, refined in its nonlinear parameters, the wind and the gusts, 3. the chain once more with the effects found
+known, and without it where the rotors' differences explain as much, 4. what does harm or no good on held-out runs taken
+back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from rotorid.effects.contract import Form
+from rotorid.mismatch.decide import wrong_values
+from rotorid.mismatch.gusts import with_gusts
+from rotorid.mismatch.harmless import REASON as HARM
+from rotorid.mismatch.harmless import Values, without_harm, without_useless
+from rotorid.mismatch.prepare import Prepared
+from rotorid.mismatch.rows import RUN_SCALE, Term
+from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
+from rotorid.mismatch.speedpath import SpeedResult, nothing_between, taken_back
+from rotorid.mismatch.wrench import (
+    WrenchModel,
+    after_residual,
+    chosen,
+    path_segments,
+    refine_nonlinear,
+    reverse_regression,
+    speed_path,
+    with_wind,
+    wrench_model,
+)
+
+RUN_P = 1e-6
+RUN_SPREAD = 0.007
+"""Relative spread of the thrust coefficient between runs below which one number serves all."""
+RUN_TRUST = 0.02
+"""Relative one-sigma of a run's own thrust about the common one."""
+
+Chain = tuple[SpeedResult, float, float | None]
+"""What lies between command and speed, the full speed in rad/s, and the voltage at which it is reached."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The model of a set, the believed values it contradicts, and what lies between command and speed."""
+
+    model: WrenchModel
+    values: Values
+    chain: Chain | None
+    """None where no command is recorded."""
+    measured: bool
+    """Whether rotor speeds are measured."""
+
+    @property
+    def commanded(self) -> bool:
+        """Whether rotor speeds are known from their commands alone."""
+        return self.chain is not None and not self.measured
+
+
+def fitted(prepared: Prepared) -> Fitted:
+    """The model of a set, less what does harm or no good on the runs held out."""
+    measured = all(s.measured_speed for s in prepared.segments)
+    chain = speed_path(prepared)
+    if chain is None or measured:
+        model, values, values_of, _ = without_harm(
+            prepared, refined_model(prepared, *turning(prepared)), values_called_wrong, False
+        )
+    else:
+        chain, model = with_chain(prepared, chain)
+        chain, model, values, values_of = harmless_chain(prepared, chain, model)
+    model, values = without_useless(prepared, model, values, values_of)
+    return Fitted(model, values, chain, measured)
+
+
+def turning(prepared: Prepared, chain: Chain | None = None):
+    """Segments and their noisy copies with the rotors turning as measured, or as a chain makes of their commands."""
+    both = prepared.segments, prepared.noisy_segments
+    if chain is None:
+        return both
+    return tuple(path_segments(segments, *chain, prepared.thinner.cutoff_hz) for segments in both)
+
+
+def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
+    """The chain and the model where rotor speeds are known from commands alone."""
+    model = refined_model(prepared, *turning(prepared, chain))
+    if model.selection.active:
+        # The wrench effects found change what the commands must explain: once more with them known.
+        chain = speed_path(prepared, chosen(model))
+        model = refined_model(prepared, *turning(prepared, chain))
+    if [k for k, _ in chain[0].fit.chain] == ["throttle_curve"]:
+        # A curve alters differences between rotors too: unequal rotors at one throttle look like one.
+        plain = refined_model(prepared, *turning(prepared))
+        # A thrust curve in its place is the same column over again, with the torque's share left to a wrong value.
+        renamed = any(plain.search.terms[k].effect == "thrust_curve" for k in plain.selection.active)
+        limit = cost_of(model, model.regression.filters) + curve_cost(chain[0])
+        if not renamed and cost_of(plain, model.regression.filters) < limit:
+            return (nothing_between(chain[0]), *chain[1:]), plain
+    return chain, model
+
+
+def harmless_chain(prepared: Prepared, chain: Chain, model: WrenchModel):
+    """Chain, model, its wrong values and the function that finds them, less what does harm on the runs held out.
+
+    Fitted with every value free, a curve of the throttle may need values that nothing else bears out.
+    """
+    model, values, values_of, harm = without_harm(prepared, model, values_called_wrong, True)
+    for result in taken_back(chain[0], HARM) if harm and chain[0].fit.chain else ():
+        chain = (result, *chain[1:])
+        model = refined_model(prepared, *turning(prepared, chain if result.fit.chain else None))
+        model, values, values_of, harm = without_harm(prepared, model, values_called_wrong, True)
+        if not harm:
+            break
+    return chain, model, values, values_of
+
+
+def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
+    """The search, then nonlinear parameters refined and the search repeated from there."""
+    model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
+    terms = list(prepared.terms)
+    if thrust_differs(model):
+        terms = with_run_scales(terms, prepared)
+        model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
+    for _ in range(2 if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0):
+        refined = refine_nonlinear(prepared, model, segments)
+        terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
+        again = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
+        same = set(again.selection.active) == set(model.selection.active)
+        model = again
+        if same:
+            break
+    model = with_wind(prepared, model, segments, noisy, terms)
+    if model.wind is not None:
+        terms = list(model.terms)
+    return with_gusts(prepared, model, terms)
+
+
+def changes_its_columns(form: Form) -> bool:
+    """Whether a form's columns hang on what the model holds: nonlinear parameters, or the accelerations predicted."""
+    return bool(form.nonlinear) or not {"angular_acceleration", "specific_force"}.isdisjoint(form.requires)
+
+
+def thrust_differs(model: WrenchModel) -> bool:
+    """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than RUN_SPREAD."""
+    if "thrust" not in model.search.terms or not all(s.measured_speed for s in model.prepared.segments):
+        return False
+    regression = model.search.regression
+    fit = regression.fit(model.search.always + model.selection.active)
+    spread, p = regression.between_runs(fit, "thrust")
+    runs = len(np.unique(regression.run[regression.training]))
+    return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
+
+
+def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
+    """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
+    runs = dict.fromkeys(s.run for s in prepared.segments)
+    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(RUN_TRUST,), run=r) for r in runs)]
+
+
+def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
+    """Believed values that the model's recordings contradict, less those refused."""
+    reverse, search = reverse_regression(model.prepared, model, model.segments), model.search
+    size = size_of_value(model)
+    return wrong_values(search.regression, search, model.selection, reverse, size, refused=refused)
+
+
+def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:
+    """Function of a value and its relative change that gives the change's size in units of the noise."""
+
+    def size(key: str, change: float) -> float:
+        return float(model.search.sizes_of(key, np.array([change])).max())
+
+    return size
+
+
+def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
+    """Whitened squares that a model leaves, and what its ids and parameters cost."""
+    left = 0.0
+    for part in after_residual(model):
+        for channel, taps in filters.items():
+            left += float((lfilter(taps, [1.0], part[:, channel])[len(taps) :] ** 2).sum())
+    terms = [model.search.terms[k] for k in model.selection.active]
+    return left + sum(COST_PER_EFFECT + COST_PER_PARAMETER * t.size for t in terms)
+
+
+def curve_cost(result: SpeedResult) -> float:
+    """What the forms between command and rotor speed cost."""
+    return sum(COST_PER_EFFECT + COST_PER_PARAMETER * len(form.parameters) for _, form in result.fit.chain)

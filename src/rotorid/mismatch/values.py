@@ -1,0 +1,144 @@
+"""Believed values as the contract states them: their numbers, a vehicle with them changed, and what throttle alone or a
+curve beside them leaves of what is said about them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.effects.thrust_curve import SQUARE
+from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z
+from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.harmless import Values
+from rotorid.mismatch.rows import PARAMETER_NAMES
+from rotorid.mismatch.wrench import WrenchModel
+from rotorid.recordings import RecordingSet, Vehicle, columns
+
+IN_QUESTION = {"payload": {"mass", "thrust"}, "throttle_curve": {"thrust", "torque", "speed"}}
+"""Values that an id would change by itself; thrust in a payload's is its ratio to the mass."""
+
+
+def believed_value(vehicle: Vehicle, key: str) -> float:
+    """The number that a value's name stands for (the mean over rotors of coefficients)."""
+    if key == "mass":
+        return vehicle.mass_kg
+    if key == "thrust":
+        return float(vehicle.thrust_coefficients_n_s2().mean())
+    if key == "torque":
+        return float(vehicle.torque_coefficients_n_m_s2().mean())
+    if key == "speed":
+        return vehicle.rotor_speed_limits_rad_s[1]
+    if key == "arm":
+        return 1.0
+    return getattr(vehicle.inertia_kg_m2, key[-2:])
+
+
+def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
+    """The vehicle with values changed by relative amounts."""
+    change = {}
+    for key, name in (("thrust", "thrust_coefficient_n_s2"), ("torque", "torque_coefficient_n_m_s2")):
+        if key in relative:
+            old = getattr(vehicle, name)
+            factor = 1 + relative[key]
+            change[name] = tuple(v * factor for v in old) if isinstance(old, tuple) else old * factor
+    if "mass" in relative:
+        change["mass_kg"] = vehicle.mass_kg * (1 + relative["mass"])
+    inertia = {k[-2:]: 1 + v for k, v in relative.items() if k.startswith("inertia")}
+    if inertia:
+        old = vehicle.inertia_kg_m2
+        change["inertia_kg_m2"] = old.model_copy(update={k: getattr(old, k) * f for k, f in inertia.items()})
+    if "speed" in relative:
+        low, high = vehicle.rotor_speed_limits_rad_s
+        change["rotor_speed_limits_rad_s"] = (low, high * (1 + relative["speed"]))
+    if "arm" in relative:
+        f = 1 + relative["arm"]
+        change["rotors"] = tuple(r.model_copy(update={"x_m": r.x_m * f, "y_m": r.y_m * f}) for r in vehicle.rotors)
+    return vehicle.model_copy(update=change)
+
+
+def contract_values(vehicle: Vehicle, values: dict) -> dict[str, tuple[float, float, float, float]]:
+    """Wrong values under the names of vehicle.yaml: believed, refitted and its interval."""
+    out = {}
+    for key, (relative, sd) in values.items():
+        believed = believed_value(vehicle, key)
+        out[PARAMETER_NAMES[key]] = tuple(
+            float(believed * (1 + x)) for x in (0.0, relative, relative - 1.96 * sd, relative + 1.96 * sd)
+        )
+    return out
+
+
+def only_throttle(recordings: RecordingSet) -> bool:
+    """Whether rotor speeds are known from the throttle and a believed full speed alone."""
+    count = recordings.vehicle.rotor_count
+    return all(
+        run.has(*columns.rotor_columns("throttle", count))
+        and not run.has(*columns.rotor_columns("rotor_command", count))
+        and not run.has(*columns.rotor_columns("rotor_speed", count))
+        for run in recordings.runs
+    )
+
+
+def speed_for_coefficients(values: dict, vehicle: Vehicle) -> dict:
+    """Thrust and torque coefficients off by one factor are one speed at full throttle off by its root."""
+    if not {"thrust", "torque"} <= set(values) or vehicle.rotor_speed_limits_rad_s is None:
+        return values
+    (thrust, thrust_sd), (torque, torque_sd) = values["thrust"], values["torque"]
+    if abs(thrust - torque) > 2.0 * np.hypot(thrust_sd, torque_sd) + 0.005:
+        return values
+    weight = 1.0 / np.square([thrust_sd, torque_sd])
+    change = float(weight @ [thrust, torque] / weight.sum())
+    factor = np.sqrt(1.0 + change)
+    rest = {k: v for k, v in values.items() if k not in ("thrust", "torque")}
+    return {**rest, "speed": (float(factor - 1.0), float(0.5 / factor / np.sqrt(weight.sum())))}
+
+
+def throttle_scale(values: Values, model: WrenchModel, full_rad_s: float):
+    """Values less what only says how fast rotors turn at full throttle, and that speed, which nobody stated.
+
+    The scale of the throttle rests on the believed thrust coefficient and mass: it is known as well as they are.
+    """
+    trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
+    full = full_rad_s * float(np.sqrt(1 + values.get("thrust", (0.0, 0.0))[0]))
+    reach = 1.96 * full * 0.5 * float(np.hypot(trust.get("thrust", 0.0), trust.get("mass", 0.0)))
+    return without_common_scale(values), {PARAMETER_NAMES["speed"]: (float("nan"), full, full - reach, full + reach)}
+
+
+def without_common_scale(values: Values) -> Values:
+    """Values where the scale of the rotors' speed is not known: a thrust, and a torque less its part in the scale."""
+    (thrust, thrust_sd), (torque, torque_sd) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "torque"))
+    kept = {k: v for k, v in values.items() if k not in ("thrust", "torque", "speed")}
+    change, sd = (1 + torque) / (1 + thrust) - 1, float(np.hypot(thrust_sd, torque_sd))
+    if "torque" in values and abs(change) > max(VALUE_Z * sd, SMALLEST_CHANGE):
+        kept["torque"] = (change, sd)
+    return kept
+
+
+def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:
+    """Beside a thrust curve the coefficient of its square is the curve's own parameter c_2, and no wrong value.
+
+    C_F and what the curve adds to it trade off against each other; their sum is what the recording knows.
+    """
+    curve = next((f for f in findings if f.id == "thrust_curve" and f.status in ("established", "ambiguous")), None)
+    key = next((k for k in model.selection.active if model.search.terms[k].effect == "thrust_curve"), None)
+    if curve is None or key is None:
+        return findings, values
+    fit, coefficient = model.selection.fit, believed_value(model.prepared.vehicle, "thrust")
+    share = np.zeros(len(fit.columns))
+    share[fit.columns == model.regression.start["thrust"]] = coefficient
+    symbols = [curve.form.parameters[i].symbol for i in curve.form.linear]
+    if SQUARE in symbols:
+        share[fit.columns == model.regression.start[key] + symbols.index(SQUARE)] = 1.0
+    elif "thrust" not in values:
+        return findings, values
+    value, sd = coefficient + share @ fit.beta, np.sqrt(share @ fit.covariance @ share)
+    square = Estimate("c_2", float(value), "N s2/rad2", float(value - 1.96 * sd), float(value + 1.96 * sd))
+    told = replace(curve, parameters=(*(p for p in curve.parameters if p.symbol != SQUARE), square))
+    return [told if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
+
+
+def without_values_in_question(findings: list[Finding], values: dict) -> dict:
+    """Values less those that would be right, or others, if another member of an open class were at work."""
+    members = {i for f in findings if f.status == "ambiguous" for i in f.alternatives}
+    open_values = {key for i, keys in IN_QUESTION.items() if i in members for key in keys}
+    return {k: v for k, v in values.items() if k not in open_values}
