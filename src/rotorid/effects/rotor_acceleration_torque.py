@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.scale import LEAST_ROTOR_SHARE, scale
+from rotorid.effects.contract import Contribution, Effect, Form
+from rotorid.effects.scale import rotor_inertia
 
 
 def reaction(motion, vehicle, values):
@@ -14,13 +14,11 @@ def reaction(motion, vehicle, values):
 
 
 def forms(vehicle):
-    inertia = scale(vehicle).inertia_kg_m2
-    least = LEAST_ROTOR_SHARE * inertia
     return (
         Form(
             "reaction",
             "M_z = J_r Σ y_i dω_i/dt",
-            (Parameter("J_r", "kg m2", 0.0, inertia / 4, meaning="inertia of one rotor", negligible=least),),
+            (rotor_inertia(vehicle),),
             reaction,
             ("rotor_acceleration",),
         ),

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.scale import LEAST_ROTOR_SHARE, scale
+from rotorid.effects.contract import Contribution, Effect, Form
+from rotorid.effects.scale import rotor_inertia
 
 
 def spin_vector(vehicle):
@@ -19,13 +19,11 @@ def gyroscopic(motion, vehicle, values):
 
 
 def forms(vehicle):
-    inertia = scale(vehicle).inertia_kg_m2
-    least = LEAST_ROTOR_SHARE * inertia
     return (
         Form(
             "gyroscopic",
             "M = −Ω × J_r Σ s_i ω_i e3",
-            (Parameter("J_r", "kg m2", 0.0, inertia / 4, meaning="inertia of one rotor", negligible=least),),
+            (rotor_inertia(vehicle),),
             gyroscopic,
             ("angular_velocity", "rotor_speed"),
         ),

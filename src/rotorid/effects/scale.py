@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotorid.effects.contract import Parameter
 from rotorid.recordings.vehicle import Vehicle
 
 AIR_DENSITY_KG_M3 = 1.2
@@ -83,3 +84,10 @@ def hover_inflow_m_s(vehicle: Vehicle, density_kg_m3: float = AIR_DENSITY_KG_M3)
     """Momentum theory: v_h = sqrt(T / (2 ρ π R²)) of one rotor in hover, m/s."""
     thrust = vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.rotor_count
     return float(np.sqrt(thrust / (2 * density_kg_m3 * np.pi * rotor_radius_m(vehicle) ** 2)))
+
+
+def rotor_inertia(vehicle: Vehicle) -> Parameter:
+    """The moment of inertia of one rotor about its axis, J_r."""
+    inertia = scale(vehicle).inertia_kg_m2
+    least = LEAST_ROTOR_SHARE * inertia
+    return Parameter("J_r", "kg m2", 0.0, inertia / 4, meaning="inertia of one rotor", negligible=least)
