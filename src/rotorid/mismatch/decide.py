@@ -58,10 +58,7 @@ def suggested(search: Search, active: list[str]) -> Fit | None:
 def estimates(
     regression: Regression, fit: Fit, search: Search, key: str, suggested: Fit | None = None
 ) -> tuple[Estimate, ...]:
-    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`.
-
-    Those that nothing in the recordings shows (their columns are noise alone) are left out.
-    """
+    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`."""
     term = search.terms[key]
     beta, covariance = coefficients(regression, fit, key)
     spread, p = regression.between_runs(fit, key)
@@ -69,10 +66,7 @@ def estimates(
     reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
     other = beta if suggested is None else coefficients(regression, suggested, key)[0]
     out = []
-    shown = regression.shown(key)
-    for index, value, also, sd, seen in zip(term.form.linear, beta, other, np.sqrt(variance), shown, strict=False):
-        if not seen:
-            continue
+    for index, value, also, sd in zip(term.form.linear, beta, other, np.sqrt(variance), strict=False):
         parameter = term.form.parameters[index]
         ends = (value, min(value, also) - reach * sd, max(value, also) + reach * sd)
         middle, low, high = (float(term.form.stated(index, x)) for x in ends)
@@ -163,6 +157,8 @@ def wrench_findings(
                 term.form.stated(i, b) for i, b in zip(term.form.linear, beta, strict=True)
             ]
         parameters = estimates(regression, selection.fit, search, key, beside) if term.form.linear else ()
+        # What nothing in the recordings shows (columns that are noise alone) is not stated.
+        parameters = tuple(p for p, shown in zip(parameters, regression.shown(key), strict=True) if shown)
         if key in nonlinear:
             values, sd = nonlinear[key]
             parameters = tuple(

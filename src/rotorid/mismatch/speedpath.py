@@ -33,6 +33,8 @@ LIFT = (0.5, 2.0)
 noise of a hover says little of its mean, so a curve without any thrust would explain moments that do not respond."""
 CURVE_STAGE, LIMIT_STAGE = 0, 2
 LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
+MOST_LIMITED = 0.5
+"""Share of the time that a limit may hold a rotor."""
 AT_BOUND = 1e-3
 """Share of a parameter's range from its bound within which the bound holds it."""
 
@@ -466,12 +468,22 @@ class SpeedSearch:
         grid = np.linspace(low, high, 9)[:, None]
         path = SpeedPath(grid, 0.01 * np.arange(9.0), self.problem.full_speed)
         for key, form in fit.chain:
+            if form.stage == LIMIT_STAGE and self._always_limited(form, fit.values[fit.slice_of(key)]):
+                return False
             if form.stage == CURVE_STAGE:
                 speed = form.apply(path, fit.values[fit.slice_of(key)])
                 slope = np.diff(speed, axis=0) / np.maximum(np.diff(grid, axis=0), 1e-9)
                 if (slope < LEAST_RESPONSE * (speed / np.maximum(grid, 1e-9))[1:]).any():
                     return False
         return True
+
+    def _always_limited(self, form: SpeedForm, values: np.ndarray) -> bool:
+        """Whether a limit holds some rotor most of the time: nobody flies so, but in a hover of hardly any commands it
+        makes up for whatever keeps the rotors apart."""
+        segments = self.problem.segments
+        paths = [SpeedPath(s.command, s.motion.time_s, self.problem.full_speed) for s in segments]
+        held = np.concatenate([form.apply(p, values) != p.speed for p in paths])
+        return bool(held.mean(axis=0).max() > MOST_LIMITED)
 
     def negligible(self, fit: SpeedFit, key: str) -> bool:
         """Whether an id's parameters are all closer to changing nothing than their own limits; of a lag, than half a

@@ -129,6 +129,17 @@ def test_a_limit_that_is_reached_in_one_second_of_twenty_is_found():
         assert result.fit.values[0] == pytest.approx(1450.0 / full, rel=0.01)
 
 
+def test_a_limit_that_holds_a_rotor_most_of_the_time_is_none():
+    """Rotors that hardly move, three a little faster than the fourth: a limit would make them alike."""
+    segment = recorded(9)
+    rng = np.random.default_rng(9)
+    command = np.array([1650.0, 1650.0, 1640.0, 1650.0]) + 0.5 * rng.standard_normal(segment.command.shape)
+    speed = np.minimum(command, 1645.0) + 0.1 * rng.standard_normal(command.shape)
+    flown = [replace(segment, motion=replace(segment.motion, rotor_speed=speed), command=command)]
+    result = SpeedSearch(MeasuredSpeed(flown, 1650.0, None), candidate_forms(flown)).run()
+    assert "command_saturation" not in [k for k, _ in result.fit.chain]
+
+
 def test_a_lag_beside_a_delay_is_also_stated_as_the_lag_alone_that_others_fit():
     """A lag of 40 ms behind a delay of 20 ms: alone, the lag must make up for most of both."""
     both = searched(recorded(7, delay=("of the command", (0.02,)), motor_lag=("one constant", (0.04,))))
