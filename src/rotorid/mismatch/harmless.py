@@ -198,9 +198,9 @@ def without_useless(
     """The model less the effects that lower the held-out error of no channel that they act in, and its wrong values.
 
     An error counts as it is or about its mean in each run: what differs between flights is told by itself, and must
-    not decide about an effect that is right about everything else. The least useful goes first, and the others are
-    looked at again without it. Where too little is held out to say anything, or an effect hardly acts (no landing, no
-    turn), nothing goes.
+    not decide about an effect that is right about everything else. Beyond HARM_RATIO it does: what is delivered would
+    be worse with the effect than without. The least useful goes first, and the others are looked at again without it.
+    Where too little is held out to say anything, or an effect hardly acts (no landing, no turn), nothing goes.
     """
     held = held_out_masks(prepared, model, model.segments)
     per = max(2, int(prepared.thinner.rate_hz))
@@ -221,7 +221,10 @@ def without_useless(
             fewer = without(model, key, USELESS)
             left = delivered_residuals(fewer, values)
             pairs = (with_it, left), tuple(about_means(runs, part, held) for part in (with_it, left))
-            options.append((max(helps(*growth(*pair, held, per), wrench) for pair in pairs), key, fewer))
+            use = max(helps(*growth(*pair, held, per), wrench) for pair in pairs)
+            if harmed(*growth(left, with_it, held, per))[wrench].any():
+                use = -np.inf
+            options.append((use, key, fewer))
         least = min(options, key=lambda o: o[0], default=None)
         if least is None or least[0] >= HELP_Z:
             return model, values
