@@ -19,7 +19,8 @@ NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is told from motion."""
 MOSTLY_NOISE = 0.3
 """Share of a side's power in the band that must be noise before it says how much noise there is."""
-LEAST_LOUDER = 1.2
+LEAST_LOUDER, MOST_LOUDER = 1.2, 10.0
+"""A sensor louder than that was filtered before it was recorded: what is left in the band may be the model's own."""
 
 
 def louder(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, thinner: Thinner) -> dict[str, float]:
@@ -43,7 +44,7 @@ def louder(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, thin
             if assumed > 0 and found > MOSTLY_NOISE * power:
                 squares[sensor].append(found / assumed)
     factors = {sensor: float(np.sqrt(np.median(found))) for sensor, found in squares.items() if found}
-    return {sensor: factor for sensor, factor in factors.items() if factor > LEAST_LOUDER}
+    return {sensor: factor for sensor, factor in factors.items() if LEAST_LOUDER < factor < MOST_LOUDER}
 
 
 def _sides(segment: Segment, vehicle: Vehicle, thinner: Thinner) -> tuple[np.ndarray, np.ndarray] | None:

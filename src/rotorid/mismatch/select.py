@@ -42,10 +42,6 @@ EXPECTED_HELD_OUT = 25.0
 MOST_STRAIN = 4.0
 """Standard deviations of trust that an effect may push a believed value to."""
 NEAR_LIMIT = 0.98
-MOST_BORROWED = 0.1
-"""Share of what a term explains that it may owe to a believed value far from its belief."""
-HELD = 1e-3
-"""Relative one-sigma of a value that is held at its belief."""
 CANCELLED = 0.1
 """Two contributions cancel each other in a channel where their sum is this share of either."""
 """Share of the furthest that a believed value may move at which it counts as held there."""
@@ -137,16 +133,11 @@ class Search:
         if physical:
             own, noise = self.regression.own_part(keys, key, beta)
             physical = own > SHARE_OF_LARGEST**2 and noise < MOST_ATTENUATION
-        physical = physical and not self.strains(keys, key, fit, base)
+        physical = physical and not self.strains(fit, base)
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
-    def strains(self, keys: list[str], key: str, fit: Fit, base: Fit) -> bool:
-        """Whether a term needs a believed value far from its belief that the model without it does not need.
-
-        Needs: held at its belief the value takes more than MOST_BORROWED of what the term explains with it. A value
-        that the recordings hardly know may drift along with anything.
-        """
-        far = {}
+    def strains(self, fit: Fit, base: Fit) -> bool:
+        """Whether a term needs a believed value far from its belief that the model without it does not need."""
         for term in self.regression.terms:
             if term.kind != "value":
                 continue
@@ -155,11 +146,8 @@ class Search:
             with_it = abs(fit.beta[fit.columns == column][0])
             without = abs(base.beta[base.columns == column][0])
             if with_it > most and with_it > without + term.prior_sd[0]:
-                far[term.key] = HELD
-        if not far:
-            return False
-        alone = [self.regression.fit(k, loose=far).gain for k in (keys, [k for k in keys if k != key])]
-        return alone[0] - alone[1] < (1 - MOST_BORROWED) * (fit.gain - base.gain)
+                return True
+        return False
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""

@@ -64,3 +64,8 @@ def test_white_noise_is_as_loud_as_it_seems():
 def test_where_the_rotors_work_in_the_band_nothing_is_said():
     """A thrust of 10 % less than believed leaves the moment with the noise's sign, but only a tenth of it."""
     assert found(flown(2, 1.0, 0.0, work=60.0, thrust=0.9), 1.0) == {}
+
+
+def test_a_sensor_filtered_before_it_was_recorded_says_nothing():
+    """Hardly any noise at the highest frequencies, and a hundred times as much in the band: that may be the model's."""
+    assert found(flown(4, 5.0, 0.8), 0.01) == {}

@@ -209,34 +209,3 @@ def test_effects_that_add_up_are_left_alone():
     noise, x = case(rng, 2)
     y = [n + 2 * columns[0] - 1.5 * columns[1] for n, columns in zip(noise, x, strict=True)]
     assert search_of([term("e0"), term("e1")], y, x).cancelling(["e0/form", "e1/form"]) is None
-
-
-def values_and_a_term(rng, share: float) -> Search:
-    """Two believed values of one column (an arm and an inertia), and a term.
-
-    The response is the term's column and `share` of the values', which the term's own column holds too.
-    """
-    noise, x = case(rng, 2)
-    x = [[20 * a, -20 * a + 0.02 * b, b + 20 * share * a] for a, b in x]
-    y = [n + 3 * (columns[2] - share * columns[0]) for n, columns in zip(noise, x, strict=True)]
-    terms = [Term("arm", "value", prior_sd=(0.03,)), Term("inertia_xx", "value", prior_sd=(0.03,)), term("e")]
-    return search_of(terms, y, x)
-
-
-def test_a_term_that_owes_what_it_explains_to_a_value_far_off_strains_it():
-    search = values_and_a_term(np.random.default_rng(13), 0.3)
-    judged = search.judge("e/form", ["e/form"], search.without("e/form", ["e/form"]))
-    keys = [*search.always, "e/form"]
-    fit, base = search.regression.fit(keys), search.regression.fit(search.always)
-    assert search.strains(keys, "e/form", fit, base) and not judged.physical
-
-
-def test_a_value_that_only_drifts_along_is_no_strain():
-    """Two values of one column move against each other by any amount; held at their belief the term is as good."""
-    search = values_and_a_term(np.random.default_rng(13), 0.0)
-    keys = [*search.always, "e/form"]
-    fit, base = search.regression.fit(keys), search.regression.fit(search.always)
-    drifted = replace(fit, beta=np.where(np.isin(fit.columns, [0, 1]), 0.14, fit.beta))
-    assert not search.strains(keys, "e/form", drifted, base)
-    # The same drift, were the term to explain ten times as much with it, would be needed.
-    assert search.strains(keys, "e/form", replace(drifted, gain=10 * fit.gain), base)
