@@ -13,7 +13,7 @@ AIR_DENSITY_KG_M3 = 1.2
 FASTEST_DECAY_1_S = 5.0
 """Drag stops no multirotor within less than a fifth of a second (published: 0.2 to 0.6 1/s)."""
 LEAST_ROTOR_SHARE = 2e-5
-"""No rotor's inertia is a smaller share of its vehicle's (published: 5e-4 to 5e-3)."""
+"""No rotor's inertia is a smaller share of its vehicle's (2e-3 in the example of the recording contract)."""
 FASTEST_DAMPING_1_S = 20.0
 """Nor does air stop its turning within less than a twentieth."""
 

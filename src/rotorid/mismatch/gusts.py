@@ -16,7 +16,7 @@ from scipy.stats import chi2
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.findings import Estimate, Finding
-from rotorid.mismatch.louder import NOISE_BAND
+from rotorid.mismatch.louder import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import Fit, Regression, build
@@ -26,7 +26,6 @@ from rotorid.mismatch.wrench import (
     FEELS_THE_AIR,
     WrenchModel,
     after_residual,
-    band_power,
     block_seconds,
     chosen,
     model_filters,

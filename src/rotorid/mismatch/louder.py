@@ -9,7 +9,7 @@ is in the residual with the other sign, noise of the measured side with its own.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import csd, welch
+from scipy.signal import csd
 
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.rows import Thinner, baseline_wrench, residual
@@ -19,6 +19,7 @@ NOISE_BAND = (0.5, 0.85)
 """Band, as shares of the cutoff, in which noise is told from motion."""
 MOSTLY_NOISE = 0.3
 """Share of a side's power in the band that must be noise before it says how much noise there is."""
+SHORTEST_ROWS = 32
 LEAST_LOUDER, MOST_LOUDER = 1.2, 10.0
 """A sensor louder than that was filtered before it was recorded: what is left in the band may be the model's own."""
 
@@ -33,14 +34,15 @@ def louder(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, thin
     sides = [pair for pair in sides if None not in pair]
     if not sides:
         return {}
+    rate_hz, band = thinner.rate_hz, tuple(share * thinner.cutoff_hz for share in NOISE_BAND)
     for c in range(3):
         left = [measured[:, c] - modelled[:, c] for (measured, modelled), _ in sides]
-        whole = _power(left, left, thinner)
+        whole = band_power(left, rate_hz, band)
         for sensor, side, sign in (("gyroscope", 0, 1.0), ("rotors", 1, -1.0)):
             own = [a[side][:, c] for a, _ in sides]
             added = [b[side][:, c] - a[side][:, c] for a, b in sides]
-            power, assumed = _power(own, own, thinner), _power(added, added, thinner)
-            found = min(sign * _power(left, own, thinner), whole)
+            power, assumed = band_power(own, rate_hz, band), band_power(added, rate_hz, band)
+            found = min(sign * band_power(left, rate_hz, band, own), whole)
             if assumed > 0 and found > MOSTLY_NOISE * power:
                 squares[sensor].append(found / assumed)
     factors = {sensor: float(np.sqrt(np.median(found))) for sensor, found in squares.items() if found}
@@ -57,16 +59,14 @@ def _sides(segment: Segment, vehicle: Vehicle, thinner: Thinner) -> tuple[np.nda
     return thinner(groups["moment"]) + modelled, modelled
 
 
-def _power(one: list[np.ndarray], other: list[np.ndarray], thinner: Thinner) -> float:
-    """Mean real cross power of stretches in the band."""
-    low, high = (share * thinner.cutoff_hz for share in NOISE_BAND)
+def band_power(
+    one: list[np.ndarray], rate_hz: float, band_hz: tuple[float, float], other: list[np.ndarray] | None = None
+) -> float:
+    """Mean power density of stretches in a band of frequency, or its real cross density with `other` stretches."""
     total, weight = 0.0, 0
-    for a, b in zip(one, other, strict=True):
-        if len(a) >= 32:
-            size = min(len(a), 256)
-            frequency, density = (
-                welch(a, thinner.rate_hz, nperseg=size) if a is b else csd(a, b, thinner.rate_hz, nperseg=size)
-            )
-            band = (frequency >= low) & (frequency <= high)
-            total, weight = total + float(density[band].real.mean()) * len(a), weight + len(a)
+    for a, b in zip(one, one if other is None else other, strict=True):
+        if len(a) >= SHORTEST_ROWS:
+            frequency, density = csd(a, b, fs=rate_hz, nperseg=min(len(a), 256))
+            inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+            total, weight = total + float(density[inside].real.mean()) * len(a), weight + len(a)
     return total / max(weight, 1)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter, welch
+from scipy.signal import lfilter
 
 from rotorid.effects.contract import Form
-from rotorid.mismatch.louder import NOISE_BAND
+from rotorid.mismatch.louder import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
@@ -269,16 +269,6 @@ def noise_of_columns(rows, noisy, channel: int, columns: np.ndarray, taps: np.nd
         energy += (x**2).sum(axis=0)
         noise += (added**2).sum(axis=0)
     return noise / np.maximum(energy, 1e-300)
-
-
-def band_power(parts: list[np.ndarray], rate_hz: float, band: tuple[float, float]) -> float:
-    """Mean power density of stretches in a band of frequency."""
-    power = []
-    for part in parts:
-        if len(part) >= 32:
-            frequency, density = welch(part, fs=rate_hz, nperseg=min(len(part), 256))
-            power.append(density[(frequency >= band[0]) & (frequency <= band[1])].mean() * len(part))
-    return float(sum(power) / max(sum(len(p) for p in parts if len(p) >= 32), 1))
 
 
 class Seconds:
