@@ -132,7 +132,7 @@ def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
     if found.chain is not None:
         findings += speed_findings(found.chain[0], prepared, found.measured, found.chain[1])
     findings += wrench_findings(
-        model.rows,
+        model.contributions,
         model.search.regression,
         model.search,
         model.selection,

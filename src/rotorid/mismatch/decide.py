@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
@@ -80,15 +81,15 @@ def predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
 
 
 def held_out_gain(
-    rows: list[Rows], regression: Regression, with_it: Fit, without: Fit, channel: int, held: list[np.ndarray]
+    contributions: Contributions, with_it: Fit, without: Fit, channel: int, held: list[np.ndarray]
 ) -> tuple[float, float, float] | None:
     """rmse with / without a term in its main channel on held-out samples, with a block-bootstrap interval."""
     energies = []
-    for r, mask in zip(rows, held, strict=True):
+    parts = (contributions.of(fit.columns, fit.beta) for fit in (with_it, without))
+    for r, mask, more, less in zip(contributions.rows, held, *parts, strict=True):
         if not mask.any():
             continue
-        a = (r.y - predicted(r, with_it.columns, with_it.beta))[mask, channel]
-        b = (r.y - predicted(r, without.columns, without.beta))[mask, channel]
+        a, b = (r.y - more)[mask, channel], (r.y - less)[mask, channel]
         count = max(1, len(a) // 40)
         energies += [
             (float(x @ x), float(y @ y))
@@ -115,7 +116,7 @@ def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: n
 
 
 def wrench_findings(
-    rows: list[Rows],
+    contributions: Contributions,
     regression: Regression,
     search: Search,
     selection: Selection,
@@ -129,7 +130,7 @@ def wrench_findings(
     `values` are the keys of the believed values that are called wrong: what a term gains on the held-out part is
     judged as it is delivered, with those free alone and without the empirical terms.
     """
-    effects = catalogue()
+    effects, rows = catalogue(), contributions.rows
     findings = []
     loose = {k: WIDEST_TRUST for k in values}
     kept = [k for k in search.always if search.terms[k].kind != "value" or k in loose]
@@ -156,9 +157,11 @@ def wrench_findings(
             values[list(term.form.linear)] = [
                 term.form.stated(i, b) for i, b in zip(term.form.linear, beta, strict=True)
             ]
-        parameters = estimates(regression, selection.fit, search, key, beside) if term.form.linear else ()
-        # What nothing in the recordings shows (columns that are noise alone) is not stated.
-        parameters = tuple(p for p, shown in zip(parameters, regression.shown(key), strict=True) if shown)
+        parameters = ()
+        if term.form.linear:
+            stated = estimates(regression, selection.fit, search, key, beside)
+            # What nothing in the recordings shows (columns that are noise alone) is not stated.
+            parameters = tuple(p for p, shown in zip(stated, regression.shown(key), strict=True) if shown)
         if key in nonlinear:
             values, sd = nonlinear[key]
             parameters = tuple(
@@ -177,7 +180,7 @@ def wrench_findings(
                 p_value=selection.p_values[key],
                 channels=tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels),
                 alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
-                gain=held_out_gain(rows, regression, with_it, without, channels[0], held),
+                gain=held_out_gain(contributions, with_it, without, channels[0], held),
                 windows=(term.window,) if term.window else (),
             )
         )

@@ -107,13 +107,14 @@ def dependence(prepared, model, segments, noisy):
     most = most_noise(prepared, segments, noisy)
     full = model.full_fit()
     named = np.where(model.unnamed(full.columns), 0.0, full.beta)
+    added = model.contributions.of(full.columns, named)
     before, after, depends = {}, {}, {}
     for c in range(6):
         if not np.isfinite(model.noise[c]):
             continue
         taps = model.regression.filters[c]
         raw = [r.y[:, c] for r in model.rows]
-        left = left_by(model.rows, c, full.columns, named)
+        left = left_by(model.rows, c, added)
         rate_hz = prepared.thinner.rate_hz
         runs = [r.run for r in model.rows]
         shared = [(d[:, c], z) for d, z in zip(noise, moved, strict=True)] or None
@@ -128,13 +129,13 @@ def dependence(prepared, model, segments, noisy):
     return before, after, list(depends)
 
 
-def left_by(rows, channel: int, columns, beta) -> list[np.ndarray]:
-    """What coefficients leave of a channel, (n,) per stretch; where they leave more than there was, what there was.
+def left_by(rows, channel: int, added) -> list[np.ndarray]:
+    """What contributions `added` (n, 12) leave of a channel, (n,) per stretch; where it is more than there was, that.
 
     Where a flight hardly excites a value its column is mostly noise, and the correction for that noise can overshoot.
     """
     raw = [r.y[:, channel] for r in rows]
-    left = [y - r.x[:, channel][:, columns] @ beta for y, r in zip(raw, rows, strict=True)]
+    left = [y - part[:, channel] for y, part in zip(raw, added, strict=True)]
     return left if sum(float(x @ x) for x in left) <= sum(float(y @ y) for y in raw) else raw
 
 

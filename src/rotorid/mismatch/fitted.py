@@ -18,7 +18,7 @@ from rotorid.effects.contract import Form
 from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.gusts import with_gusts
 from rotorid.mismatch.harmless import REASON as HARM
-from rotorid.mismatch.harmless import Values, without_harm, without_useless
+from rotorid.mismatch.harmless import Values, without_harm, without_unsure, without_useless
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
@@ -73,7 +73,7 @@ def fitted(prepared: Prepared) -> Fitted:
     else:
         chain, model = with_chain(prepared, chain)
         chain, model, values, values_of = harmless_chain(prepared, chain, model)
-    model, values = without_useless(prepared, model, values, values_of)
+    model, values = without_unsure(*without_useless(prepared, model, values, values_of), values_of)
     return Fitted(model, values, chain, measured)
 
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.decide import WIDEST_TRUST, coefficients, main_channels
+from rotorid.mismatch.decide import WIDEST_TRUST, coefficients, estimates, main_channels, suggested
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, training_rule
 from rotorid.mismatch.regression import Fit
@@ -37,6 +37,7 @@ LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
 REASON = "what is delivered with it is worse on the held-out runs than the believed vehicle"
 USELESS = "without it the held-out error is no larger in any channel that it acts in"
+UNSURE = "none of it at all is within its interval"
 
 Values = dict[str, tuple[float, float]]
 ValuesOf = Callable[[WrenchModel, Sequence[str]], Values]
@@ -52,7 +53,8 @@ def delivered_fit(model: WrenchModel, values: Values, active: Sequence[str]) -> 
 def residuals_of(model: WrenchModel, fit: Fit) -> list[np.ndarray]:
     """What values and named effects of a fit leave of every stretch, (n, 12); empirical terms stay out."""
     named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
-    return [r.y - r.x[:, :, fit.columns] @ named for r in model.rows]
+    added = model.contributions.of(fit.columns, named)
+    return [r.y - part for r, part in zip(model.rows, added, strict=True)]
 
 
 def delivered_residuals(model: WrenchModel, values: Values) -> list[np.ndarray]:
@@ -190,6 +192,28 @@ def without_harm(
 def less(values_of: ValuesOf, refused: tuple[str, ...]) -> ValuesOf:
     """The function of a model and refused values that gives its wrong values, with these refused always."""
     return lambda model, more: values_of(model, (*refused, *more))
+
+
+def without_unsure(model: WrenchModel, values: Values, values_of: ValuesOf) -> tuple[WrenchModel, Values]:
+    """The model less the effects of which every parameter may be zero, and its wrong values; the least sure goes first.
+
+    An interval takes in what an effect too weak to be stated would make of it.
+    """
+    while True:
+        selection, search = model.selection, model.search
+        beside = suggested(search, selection.active)
+        unsure = []
+        for key in selection.active:
+            term = search.terms[key]
+            if term.effect in UNKNOWNS or term.run or not term.form.linear or term.form.nonlinear:
+                continue
+            found = estimates(model.regression, selection.fit, search, key, beside)
+            if all(e.low <= 0.0 <= e.high for e in found):
+                unsure.append(key)
+        if not unsure:
+            return model, values
+        model = without(model, max(unsure, key=lambda k: selection.p_values[k]), UNSURE)
+        values = values_of(model, ())
 
 
 def without_useless(

@@ -111,6 +111,7 @@ def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> l
     _, inputs = standardised(prepared, segments)
     full = model.full_fit()
     unnamed = model.unnamed(full.columns)
+    added = model.contributions.of(full.columns, full.beta)
     training = [r.run in prepared.split.training for r in model.rows]
     if prepared.split.training == prepared.split.held_out:
         training = [True] * len(training)
@@ -125,7 +126,7 @@ def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> l
     for c, name in enumerate(CHANNELS[:6]):
         if name not in p_after:
             continue
-        left = left_by(model.rows, c, full.columns, full.beta)
+        left = left_by(model.rows, c, added)
         empirical = [r.x[:, c][:, full.columns[unnamed]] @ full.beta[unnamed] for r in model.rows]
         cross = sum(f.T @ e for f, e, t in zip(features, left, training, strict=True) if t)
         beta = np.linalg.solve(weights, cross)

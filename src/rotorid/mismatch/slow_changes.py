@@ -28,12 +28,13 @@ def slow_excess(prepared, model, segments, noisy) -> dict[str, tuple[float, floa
     rate = prepared.thinner.rate_hz
     fast = tuple(share * prepared.thinner.cutoff_hz for share in FAST_BAND)
     full = model.full_fit()
+    contributions = model.contributions.of(full.columns, full.beta)
     noise = added_noise(prepared, segments, noisy)
     out = {}
     for c in range(6):
         if not np.isfinite(model.noise[c]):
             continue
-        left = left_by(model.rows, c, full.columns, full.beta)
+        left = left_by(model.rows, c, contributions)
         added = [x[:, c] for x in noise]
         frequency, found = _spectrum(left, rate)
         if frequency is None:

@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from rotorid.effects.contract import Form
+from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.louder import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
@@ -77,6 +78,8 @@ class WrenchModel:
     segments: list[Segment] = field(default_factory=list)
     """What the rows are made of: rotor speeds as the chain has them, moving air where it moves."""
     noisy_segments: list[Segment] = field(default_factory=list)
+    contributions: Contributions | None = None
+    """What the terms add to the channels as far as their regressors are more than noise."""
 
     def full_fit(self) -> Fit:
         """The fit of everything in the model, winds of single runs and all."""
@@ -131,8 +134,9 @@ def wrench_model(
     if noisy is not None:
         colours = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
-    left, _ = full_fit_residuals(rows, precision, colours)
+    left, beta = full_fit_residuals(rows, precision, colours)
     model = searched(prepared, terms, rows, noisy, left, start, segments, known_sizes)
+    model = replace(model, floor=np.fmin(model.noise, whole_floor(model, beta, segments)))
     # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
     # thrust and a deaf gyroscope): such a channel would weigh as if it were exact, and pull at all values.
     remains = after_residual(model)
@@ -144,6 +148,13 @@ def wrench_model(
         again = searched(prepared, terms, rows, noisy, left, active, segments, known_sizes)
         model = replace(again, floor=model.floor)
     return replace(model, segments=segments, noisy_segments=noisy_segments)
+
+
+def whole_floor(model: WrenchModel, beta: np.ndarray, segments: list[Segment]) -> np.ndarray:
+    """What coefficients of the whole catalogue leave of each channel (12,), the noise of regressors aside."""
+    added = model.contributions.of(np.arange(len(beta)), beta)
+    left = np.concatenate([r.y - part for r, part in zip(model.rows, added, strict=True)])
+    return np.hypot(left.std(axis=0), channel_floor(segments, model.prepared.vehicle))
 
 
 def inflated_channels(remains: list[np.ndarray], noise: np.ndarray) -> np.ndarray:
@@ -174,6 +185,7 @@ def searched(
     regression = build(
         rows, terms, filters, training_rule(prepared.split, segments), block_seconds(rows, rate), rate, noisy
     )
+    contributions = Contributions(rows, noisy, rate)
     per = max(2, int(rate))
 
     values = [t.key for t in terms if t.kind == "value"]
@@ -191,29 +203,38 @@ def searched(
     held = [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in rows]
 
     def harms(key: str, with_it: Fit, without: Fit) -> bool:
-        return spoils_a_channel(rows, held, regression.columns([key]), with_it, without, noise, per)
+        acts = regression.columns([key])
+        return spoils_a_channel(contributions, held, acts, with_it, without, noise, per)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
     search = Search(regression.without_winds(), sizes_of, known_sizes, harms, seconds.sizes)
-    return WrenchModel(prepared, terms, rows, regression, search, search.run(start), noise, noise)
+    selection = search.run(start)
+    return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 
 
 def spoils_a_channel(
-    rows: list[Rows], held: list[np.ndarray], cols: np.ndarray, with_it: Fit, without: Fit, noise: np.ndarray, per: int
+    contributions: Contributions,
+    held: list[np.ndarray],
+    cols: np.ndarray,
+    with_it: Fit,
+    without: Fit,
+    noise: np.ndarray,
+    per: int,
 ) -> bool:
     """Whether a term leaves more of a channel that it acts on than there is without it, held out and beyond doubt.
 
     Squares are compared by blocks of `per` rows without their outermost eighths, as for the whole.
     """
-    fits = [(with_it.columns, with_it.beta), (without.columns, without.beta)]
     own = with_it.beta[[list(with_it.columns).index(c) for c in cols]]
+    rows = contributions.rows
+    parts = (contributions.of(*pair) for pair in ((with_it.columns, with_it.beta), (without.columns, without.beta)))
     changes, acts = [], np.zeros(12, bool)
-    for r, mask in zip(rows, held, strict=True):
+    for r, mask, more, less in zip(rows, held, *parts, strict=True):
         if mask.sum() < 2 * per:
             continue
-        parts = np.array_split(np.flatnonzero(mask), mask.sum() // per)
-        after, before = ((r.y - r.x[:, :, c] @ b) ** 2 for c, b in fits)
-        changes += [(before[p] - after[p]).mean(axis=0) for p in parts]
+        blocks = np.array_split(np.flatnonzero(mask), mask.sum() // per)
+        gain = (r.y - less) ** 2 - (r.y - more) ** 2
+        changes += [gain[b].mean(axis=0) for b in blocks]
         acts |= np.sqrt(((r.x[mask][:, :, cols] @ own) ** 2).mean(axis=0)) > LEAST_ACTION * noise
     if len(changes) < LEAST_BLOCKS:
         return False

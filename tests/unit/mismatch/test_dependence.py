@@ -124,7 +124,7 @@ def test_what_free_values_explain_and_no_wrong_value_tells_is_left_over():
 
 
 def test_a_fit_that_leaves_more_than_there_was_is_not_believed():
-    """y = (1, 2), x = (1, 1): with 1 there remain (0, 1); with 5, (-4, -3), which is more than y."""
-    rows = [SimpleNamespace(y=np.array([[1.0], [2.0]]), x=np.ones((2, 1, 1)))]
-    np.testing.assert_allclose(left_by(rows, 0, [0], np.array([1.0]))[0], [0.0, 1.0])
-    np.testing.assert_allclose(left_by(rows, 0, [0], np.array([5.0]))[0], [1.0, 2.0])
+    """y = (1, 2): less (1, 1) there remain (0, 1); less (5, 5), (-4, -3), which is more than y."""
+    rows = [SimpleNamespace(y=np.array([[1.0], [2.0]]))]
+    np.testing.assert_allclose(left_by(rows, 0, [np.ones((2, 1))])[0], [0.0, 1.0])
+    np.testing.assert_allclose(left_by(rows, 0, [np.full((2, 1), 5.0)])[0], [1.0, 2.0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import (
     SMALLEST_CHANGE,
     WIDEST_TRUST,
@@ -122,10 +123,11 @@ def test_the_held_out_gain_is_the_ratio_of_errors_with_and_without():
     half = size / RATE_HZ / 2
     made = build([rows], [Term("x", "effect")], {0: np.array([1.0])}, lambda run, t: t < half, 1.0, RATE_HZ)
     held = [rows.time_s > half]
-    ratio, low, high = held_out_gain([rows], made, made.fit(["x"]), made.fit([]), 0, held)
+    contributions = Contributions([rows])
+    ratio, low, high = held_out_gain(contributions, made.fit(["x"]), made.fit([]), 0, held)
     assert ratio == pytest.approx(np.sqrt(0.5), abs=0.02)
     assert low < np.sqrt(0.5) < high and high - low < 0.06
-    assert held_out_gain([rows], made, made.fit(["x"]), made.fit([]), 0, [np.zeros(size, bool)]) is None
+    assert held_out_gain(contributions, made.fit(["x"]), made.fit([]), 0, [np.zeros(size, bool)]) is None
 
 
 def test_the_channels_of_a_finding_are_those_it_is_strongest_in():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import Fit, full_fit_residuals
 from rotorid.mismatch.rows import Rows
@@ -40,7 +41,7 @@ def two_channels(force: float, moment: float, size: int = 1600) -> Rows:
 def spoiled(rows: Rows, held: bool = True) -> bool:
     mask = [np.full(len(rows.y), held)]
     noise = np.where(np.isfinite(rows.y[0]), 1.0, np.nan)
-    return spoils_a_channel([rows], mask, np.array([0]), fit_of(1.0), fit_of(), noise, 40)
+    return spoils_a_channel(Contributions([rows]), mask, np.array([0]), fit_of(1.0), fit_of(), noise, 40)
 
 
 def test_a_term_that_helps_everywhere_spoils_nothing():

@@ -8,6 +8,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS
+from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import estimates, held_out_gain
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.instrument.model import (
@@ -39,7 +40,7 @@ def findings_of(model: ReadingModel) -> list[Finding]:
     effects, search, selection = catalogue(), model.search, model.selection
     rule = in_training(model.setup)
     held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
-    with_it = model.regression.fit(search.always + selection.active)
+    with_it, contributions = model.regression.fit(search.always + selection.active), Contributions(model.rows)
     out = []
     for key in selection.active:
         term, effect = search.terms[key], effects[search.terms[key].effect]
@@ -68,7 +69,7 @@ def findings_of(model: ReadingModel) -> list[Finding]:
                 p_value=selection.p_values[key],
                 channels=tuple(CHANNELS[c] for c in channels),
                 alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
-                gain=held_out_gain(model.rows, model.regression, with_it, without, channels[0], held),
+                gain=held_out_gain(contributions, with_it, without, channels[0], held),
             )
         )
     for effect_id, reason in selection.not_established.items():
