@@ -43,6 +43,12 @@ DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inert
 LOWEST_TO_MEAN = 1.08
 MOST_S, PIECE_S = 600.0, 20.0
 """Longer recordings are represented by pieces: memory must not grow with an hour's flight."""
+NOISE_REACH = 3.0
+"""Highest frequency, over the cutoff of the analysis, that a sensor's noise is read from."""
+FINEST_HZ = 1.0
+PIECE_SAMPLES, SMOOTHED = 256, 9
+"""Samples of the pieces that spectra are averaged over (more where a bin would be wider than FINEST_HZ), and bins that
+are averaged."""
 MOST_NOISE_SAMPLES = 8192
 """Samples of a column that its noise level is read from."""
 
@@ -82,19 +88,35 @@ def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float
     return rule
 
 
-def white_level(values: np.ndarray) -> float:
-    """One-sigma of the white part of an evenly sampled signal: the lowest level of its spectrum, as if flat."""
-    values = values[np.isfinite(values)][:MOST_NOISE_SAMPLES]
+def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) -> float:
+    """One-sigma of the white part of an evenly sampled signal: the lowest level of its spectrum, as if flat.
+
+    Above `highest_hz` nobody looks: a gyroscope that smooths its own reading has next to no noise there, and all the
+    same noise below.
+    """
+    pieces = max(1, int(np.ceil(rate_hz / FINEST_HZ / PIECE_SAMPLES)))
+    values = values[np.isfinite(values)][: MOST_NOISE_SAMPLES * pieces]
     if len(values) < 64:
         return 0.0
-    _, density = welch(values, fs=1.0, nperseg=min(256, len(values) // 2))
-    smooth = np.convolve(density[2:], np.ones(9) / 9, mode="valid")
+    frequency, density = welch(values, fs=1.0, nperseg=min(PIECE_SAMPLES * pieces, len(values) // 2))
+    smooth = np.convolve(density[2:], np.ones(SMOOTHED) / SMOOTHED, mode="valid")
+    low = smooth[frequency[SMOOTHED + 1 :] * rate_hz <= highest_hz]
+    smooth = low if len(low) else smooth[:1]
     # The lowest of some hundred smoothed levels lies below their mean.
     return float(LOWEST_TO_MEAN * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 
 
-def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle) -> dict[str, float]:
-    """White noise per sample of each sensor, one sigma in the columns' own unit, from the data themselves."""
+def own_rate_hz(run: Run, column: str) -> float:
+    """Readings of a column per second."""
+    count = int(np.isfinite(run.column(column)).sum())
+    return count / max(float(run.time_s[-1] - run.time_s[0]), 1e-9)
+
+
+def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.inf) -> dict[str, float]:
+    """White noise per sample of each sensor, one sigma in the columns' own unit, from the data themselves.
+
+    It is read below NOISE_REACH times the cutoff of the analysis, at each sensor's own rate.
+    """
     groups = {
         "rotors": c.rotor_columns("rotor_speed", vehicle.rotor_count),
         "gyroscope": c.ANGULAR_VELOCITY,
@@ -108,7 +130,7 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle) -> dict[str, float]:
         found = []
         for run in runs:
             if names and run.has(*names):
-                found += [white_level(run.column(n)) for n in names]
+                found += [white_level(run.column(n), own_rate_hz(run, n), NOISE_REACH * cutoff_hz) for n in names]
         if found:
             levels[key] = float(np.median(found))
     return levels
@@ -223,7 +245,7 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
     """Segments, noise and terms of a set."""
     vehicle, split = recordings.vehicle, split_runs(recordings)
     rate_hz, cutoff = analysis_rate_hz(recordings.runs, vehicle, cutoff_hz)
-    noise = sensor_noise(recordings.runs, vehicle)
+    noise = sensor_noise(recordings.runs, vehicle, cutoff)
     rng = np.random.default_rng(0)
     segments, noisy, full = [], [], full_speed(recordings.runs, vehicle)
     for run in recordings.runs:

@@ -64,9 +64,17 @@ def test_the_white_part_of_a_signal_is_its_noise():
     rng = np.random.default_rng(0)
     t = np.arange(8000) / 200.0
     swing = 3.0 * np.sin(2 * np.pi * 0.7 * t)
-    assert 0.18 < white_level(swing + 0.2 * rng.standard_normal(8000)) < 0.205
-    assert white_level(swing) < 0.005
-    assert white_level(np.full(10, np.nan)) == 0.0
+    assert 0.18 < white_level(swing + 0.2 * rng.standard_normal(8000), 200.0) < 0.205
+    assert white_level(swing, 200.0) < 0.005
+    assert white_level(np.full(10, np.nan), 200.0) == 0.0
+
+
+def test_noise_that_a_sensor_smooths_away_at_the_top_is_read_below():
+    """White noise of 0.2 through a mean of two samples: half its power at a quarter of the rate, none at half of it."""
+    noise = 0.2 * np.random.default_rng(0).standard_normal(16001)
+    smoothed = (noise[1:] + noise[:-1]) / 2
+    assert white_level(smoothed, 400.0) < 0.02
+    assert white_level(smoothed, 400.0, 60.0) == pytest.approx(0.2 * np.cos(np.pi * 60 / 400), rel=0.15)
 
 
 def test_the_noise_is_measured_not_believed():
