@@ -3,7 +3,14 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.hysteresis import play
+from rotorid.effects.loading import AXES, UNITS
 
+LOOSE = 0.02
+"""Half width of the play by which friction turns over, as a share of the largest tilt: a cable that rubs does so
+within a little way, whatever the speed."""
+FRICTION = ((0, 1), (1, 0), (3, 0), (4, 1))
+"""Channels and the tilt (0 roll, 1 pitch) whose friction they feel."""
 FORCE, MOMENT = "force per sine of the tilt", "moment per sine of the tilt"
 
 
@@ -36,11 +43,43 @@ def _vertical(loading, vehicle, values):
     return Contribution(reading=out)
 
 
+def _full(pairs, rubbing=()):
+    """Contribution of every pair (channel, tilt), then of the friction of every `rubbing` pair, a value each."""
+
+    def contribution(loading, vehicle, values):
+        tilts = [np.sin(a) for a in loading.attitude]
+        out = np.zeros((loading.size, 6))
+        for (channel, tilt), k in zip(pairs, values, strict=False):
+            out[:, channel] += k * tilts[tilt]
+        for (channel, tilt), f in zip(rubbing, values[len(pairs) :], strict=True):
+            out[:, channel] += f * friction(loading.attitude[tilt])
+        return Contribution(reading=out)
+
+    return contribution
+
+
+def friction(tilt_rad):
+    """−1 to 1 by whether a tilt (n,) came from above or from below, turning over within a play; 0 without tilt."""
+    width = LOOSE * float(np.abs(tilt_rad).max())
+    return (tilt_rad - play(tilt_rad, width)) / width if width > 0 else np.zeros(len(tilt_rad))
+
+
 def reading_forms(instrument):
     if instrument.bench or not instrument.tilts or instrument.vehicle.tared:
         return ()
     names = ("k_x,pitch", "k_y,roll", "m_x,roll", "m_y,pitch", "k_x,roll", "k_y,pitch", "m_x,pitch", "m_y,roll")
     units = ("N/rad", "N/rad", "N m/rad", "N m/rad") * 2
+    pairs = tuple((c, t) for c in instrument.channels for t in (0, 1))
+    rubbing = tuple((c, t) for c, t in FRICTION if c in instrument.channels)
+    matrix = tuple(
+        Parameter(f"K_{AXES[c]},{n}", f"{UNITS[c]}/rad", meaning=MOMENT if c > 2 else FORCE)
+        for c in instrument.channels
+        for n in ("roll", "pitch")
+    )
+    rubs = tuple(
+        Parameter(f"f_{AXES[c]},{('roll', 'pitch')[t]}", UNITS[c], meaning="half the height of the loop of friction")
+        for c, t in rubbing
+    )
     return (
         Form(
             "alike about both axes",
@@ -54,6 +93,13 @@ def reading_forms(instrument):
             "F = K_F (sin φ, sin θ), M = K_M (sin φ, sin θ)",
             tuple(Parameter(n, u, meaning=MOMENT if "m" in u else FORCE) for n, u in zip(names, units, strict=True)),
             own,
+        ),
+        Form("full matrix", "(F, M) = K (sin φ, sin θ)", matrix, _full(pairs)),
+        Form(
+            "full matrix and friction",
+            "(F, M) = K (sin φ, sin θ) + f (branch of φ, θ: 1 rising, −1 falling)",
+            (*matrix, *rubs),
+            _full(pairs, rubbing),
         ),
         Form(
             "vertical",

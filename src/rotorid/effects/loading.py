@@ -195,6 +195,11 @@ def forms_of(effect: Effect, instrument: Instrument) -> tuple[Form, ...]:
     return () if instrument.bench else effect.forms(instrument.vehicle)
 
 
+def on_stand(form: Form) -> Form:
+    """A form for a flight as it acts on a stand: through the motion of the `Loading`."""
+    return replace(form, contribution=lambda loading, own, values: form.contribution(loading.motion, own, values))
+
+
 def unsmoothed(load: np.ndarray) -> np.ndarray:
     """Samples (n, k) between which straight lines do not smooth: a twelfth of the second difference taken off.
 

@@ -29,6 +29,12 @@ def ringing(loading, vehicle, values):
     return Contribution(reading=resonance(load, values[0], values[1], loading.dt_s) - load)
 
 
+def ringing_in_part(loading, vehicle, values):
+    """y = F + p (H(s) − 1) F: of a structure's modes one rings in the band, and bends under a part p of the load."""
+    load = since_the_first(loading)
+    return Contribution(reading=values[2] * (resonance(load, values[0], values[1], loading.dt_s) - load))
+
+
 def reading_forms(instrument):
     highest = 0.4 * instrument.rate_hz
     starts = tuple(
@@ -36,15 +42,16 @@ def reading_forms(instrument):
     )
     if not starts:
         return ()
+    frequency = Parameter("f_n", "Hz", 0.5, highest, nonlinear=True, starts=starts, meaning="natural frequency")
+    damping = Parameter("zeta", "1", 0.001, 0.6, nonlinear=True, starts=(0.05,), meaning="damping ratio")
+    part = Parameter("p", "1", 0.0, 3.0, nonlinear=True, starts=(1.0,), meaning="part of the load that it bends under")
     return (
+        Form("second order", "y = f_n² F / (f_n² − f² + 2 i ζ f_n f)", (frequency, damping), ringing),
         Form(
-            "second order",
-            "y = f_n² F / (f_n² − f² + 2 i ζ f_n f)",
-            (
-                Parameter("f_n", "Hz", 0.5, highest, nonlinear=True, starts=starts, meaning="natural frequency"),
-                Parameter("zeta", "1", 0.001, 0.6, nonlinear=True, starts=(0.05,), meaning="damping ratio"),
-            ),
-            ringing,
+            "second order, in part",
+            "y = F + p (H − 1) F, H = f_n² / (f_n² − f² + 2 i ζ f_n f)",
+            (frequency, damping, part),
+            ringing_in_part,
         ),
     )
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs
+from rotorid.effects.loading import on_stand
 from rotorid.effects.scale import scale
 
 SQUARE = "Δc_2"
@@ -89,11 +90,49 @@ def forms(vehicle):
     )
 
 
+def power_of_speed(vehicle):
+    """Contribution T_i = C_F ω_h² (ω_i/ω_h)^(2 + e), ω_h the hover speed: at hover the believed thrust."""
+    hover = scale(vehicle).hover_speed_rad_s
+
+    def contribution(motion, own, values):
+        ratio = np.maximum(motion.rotor_speed, 0.0) / hover
+        square = own.thrust_coefficients_n_s2() * hover**2
+        return lift_at_hubs(square * (ratio ** (2.0 + values[0]) - ratio**2), own)
+
+    return contribution
+
+
+def reading_forms(instrument):
+    """The forms of a flight and, as a stand goes from rest to full speed, a power of the speed."""
+    if instrument.bench:
+        return ()
+    excess = Parameter(
+        "e",
+        "1",
+        -1.5,
+        1.5,
+        nonlinear=True,
+        starts=(-0.2, -0.05, 0.05, 0.2),
+        meaning="exponent of the speed beyond two",
+        negligible=0.01,
+    )
+    vehicle = instrument.vehicle
+    power = Form(
+        "power of the speed",
+        "T_i = C_F ω_h² (ω_i/ω_h)^(2+e), ω_h the hover speed",
+        (excess,),
+        power_of_speed(vehicle),
+        ("rotor_speed",),
+    )
+    return tuple(on_stand(form) for form in (*forms(vehicle), power))
+
+
 EFFECT = Effect(
     id="thrust_curve",
     name="a thrust curve that is not a pure square",
     sentence="thrust is off by an amount that depends on rotor speed alone",
     forms=forms,
+    reading_forms=reading_forms,
     source="Bitcraze and Förster (ETH 2015), thrust fits of the Crazyflie; Leishman, ch. 2; catalogue F3",
     sign="positive adds thrust (along −z of the body) to every rotor",
     validity=("within the range of rotor speeds flown; a wide range tells the terms apart, a narrow one does not"),

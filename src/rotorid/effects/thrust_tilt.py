@@ -3,6 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs, rotor_thrusts
+from rotorid.effects.loading import on_stand
 
 
 def _forces(motion, vehicle, tilt_x, tilt_y):
@@ -64,11 +65,39 @@ def forms(vehicle):
     )
 
 
+def each_its_own(motion, vehicle, values):
+    """F_i += T_i (ε_x,i, ε_y,i, 0) at each hub, torques leaning with their axes; values (2k,): x of each, then y."""
+    tilt_x, tilt_y = np.split(np.asarray(values, float), 2)
+    parts = [
+        _tilted(motion, vehicle, tilt_x[k], tilt_y[k], np.eye(vehicle.rotor_count)[k])
+        for k in range(vehicle.rotor_count)
+    ]
+    return Contribution(force=sum(p.force for p in parts), moment=sum(p.moment for p in parts))
+
+
+def reading_forms(instrument):
+    """The forms of a flight and, as a stand drives rotors one by one, each rotor leaning its own way."""
+    if instrument.bench:
+        return ()
+    vehicle, count = instrument.vehicle, instrument.vehicle.rotor_count
+    found = [form for form in forms(vehicle) if count >= form.minimum_rotors]
+    if count > 1:
+        tilts = tuple(
+            Parameter(f"eps_{a}{k + 1}", "rad", -0.5, 0.5, meaning=f"tilt of rotor {k + 1} along {a}")
+            for a in "xy"
+            for k in range(count)
+        )
+        text = "F_i = T_i (ε_x,i, ε_y,i, −1)"
+        found.append(Form("each rotor its own way", text, tilts, each_its_own, ("rotor_speed",)))
+    return tuple(on_stand(form) for form in found)
+
+
 EFFECT = Effect(
     id="thrust_tilt",
     name="a tilted thrust axis",
     sentence="a sideways force proportional to thrust",
     forms=forms,
+    reading_forms=reading_forms,
     source="rigid-body mechanics, small angles; catalogue F16",
     sign="positive ε_x pushes forward, positive ε_y to the right",
     validity="angles below about 0.3 rad (loss of lift of second order left out), constant",

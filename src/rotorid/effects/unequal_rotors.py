@@ -1,10 +1,9 @@
 """Rotors that are not alike: thrust or torque coefficients differ between them."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
+from rotorid.effects.loading import on_stand
 
 
 def _thrust(motion, vehicle, weights):
@@ -89,9 +88,6 @@ def reading_forms(instrument):
     if instrument.bench:
         return ()
     vehicle = instrument.vehicle
-
-    def on_stand(form):
-        return replace(form, contribution=lambda loading, own, values: form.contribution(loading.motion, own, values))
 
     found = [*forms(vehicle)]
     count = vehicle.rotor_count

@@ -48,6 +48,24 @@ def of_all_rotors(largest_n):
     return contribution
 
 
+def by_power(largest_n):
+    """Contribution T_i = C_F ω_i² (1 − c LP_τ((ΣT/T_max)^(n/2))), T_max the largest total thrust, N.
+
+    Air driven round a room goes as the speed that the rotors give it (n = 1) or as its momentum (n = 2): between the
+    two lie rooms of any size.
+    """
+
+    def contribution(loading, vehicle, values):
+        share, tau_s, power = values
+        total = (vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2).sum(axis=1, keepdims=True)
+        late = followed((total / largest_n) ** (power / 2.0), tau_s, loading.dt_s)
+        return Contribution(
+            reading=thrust_part(np.broadcast_to(-share * late, (loading.size, 1)), loading, vehicle)
+        )
+
+    return contribution
+
+
 def by_distance(loading, vehicle, values):
     """T_i = (1 + c (R/d)²) C_F ω_i², d the distance to the wall."""
     ratio = (rotor_radius_m(vehicle) / np.maximum(loading.distance, 1e-3)) ** 2
@@ -69,6 +87,10 @@ def reading_forms(instrument):
         text = "T = C_F ω² (1 − c_T (ΣT after a lag of τ)/T_max)"
         together = of_all_rotors(max(instrument.largest[2], 1e-6))
         forms.append(Form("recirculation of all rotors' air", text, (largest, tau), together, ("rotor_speed",)))
+        power = Parameter("n", "1", 0.3, 3.0, nonlinear=True, starts=(1.0,), meaning="power of the rotors' speed")
+        text = "T = C_F ω² (1 − c_T ((ΣT/T_max)^(n/2) after a lag of τ))"
+        by = by_power(max(instrument.largest[2], 1e-6))
+        forms.append(Form("recirculation by a power of the speed", text, (largest, tau, power), by, ("rotor_speed",)))
     if instrument.distance:
         forms.append(
             Form(

@@ -11,17 +11,17 @@ from scipy.signal import lfilter
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading, forms_of
-from rotorid.mismatch.instrument.columns import rows_of, term_columns
+from rotorid.mismatch.instrument.columns import OFFSET, rows_of, term_columns
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import (
     Regression,
     autoregression,
+    bounded,
     build,
     chi2_p,
     full_fit_residuals,
     limited_bias,
-    ridge_inverse,
 )
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import (
@@ -58,6 +58,9 @@ MOST_AT_ONCE = 6
 """More causes than this at once are not told apart by six channels: what they leave is stated as unexplained."""
 MOST_OF_A_FORM = 6
 """Parameters of a form from which it joins in the second round only."""
+MOST_OFFSET = 2.0
+"""Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
+what it lacks, divided by τ: an offset in time without end would be that filter itself."""
 LATER = ("thrust and torque apart",)
 """Forms of fewer parameters that could swallow several causes as well: they join in the second round, too."""
 
@@ -138,13 +141,15 @@ class ReadingSearch(Search):
             self.terms = every
 
     def worth(self, keys):
-        """As for flights, from the summed Gram matrix alone and without limits of believed values."""
+        """As for flights, from the summed Gram matrix alone; of believed values only the offset in time has a limit."""
         reg = self.regression
         cols = reg.columns(self.always + keys)
         gram, cross = self.total_gram[np.ix_(cols, cols)], self.total_cross[cols]
         share = reg.training.mean()
         bias = limited_bias(gram, share * reg.bias_gram[np.ix_(cols, cols)])
-        beta = ridge_inverse(gram - bias + np.diag(reg.precision[cols])) @ (cross - share * reg.bias_cross[cols])
+        normal = gram - bias + np.diag(reg.precision[cols])
+        limit = np.where(np.isin(cols, reg.columns(reg.keys_of("nuisance"))), reg.limit[cols], np.inf)
+        beta = bounded(normal, cross - share * reg.bias_cross[cols], limit)[0]
         gain = float(2 * cross @ beta - beta @ gram @ beta)
         return gain - COST_PER_PARAMETER * sum(self.terms[k].size for k in keys) - COST_PER_EFFECT * len(keys)
 
@@ -333,10 +338,18 @@ def reading_model(
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
+    hold_offset(regression, setup)
     sizes = size_function(rows, regression, noise, max(1, int(setup.rate_hz)) if not short else 1)
     search = ReadingSearch(regression, sizes, np.zeros(6))
     selection = search.run(active)
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
+
+
+def hold_offset(regression: Regression, setup: Setup) -> None:
+    """Limit the offset in time between load and reading, in place: what is more is a delay or a filter."""
+    for key in regression.keys_of("nuisance"):
+        if key == OFFSET:
+            regression.limit[regression.columns([key])] = MOST_OFFSET / setup.instrument.rate_hz
 
 
 def size_function(rows: list[Rows], regression: Regression, noise: np.ndarray, per: int):
@@ -529,6 +542,7 @@ def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, lo
     regression = build(
         rows, [*chosen, *slopes], model.regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz
     )
+    hold_offset(regression, setup)
     fit = regression.fit([t.key for t in (*chosen, *slopes)], jackknife=True)
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     at = {c: (b, s) for c, b, s in zip(fit.columns, fit.beta, sd, strict=True)}
