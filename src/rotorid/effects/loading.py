@@ -87,6 +87,8 @@ class Loading:
     """Mask of the samples to be compared, (n,); None for all."""
     speed_read: np.ndarray | None = None
     """Rotor speeds as they were read, (n, k), rad/s, where those of the motion are smoothed."""
+    voltage_read: np.ndarray | None = None
+    """Battery voltage as it was read, (n,), V, where that of the motion is what can be expected of it."""
     extra: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property

@@ -24,12 +24,6 @@ def recursion(frequency_hz, damping, dt_s):
 
 
 def ringing(loading, vehicle, values):
-    """y = H(s) F, so y − F = (H − 1) F."""
-    load = since_the_first(loading)
-    return Contribution(reading=resonance(load, values[0], values[1], loading.dt_s) - load)
-
-
-def ringing_in_part(loading, vehicle, values):
     """y = F + p (H(s) − 1) F: of a structure's modes one rings in the band, and bends under a part p of the load."""
     load = since_the_first(loading)
     return Contribution(reading=values[2] * (resonance(load, values[0], values[1], loading.dt_s) - load))
@@ -46,12 +40,8 @@ def reading_forms(instrument):
     damping = Parameter("zeta", "1", 0.001, 0.6, nonlinear=True, starts=(0.05,), meaning="damping ratio")
     part = Parameter("p", "1", 0.0, 3.0, nonlinear=True, starts=(1.0,), meaning="part of the load that it bends under")
     return (
-        Form("second order", "y = f_n² F / (f_n² − f² + 2 i ζ f_n f)", (frequency, damping), ringing),
         Form(
-            "second order, in part",
-            "y = F + p (H − 1) F, H = f_n² / (f_n² − f² + 2 i ζ f_n f)",
-            (frequency, damping, part),
-            ringing_in_part,
+            "second order", "y = F + p (H − 1) F, H = f_n² / (f_n² − f² + 2 i ζ f_n f)", (frequency, damping, part), ringing
         ),
     )
 
@@ -65,7 +55,7 @@ EFFECT = Effect(
     source="catalogue B8",
     sign="f_n and ζ are positive; no steady reading changes, a step overshoots by exp(−π ζ/√(1 − ζ²))",
     validity=(
-        "one linear mode alike on all channels, from rest, below 0.4 of the recording's rate; further modes "
+        "one linear mode with the same part p on all channels, from rest, below 0.4 of the recording's rate; further modes "
         "and their coupling are left out"
     ),
     excited_by=("load_change",),

@@ -18,6 +18,8 @@ from rotorid.mismatch.motion import Segment
 
 SLOW_S = 5.0
 """Length of the mean that is taken for slow."""
+MEMORY_S, MOST_MEMORY = 1.0, 0.2
+"""Noise has forgotten itself after so long: means over it hold less than this share of its power."""
 RELAXATION_S = (0.0, 0.03, 0.1, 0.3, 1.0)
 """Time constants with which the voltage may follow the load."""
 
@@ -26,18 +28,41 @@ def without_noise(segments: list[Segment]) -> list[Segment]:
     """Segments with the expected voltage in place of the reading; as they are where voltage or command is missing."""
     if not segments or any(s.motion.voltage is None or s.command is None for s in segments):
         return segments
+    expected = expected_voltages(
+        [s.motion.voltage for s in segments], [s.command for s in segments], [s.dt_s for s in segments]
+    )
+    return [replace(s, motion=replace(s.motion, voltage=v)) for s, v in zip(segments, expected, strict=True)]
+
+
+def expected_voltages(
+    voltages: list[np.ndarray], commands: list[np.ndarray], steps_s: list[float]
+) -> list[np.ndarray]:
+    """What can be expected of voltages (n,), V, read in stretches of even steps with commanded rotor speeds (n, k)."""
     slow, quick, loads = [], [], []
-    for s in segments:
-        size = min(s.motion.size - 1, int(SLOW_S * s.rate_hz)) | 1
-        slow.append(running_mean(s.motion.voltage, size))
-        quick.append(s.motion.voltage - slow[-1])
-        columns = relaxed((s.command**3).sum(axis=1), s.dt_s)
+    for voltage, command, dt_s in zip(voltages, commands, steps_s, strict=True):
+        size = min(len(voltage) - 1, int(SLOW_S / dt_s)) | 1
+        slow.append(running_mean(voltage, size))
+        quick.append(voltage - slow[-1])
+        columns = relaxed((command**3).sum(axis=1), dt_s)
         loads.append(columns - np.stack([running_mean(c, size) for c in columns.T], axis=1))
     all_loads = np.concatenate(loads)
     scale = np.maximum(all_loads.std(axis=0), 1e-300)
     drop, *_ = np.linalg.lstsq(all_loads / scale, np.concatenate(quick), rcond=1e-6)
-    expected = [a + (b / scale) @ drop for a, b in zip(slow, loads, strict=True)]
-    return [replace(s, motion=replace(s.motion, voltage=v)) for s, v in zip(segments, expected, strict=True)]
+    return [a + (b / scale) @ drop for a, b in zip(slow, loads, strict=True)]
+
+
+def is_noise(rests: list[np.ndarray], steps_s: list[float]) -> bool:
+    """Whether what was taken off voltages (n,) is a voltmeter's noise: means over MEMORY_S of it are near nothing.
+
+    A supply that is switched over in steps is neither slow nor does it follow the load; it stays as it was read.
+    """
+    power, kept = 0.0, 0.0
+    for rest, dt_s in zip(rests, steps_s, strict=True):
+        size = max(int(MEMORY_S / dt_s), 1)
+        count = len(rest) // size
+        power += float(rest[: count * size] @ rest[: count * size]) / size
+        kept += float(np.sum(rest[: count * size].reshape(count, size).mean(axis=1) ** 2))
+    return kept < MOST_MEMORY * power
 
 
 def relaxed(load: np.ndarray, dt_s: float) -> np.ndarray:

@@ -74,8 +74,9 @@ def is_chain(entry: dict) -> bool:
 
 
 def full_voltage_of(loadings: tuple[Loading, ...]) -> float | None:
-    """Largest battery voltage of a set, V."""
-    known = [float(np.max(x.motion.voltage)) for x in loadings if x.motion.voltage is not None]
+    """Largest battery voltage that was read in a set, V."""
+    read = [x.motion.voltage if x.voltage_read is None else x.voltage_read for x in loadings]
+    known = [float(np.max(v)) for v in read if v is not None]
     return max(known, default=None)
 
 

@@ -19,6 +19,7 @@ from rotorid.mismatch.instrument.settling import settling_s, without_settling
 from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
 from rotorid.mismatch.prepare import split_runs
 from rotorid.mismatch.rows import baseline_wrench
+from rotorid.mismatch.voltmeter import SLOW_S, expected_voltages, is_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
@@ -228,6 +229,27 @@ def noised(loading: Loading) -> Loading:
     return replace(loading, motion=with_speed(loading.motion, read + noise_of(read, 1.0 / loading.dt_s) * draws))
 
 
+def without_voltmeter_noise(loadings: list[Loading]) -> list[Loading]:
+    """The loadings with the expected voltage in place of the reading, where what that takes off is noise.
+
+    Through the sag the noise of a voltmeter is a noise of the rotors' speed: a lag that nothing is late by would take
+    it out, and be found for that.
+    """
+    read = [x.motion.voltage for x in loadings]
+    if any(v is None or x.command is None or x.size * x.dt_s < SLOW_S for v, x in zip(read, loadings, strict=True)):
+        return loadings
+    if 1 / loadings[0].dt_s < STEADY_HZ:
+        return loadings
+    steps = [x.dt_s for x in loadings]
+    expected = expected_voltages(read, [x.command for x in loadings], steps)
+    if not is_noise([a - b for a, b in zip(read, expected, strict=True)], steps):
+        return loadings
+    return [
+        replace(x, motion=replace(x.motion, voltage=v), voltage_read=x.motion.voltage)
+        for x, v in zip(loadings, expected, strict=True)
+    ]
+
+
 def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
     """The motion with these rotor speeds (n, k), rad/s, and their derivative.
 
@@ -308,7 +330,8 @@ def set_up(recordings: RecordingSet) -> Setup:
         loaded_by(x, vehicle) for run in recordings.runs for x in stretches_of(run, vehicle, channels, dt_s, full)
     ]
     noisier = None
-    if vehicle.kind == "stand":
+    if vehicle.kind == "stand" and loadings:
+        loadings = without_voltmeter_noise(loadings)
         calm = [loaded_by(smoothed(x), vehicle) for x in loadings]
         if quieter(loadings, calm) is calm:
             noisier = tuple(distanced(loaded_by(smoothed(noised(x)), vehicle), recordings) for x in loadings)
