@@ -66,4 +66,5 @@ EFFECT = Effect(
     confusers=("delay",),
     separating_manoeuvre="tap the frame sharply at the start and at the end of a long run",
     kind="sensor",
+    exact=True,
 )

@@ -74,4 +74,5 @@ EFFECT = Effect(
     reading_forms=reading_forms,
     confusers=("unequal_rotors", "thrust_tilt"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets with rotor speeds recorded",
+    exact=True,
 )

@@ -155,6 +155,8 @@ class Form:
     (`height`: far from the ground). `always` for a form that is there in any flight. Empty takes the effect's."""
     on_loading: bool = False
     """Whether the contribution takes a `Loading` (an instrument's) in place of a `Motion`."""
+    settles: tuple[str, ...] = ()
+    """Believed values (`thrust` …) that the form's own nonlinear parameters say again: held while those are fitted."""
     of_reading: tuple[int, ...] = ()
     """Linear parameters s of Ω_m = (1 + s) Ω for which recordings give the reading Ω_m alone: a fit to it is of
     s/(1 + s)."""
@@ -259,6 +261,9 @@ class Effect:
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
+    exact: bool = False
+    """Whether its equation is geometry or a definition and can have no other form; else what it leaves of a reading
+    may be its form."""
     speed_forms: tuple[SpeedForm, ...] = ()
     """Forms that act between command and rotor speed."""
     set_forms: Callable[[Vehicle], tuple[SetForm, ...]] = lambda vehicle: ()

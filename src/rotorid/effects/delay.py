@@ -88,4 +88,5 @@ EFFECT = Effect(
     confusers=("motor_lag", "clock_skew"),
     separating_manoeuvre="excite collective and attitude up to 8 Hz",
     kind="sensor",
+    exact=True,
 )

@@ -80,4 +80,5 @@ EFFECT = Effect(
     confusers=("thrust_tilt", "crosstalk", "tare_offset"),
     separating_manoeuvre="record the weight with the motors off at 0, 15 and 30 degrees",
     kind="sensor",
+    exact=True,
 )

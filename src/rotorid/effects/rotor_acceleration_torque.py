@@ -36,4 +36,5 @@ EFFECT = Effect(
     excited_by=("rotor_acceleration",),
     confusers=("motor_lag", "delay"),
     separating_manoeuvre="excite yaw on both sides of 1 Hz",
+    exact=True,
 )

@@ -56,4 +56,5 @@ EFFECT = Effect(
     confusers=("com_offset", "unequal_rotors", "crosstalk"),
     separating_manoeuvre="hang known weights at known offsets from the sensor",
     kind="sensor",
+    exact=True,
 )

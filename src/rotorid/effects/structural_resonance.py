@@ -41,7 +41,10 @@ def reading_forms(instrument):
     part = Parameter("p", "1", 0.0, 3.0, nonlinear=True, starts=(1.0,), meaning="part of the load that it bends under")
     return (
         Form(
-            "second order", "y = F + p (H − 1) F, H = f_n² / (f_n² − f² + 2 i ζ f_n f)", (frequency, damping, part), ringing
+            "second order",
+            "y = F + p (H − 1) F, H = f_n² / (f_n² − f² + 2 i ζ f_n f)",
+            (frequency, damping, part),
+            ringing,
         ),
     )
 
@@ -55,8 +58,8 @@ EFFECT = Effect(
     source="catalogue B8",
     sign="f_n and ζ are positive; no steady reading changes, a step overshoots by exp(−π ζ/√(1 − ζ²))",
     validity=(
-        "one linear mode with the same part p on all channels, from rest, below 0.4 of the recording's rate; further modes "
-        "and their coupling are left out"
+        "one linear mode with the same part p on all channels, from rest, below 0.4 of the recording's rate; "
+        "further modes and their coupling are left out"
     ),
     excited_by=("load_change",),
     confusers=("motor_lag", "amplifier_filter"),

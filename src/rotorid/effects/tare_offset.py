@@ -56,4 +56,5 @@ EFFECT = Effect(
     confusers=("thrust_curve", "zero_drift", "com_offset"),
     separating_manoeuvre="record a few seconds without a load before and after, at every attitude of the mount",
     kind="sensor",
+    exact=True,
 )

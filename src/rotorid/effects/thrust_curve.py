@@ -91,13 +91,17 @@ def forms(vehicle):
 
 
 def power_of_speed(vehicle):
-    """Contribution T_i = C_F ω_h² (ω_i/ω_h)^(2 + e), ω_h the hover speed: at hover the believed thrust."""
+    """Contribution T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2 + e), ω_h the hover speed.
+
+    A coefficient of another power has no value to believe: where the two curves cross is as free as the power.
+    """
     hover = scale(vehicle).hover_speed_rad_s
 
     def contribution(motion, own, values):
+        excess, more = values
         ratio = np.maximum(motion.rotor_speed, 0.0) / hover
         square = own.thrust_coefficients_n_s2() * hover**2
-        return lift_at_hubs(square * (ratio ** (2.0 + values[0]) - ratio**2), own)
+        return lift_at_hubs(square * ((1.0 + more) * ratio ** (2.0 + excess) - ratio**2), own)
 
     return contribution
 
@@ -106,23 +110,18 @@ def reading_forms(instrument):
     """The forms of a flight and, as a stand goes from rest to full speed, a power of the speed."""
     if instrument.bench:
         return ()
+    vehicle, starts = instrument.vehicle, (-0.2, -0.05, 0.05, 0.2)
     excess = Parameter(
-        "e",
-        "1",
-        -1.5,
-        1.5,
-        nonlinear=True,
-        starts=(-0.2, -0.05, 0.05, 0.2),
-        meaning="exponent of the speed beyond two",
-        negligible=0.01,
+        "e", "1", -1.5, 1.5, nonlinear=True, starts=starts, meaning="exponent of the speed beyond two", negligible=0.01
     )
-    vehicle = instrument.vehicle
+    more = Parameter("d", "1", -0.6, 0.6, nonlinear=True, starts=(0.0,), meaning="further thrust at hover speed")
     power = Form(
         "power of the speed",
-        "T_i = C_F ω_h² (ω_i/ω_h)^(2+e), ω_h the hover speed",
-        (excess,),
+        "T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2+e), ω_h the hover speed",
+        (excess, more),
         power_of_speed(vehicle),
         ("rotor_speed",),
+        settles=("thrust",),
     )
     return tuple(on_stand(form) for form in (*forms(vehicle), power))
 

@@ -59,9 +59,7 @@ def by_power(largest_n):
         share, tau_s, power = values
         total = (vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2).sum(axis=1, keepdims=True)
         late = followed((total / largest_n) ** (power / 2.0), tau_s, loading.dt_s)
-        return Contribution(
-            reading=thrust_part(np.broadcast_to(-share * late, (loading.size, 1)), loading, vehicle)
-        )
+        return Contribution(reading=thrust_part(np.broadcast_to(-share * late, (loading.size, 1)), loading, vehicle))
 
     return contribution
 

@@ -34,9 +34,7 @@ def without_noise(segments: list[Segment]) -> list[Segment]:
     return [replace(s, motion=replace(s.motion, voltage=v)) for s, v in zip(segments, expected, strict=True)]
 
 
-def expected_voltages(
-    voltages: list[np.ndarray], commands: list[np.ndarray], steps_s: list[float]
-) -> list[np.ndarray]:
+def expected_voltages(voltages: list[np.ndarray], commands: list[np.ndarray], steps_s: list[float]) -> list[np.ndarray]:
     """What can be expected of voltages (n,), V, read in stretches of even steps with commanded rotor speeds (n, k)."""
     slow, quick, loads = [], [], []
     for voltage, command, dt_s in zip(voltages, commands, steps_s, strict=True):

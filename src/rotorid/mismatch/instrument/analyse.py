@@ -17,6 +17,7 @@ from rotorid.mismatch.decide import WIDEST_TRUST, wrong_values
 from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
+from rotorid.mismatch.instrument.company import without_company
 from rotorid.mismatch.instrument.decide import findings_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
@@ -43,11 +44,12 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     measured = all(x.measured for x in setup.loadings)
     chain = find_chain(setup)
     model = fitted_model(setup, terms, loadings=None if chain is None or measured else moved(setup, chain))
+    model, company = without_company(model)
     if chain is not None and not measured and model.selection.active:
         # What was found at the reading changes what the commands must explain: once more with it known.
         others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
         chain = find_chain(setup, others)
-        model = fitted_model(setup, terms, model.selection.active, moved(setup, chain))
+        model, company = without_company(fitted_model(setup, terms, model.selection.active, moved(setup, chain)))
     if chain is None:
         reasons.update({k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in SPEED_IDS})
     else:
@@ -61,7 +63,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         return wrong_values(model.regression, model.search, selection, None, size, moving=False)
 
     model, values = without_needless(model, values_of)
-    found = findings_of(model)
+    found = findings_of(model, company)
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:
@@ -74,7 +76,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     traces, before, after = make_traces(setup, model, plain, values)
     next_step, separates, sigma = next_experiment(findings, model)
     p_before, p_after, depends = dependence(model, before, after)
-    share, channels, description = leftover(model, before, after, p_after, depends)
+    share, channels, description = leftover(model, before, after, p_after, depends, approximate_forms(model, company))
     if chain is not None and measured:
         traces += speed_traces(setup, chain)
         lost = speed_left(setup, chain, traces)
@@ -113,6 +115,12 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         loadings=model.loadings,
         notes=(*remarks, *notes_of(setup)),
     )
+
+
+def approximate_forms(model: ReadingModel, company) -> list[str]:
+    """Names of effects at work whose form leaves something that others only made up for."""
+    keys = dict.fromkeys(c.stronger for c in company if c.stronger in model.selection.active)
+    return [catalogue()[model.search.terms[k].effect].name for k in keys]
 
 
 def speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> float:

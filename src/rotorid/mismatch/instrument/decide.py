@@ -11,6 +11,7 @@ from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import estimates, held_out_gain
 from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.instrument.company import Companion
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     active_values,
@@ -35,8 +36,12 @@ def main_channels(model: ReadingModel, key: str) -> list[int]:
     return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]
 
 
-def findings_of(model: ReadingModel) -> list[Finding]:
-    """A finding for every term that entered, and for those that looked like something and did not survive."""
+def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> list[Finding]:
+    """A finding for every term that entered, and for those that looked like something and did not survive.
+
+    `company` are effects that only made up for the form of a term: one that in any form does as well as it is an
+    alternative to it.
+    """
     effects, search, selection = catalogue(), model.search, model.selection
     rule = in_training(model.setup)
     held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
@@ -56,7 +61,8 @@ def findings_of(model: ReadingModel) -> list[Finding]:
         else:
             parameters = estimates(model.regression, selection.fit, search, key)
         parameters = wider(parameters, doubt_of_form(model, key, model.loadings))
-        alternatives = alternatives_of(model, key)
+        either = [c.effect for c in company if c.stronger == key and c.either]
+        alternatives = [*alternatives_of(model, key), *either]
         out.append(
             Finding(
                 id=term.effect,
@@ -72,7 +78,10 @@ def findings_of(model: ReadingModel) -> list[Finding]:
                 gain=held_out_gain(contributions, with_it, without, channels[0], held),
             )
         )
+    named = {a for f in out for a in f.alternatives}
     for effect_id, reason in selection.not_established.items():
+        if effect_id in named:
+            continue
         name = effects[effect_id].name
         out.append(Finding(id=effect_id, status="not_established", sentence=f"{name} did not hold: {reason}"))
     return out

@@ -70,8 +70,8 @@ class ReadingSearch(Search):
 
     rich = False
 
-    def __init__(self, regression: Regression, sizes_of, known_sizes=None):
-        super().__init__(regression, sizes_of, known_sizes)
+    def __init__(self, regression: Regression, sizes_of, known_sizes=None, joint_sizes=None):
+        super().__init__(regression, sizes_of, known_sizes, joint_sizes=joint_sizes)
         self.total_gram = regression.gram[regression.training].sum(axis=0)
         self.total_cross = regression.cross[regression.training].sum(axis=0)
 
@@ -339,8 +339,9 @@ def reading_model(
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
     hold_offset(regression, setup)
-    sizes = size_function(rows, regression, noise, max(1, int(setup.rate_hz)) if not short else 1)
-    search = ReadingSearch(regression, sizes, np.zeros(6))
+    joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1)
+    sizes = size_function(regression, joint_sizes)
+    search = ReadingSearch(regression, sizes, np.zeros(6), joint_sizes=joint_sizes)
     selection = search.run(active)
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
 
@@ -352,24 +353,27 @@ def hold_offset(regression: Regression, setup: Setup) -> None:
             regression.limit[regression.columns([key])] = MOST_OFFSET / setup.instrument.rate_hz
 
 
-def size_function(rows: list[Rows], regression: Regression, noise: np.ndarray, per: int):
-    """Size of a term by channel: its rms over the strongest tenth of the seconds, in units of the noise, (6,)."""
+def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int):
+    """Size of columns with coefficients: rms over the strongest tenth of the seconds, in units of the noise, (6,)."""
     loud = np.where(np.isfinite(noise), noise, np.inf)
-    margin = {t.key: TARE_MARGIN if t.effect == "tare_offset" else 1.0 for t in regression.terms}
-    margin |= {t.key: 2 * TARE_MARGIN for t in regression.terms if t.key == "tare_offset/own in each run"}
 
-    def sizes(key: str, beta: np.ndarray) -> np.ndarray:
-        cols = regression.columns([key])
+    def sizes(cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
         energies = []
         for r in rows:
             square = (r.x[:, :, cols] @ beta) ** 2
             count = max(1, len(square) // per)
             whole = len(square) // count * count
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
-        strongest = np.quantile(np.concatenate(energies), STRONGEST, axis=0)
-        return np.sqrt(strongest) / loud / margin[key]
+        return np.sqrt(np.quantile(np.concatenate(energies), STRONGEST, axis=0)) / loud
 
     return sizes
+
+
+def size_function(regression: Regression, of_columns):
+    """Size of a term by channel, in units of the noise, (6,), less for a tare by what its margin is."""
+    margin = {t.key: TARE_MARGIN if t.effect == "tare_offset" else 1.0 for t in regression.terms}
+    margin |= {t.key: 2 * TARE_MARGIN for t in regression.terms if t.key == "tare_offset/own in each run"}
+    return lambda key, beta: of_columns(regression.columns([key]), beta) / margin[key]
 
 
 def whitened(model: ReadingModel, values: list[np.ndarray]) -> list[np.ndarray]:
@@ -395,7 +399,9 @@ def refined(model: ReadingModel) -> list[Term]:
         index[i] = pieces_of(stretches[k], setup.average)[i - owner.index(k)]
     channels = list(setup.instrument.channels)
     timing = [k for k in search.always if search.terms[k].kind == "nuisance"]
-    fixed = [k for k in (*search.always, *model.selection.active) if k not in moving and k not in timing]
+    settled = settled_by([search.terms[k] for k in moving])
+    known = (*moving, *timing, *settled)
+    fixed = [k for k in (*search.always, *model.selection.active) if k not in known]
     reg = model.regression
 
     def white(values):
@@ -408,7 +414,8 @@ def refined(model: ReadingModel) -> list[Term]:
     start = np.array([search.terms[k].values[i] for k, i in spans])
     limits = [search.terms[k].form.parameters[i] for k, i in spans]
     low, high = np.array([p.low for p in limits]), np.array([p.high for p in limits])
-    scale = np.maximum(np.abs(start), 1e-9)
+    span = np.where(np.isfinite(high - low), high - low, 0.0)
+    scale = np.where(start == 0.0, 0.02 * span, np.maximum(np.abs(start), 1e-9))
 
     def with_values(theta):
         out = {k: np.array(search.terms[k].values, float) for k in moving}
@@ -462,6 +469,11 @@ def refined(model: ReadingModel) -> list[Term]:
     )
     best = with_values(found.x)
     return [best.get(t.key, t) for t in model.terms]
+
+
+def settled_by(terms: list[Term]) -> set[str]:
+    """Believed values that parameters of some terms at work say again."""
+    return {value for t in terms for value in t.form.settles}
 
 
 def fitted_model(setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None) -> ReadingModel:
@@ -527,6 +539,7 @@ def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, lo
         for t in model.terms
     ]
     chosen = [t for t in at_work if t.kind != "effect" or t.key in model.selection.active]
+    chosen = [t for t in chosen if t.key not in settled_by([own])]
     slopes = [
         Term(f"{key}/slope{i}", "slope", term.effect, form, tuple(values), 1, (np.inf,), slope_of=i)
         for i in form.nonlinear

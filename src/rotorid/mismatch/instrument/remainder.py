@@ -79,11 +79,11 @@ def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.nda
     return first, last, list(depends)
 
 
-def leftover(model: ReadingModel, before, after, p_after, depends):
+def leftover(model: ReadingModel, before, after, p_after, depends, approximate=()):
     """Share of the mismatch that stays unexplained, its channels, and a plain description.
 
     A ridge regression on all inputs and their products stands for "whatever could be explained"; it is fitted on the
-    training runs and judged on the held-out ones.
+    training runs and judged on the held-out ones. `approximate` names effects whose form is known to leave something.
     """
     _, inputs = _inputs(model)
     split = model.setup.split
@@ -109,7 +109,10 @@ def leftover(model: ReadingModel, before, after, p_after, depends):
     if not channels or total <= 0:
         return 0.0, (), ""
     named = " and ".join(d.replace("_", " ") for d in depends) or "the load"
-    text = f"{', '.join(channels)} still depend on {named}; the cause is not in the catalogue"
+    cause = "the cause is not in the catalogue"
+    if approximate:
+        cause = f"the form of {' and of '.join(approximate)} is only approximate"
+    text = f"{', '.join(channels)} still depend on {named}; {cause}"
     return float(min(1.0, left_over / total)), tuple(channels), text
 
 

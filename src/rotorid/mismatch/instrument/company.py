@@ -1,0 +1,218 @@
+"""Effects that only explain what the form of a stronger one leaves.
+
+A law of nature has one form, an effect of the catalogue has many: another laboratory's thrust curve, cable or room is
+never quite that of any equation written down before. What a strong effect's form leaves follows the same inputs, is far
+above the noise, and something else in the catalogue will fit it. So whatever was found beside a stronger effect must
+also be needed where that one is free to have any smooth form: its contribution times hat functions of the load's size,
+of its own size and of the tilt, each rotor's share of it apart, fading within a run, and a little late. What is not
+needed then is no effect of its own but the stronger one's form being only approximate. Effects whose equation is
+geometry or a definition (`Effect.exact`) have that form and no other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.loading import Loading
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, hold_offset, in_training
+from rotorid.mismatch.instrument.setup import averaged, pieces_of
+from rotorid.mismatch.instrument.values import selection_of
+from rotorid.mismatch.regression import Regression, build
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.select import KEEP_P, SHARE_OF_LARGEST
+
+KNOTS = (0.0, 1 / 3, 2 / 3, 1.0)
+"""Where the hat functions stand, as shares of the largest."""
+WEAKER = 0.5
+"""An effect is the weaker one of two where it adds less than this share of what the other explains by itself."""
+OF_ITS_OWN = 0.5
+"""Share of what an effect explains that must remain beside the stronger one's free form."""
+FREE = "free form"
+
+
+@dataclass(frozen=True)
+class Companion:
+    """An effect that was taken out, and the stronger one whose form it made up for."""
+
+    key: str
+    effect: str
+    stronger: str
+    """Key of the stronger one's term."""
+    either: bool
+    """Whether the stronger one is in turn not needed beside a free form of this: then it may be the true one."""
+
+
+def own_inputs(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
+    """What the gain of an effect may depend on smoothly, (n,) each between 0 and 1, on a stretch's samples."""
+    setup, out = model.setup, {}
+    for name, axes in (("force", [0, 1, 2]), ("moment", [3, 4, 5])):
+        largest = float(np.linalg.norm([setup.instrument.largest[c] for c in axes]))
+        if any(c in setup.instrument.loaded for c in axes) and largest > 0:
+            out[name] = np.minimum(np.linalg.norm(loading.load[:, axes], axis=1) / largest, 1.0)
+    if loading.attitude is not None and setup.instrument.tilts:
+        tilt = np.hypot(*(np.sin(a) for a in loading.attitude))
+        largest = max(float(np.hypot(*(np.sin(a) for a in x.attitude)).max()) for x in model.loadings)
+        out["tilt"] = tilt / max(largest, 1e-9)
+    return out
+
+
+def rotor_shares(loading: Loading) -> np.ndarray:
+    """Share of every rotor but the last in the thrust, (n, k − 1)."""
+    speed = loading.motion.rotor_speed
+    if speed is None or speed.shape[1] < 2:
+        return np.zeros((loading.size, 0))
+    return (speed**2 / np.maximum((speed**2).sum(axis=1, keepdims=True), 1.0))[:, :-1]
+
+
+def hats(values: np.ndarray) -> np.ndarray:
+    """Hat functions at KNOTS of values (n,) between 0 and 1, (n, 4): they add up to one."""
+    return np.stack([np.interp(values, KNOTS, row) for row in np.eye(len(KNOTS))], axis=1)
+
+
+def gains_of(model: ReadingModel) -> list[np.ndarray]:
+    """By which an effect's contribution may be multiplied, (n, m) on the rows of every part."""
+    setup, out = model.setup, []
+    for x in model.loadings:
+        columns = [np.ones((x.size, 1)), (x.run_time_s / max(setup.instrument.run_s, 1e-9))[:, None], rotor_shares(x)]
+        columns += [hats(v)[:, 1:] for v in own_inputs(x, model).values()]
+        whole = averaged(np.concatenate(columns, axis=1), setup.average)
+        out += [whole[p] for p in pieces_of(x, setup.average)]
+    return out
+
+
+def contribution_of(model: ReadingModel, key: str, beta: np.ndarray) -> list[np.ndarray]:
+    """What a term adds to the rows of every part, (n, 6)."""
+    cols = model.regression.columns([key])
+    return [r.x[:, :, cols] @ beta for r in model.rows]
+
+
+def freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) -> list[np.ndarray]:
+    """Columns of a term's free form on the rows of every part, (n, 6, m), apart in each of the channels."""
+    parts, gains = contribution_of(model, key, beta), gains_of(model)
+    largest = np.maximum(np.max([np.abs(p).max(axis=0) for p in parts], axis=0), 1e-300)
+    out = []
+    for part, gain in zip(parts, gains, strict=True):
+        blocks = []
+        for c in channels:
+            own = part[:, c]
+            shapes = np.concatenate(
+                [
+                    own[:, None] * gain,
+                    own[:, None] * hats(np.abs(own) / largest[c])[:, 1:-1],
+                    np.gradient(own)[:, None],
+                ],
+                axis=1,
+            )
+            block = np.zeros((len(own), 6, shapes.shape[1]))
+            block[:, c] = shapes
+            blocks.append(block)
+        out.append(np.concatenate(blocks, axis=2))
+    return out
+
+
+def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regression:
+    """The regression of some terms with the columns of a free form, key FREE, beside them."""
+    regression, setup = model.regression, model.setup
+    kept = [t for t in regression.terms if t.key in keys or t.kind != "effect"]
+    cols = regression.columns([t.key for t in kept])
+    size = free[0].shape[2]
+    term = Term(FREE, "nuisance", size=size, prior_sd=(np.inf,) * size)
+    rows = [
+        Rows(r.run, r.time_s, r.y, np.concatenate([r.x[:, :, cols], f], axis=2))
+        for r, f in zip(model.rows, free, strict=True)
+    ]
+    per = block_length(setup, rows)
+    out = build(rows, [*kept, term], regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz)
+    hold_offset(out, setup)
+    return out
+
+
+def sizes(model: ReadingModel, active: list[str]) -> dict[str, np.ndarray]:
+    """Size of every term at work by channel, in units of the noise, (6,) each."""
+    fit, regression = model.regression.fit(model.search.always + active), model.regression
+    return {k: model.search.sizes_of(k, beta_of(fit, regression.columns([k]))) for k in active}
+
+
+def beta_of(fit, cols: np.ndarray) -> np.ndarray:
+    """Coefficients of columns in a fit."""
+    return fit.beta[[list(fit.columns).index(c) for c in cols]]
+
+
+def left_of(model: ReadingModel, weak: str, strong: str, active: list[str], channels: list[int]) -> float:
+    """Share of what `weak` explains that remains beside a free form of `strong`; 0 where it is not significant."""
+    always, fit = model.search.always, model.regression.fit(model.search.always + active)
+    free = freed(model, strong, beta_of(fit, model.regression.columns([strong])), channels)
+    small = beside(model, active, free)
+    rest = [k for k in active if k != weak]
+    with_it, without = small.fit([*always, FREE, *active]), small.fit([*always, FREE, *rest])
+    if small.wald(with_it, small.columns([weak]), int(small.training.sum())) > KEEP_P:
+        return 0.0
+    before = small.explained([*always, *active]) - small.explained([*always, *rest])
+    return float((with_it.gain - without.gain) / max(before, 1e-9))
+
+
+def stronger_ones(model: ReadingModel, key: str, active: list[str]) -> list[tuple[str, list[int]]]:
+    """Terms at work that by themselves explain far more than `key` adds to them, with the channels they share.
+
+    Not by the sizes in the fit: two that make up for each other's form are both large.
+    """
+    search, size = model.search, sizes(model, active)
+    explained, out = model.regression.explained, []
+    for other in active:
+        if other == key or catalogue()[search.terms[other].effect].exact:
+            continue
+        rest = [k for k in active if k not in (key, other)]
+        none, alone, weak, both = (
+            explained([*search.always, *rest, *some]) for some in ((), (other,), (key,), (other, key))
+        )
+        if alone < weak or both - alone > WEAKER * (alone - none):
+            continue
+        shared = [c for c in model.setup.instrument.channels if size[other][c] > size[key][c] * SHARE_OF_LARGEST]
+        if shared:
+            out.append((other, shared))
+    return out
+
+
+def without_company(model: ReadingModel) -> tuple[ReadingModel, tuple[Companion, ...]]:
+    """The model without effects that only make up for the form of a stronger one, and what they were."""
+    found: list[Companion] = []
+    while True:
+        active = model.selection.active
+        worst = None
+        for key in active:
+            for strong, channels in stronger_ones(model, key, active):
+                share = left_of(model, key, strong, active, channels)
+                if share < OF_ITS_OWN and (worst is None or share < worst[0]):
+                    worst = (share, key, strong)
+        if worst is None:
+            return model, tuple(found)
+        _, key, strong = worst
+        effect = model.search.terms[key].effect
+        selection = selection_of(model, [k for k in active if k != key])
+        name = catalogue()[model.search.terms[strong].effect].name
+        reason = f"it only explains what is left by {name}, whose form is approximate"
+        selection = replace(selection, not_established=selection.not_established | {effect: reason})
+        either = exchangeable(model, key, strong)
+        model = replace(model, selection=selection)
+        found.append(Companion(key, effect, strong, either))
+
+
+def exchangeable(model: ReadingModel, key: str, strong: str) -> bool:
+    """Whether a free form of `key` in the place of `strong` explains all but what any form is wrong by."""
+    search, regression = model.search, model.regression
+    rest = [k for k in model.selection.active if k not in (key, strong)]
+    alone = regression.fit([*search.always, *rest, key])
+    channels = list(model.setup.instrument.channels)
+    free = freed(model, key, beta_of(alone, regression.columns([key])), channels)
+    small = beside(model, [*rest, key, strong], free)
+    own = small.explained([*search.always, *rest, strong]) - small.explained([*search.always, *rest])
+    beyond = small.explained([*search.always, FREE, *rest, key, strong]) - small.explained(
+        [*search.always, FREE, *rest, key]
+    )
+    return beyond < SHARE_OF_LARGEST**2 * own
+
+
+__all__ = ["Companion", "without_company"]
