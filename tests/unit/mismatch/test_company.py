@@ -40,10 +40,13 @@ def test_a_power_of_the_speed_by_hand() -> None:
     loading = stand_loading(vehicle)
     hover = np.sqrt(0.65 * 9.81 / (4 * C_F))
     twice = still(loading, rotor_speed=np.full((loading.size, 4), 2 * hover))
-    found = form_reading(form_named("thrust_curve", "power of the speed", vehicle), (-0.1, 0.05), twice, vehicle)
+    form = form_named("thrust_curve", "power of the speed", vehicle)
+    found = form_reading(form, (-0.1, 0.05), twice, vehicle)
     assert found[0, 2] == pytest.approx(-4 * 1.594125 * (1.05 * 2**1.9 - 4.0))
     rest = still(loading, rotor_speed=np.zeros((loading.size, 4)))
-    assert not form_reading(form_named("thrust_curve", "power of the speed", vehicle), (-0.1, 0.05), rest, vehicle).any()
+    assert not form_reading(
+        form_named("thrust_curve", "power of the speed", vehicle), (-0.1, 0.05), rest, vehicle
+    ).any()
 
 
 def test_each_rotor_leans_its_own_way() -> None:

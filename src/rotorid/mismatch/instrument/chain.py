@@ -51,6 +51,8 @@ SHORT = 60
 ROUNDS = 2
 FINER = 4
 """Steps of a chain that takes time to one sample."""
+FAR = 0.05
+"""Share of a cost by which a fit is still above it after a few steps when it will not come down to it."""
 ALIKE = 12.0
 """Whitened squares within which another form explains as well."""
 
@@ -118,27 +120,39 @@ def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, f
     return out
 
 
-def applied(
-    loading: Loading, chain: Chain, values, full_speed: float, first_full: float, volts, holds: bool = False
-) -> np.ndarray:
+@dataclass(frozen=True)
+class Commanded:
+    """What a chain starts from: a stretch's command (n, k), rad/s, voltage, V, and time on the clock of the chain."""
+
+    command: np.ndarray
+    time_s: np.ndarray
+    voltage: np.ndarray | None
+    dt_s: float
+    """Between the samples of the recording."""
+    finer: int
+
+
+def commanded(loading: Loading, finer: int, holds: bool) -> Commanded:
+    """A stretch's command on a clock `finer` times faster: between samples it is smooth, or `holds` until the next."""
+    command = held(loading.command, finer) if holds else between(loading.command, finer)
+    voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
+    return Commanded(command, between(loading.time_s, finer), voltage, loading.dt_s, finer)
+
+
+def applied(start: Commanded, chain: Chain, values, full_speed: float, first_full: float, volts, holds: bool = False):
     """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed.
 
-    The chain runs on a clock FINER times faster. Between samples a command is smooth, and linear on that clock; or it
-    `holds` until the next sample. `values` are those of the forms, then what `unknown_courses` names.
+    `values` are those of the forms, then what `unknown_courses` names.
     """
-    finer = FINER if takes_time(chain) else 1
-    command = held(loading.command, finer) if holds else between(loading.command, finer)
-    time_s = between(loading.time_s, finer)
-    voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
-    speed = command * (full_speed / first_full)
+    speed = start.command * (full_speed / first_full)
     at = 0
     for _, form in chain:
-        path = SpeedPath(speed, time_s, full_speed, voltage, volts, holds)
+        path = SpeedPath(speed, start.time_s, full_speed, start.voltage, volts, holds)
         # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
         with np.errstate(invalid="ignore"):
             speed = np.nan_to_num(form.apply(path, np.asarray(values[at : at + len(form.parameters)])))
         at += len(form.parameters)
-    return moved_between_samples(speed, np.asarray(values[at:]), loading.dt_s, finer)
+    return moved_between_samples(speed, np.asarray(values[at:]), start.dt_s, start.finer)
 
 
 def held(values: np.ndarray, finer: int) -> np.ndarray:
@@ -190,18 +204,32 @@ class Problem:
         self.plain = np.median([x.size for x in self.fitted]) < SHORT or (self.measured and setup.steady_points)
         self.short = np.median([x.size for x in self.fitted]) < SHORT
         self.taps: list[np.ndarray] = []
+        self._starts: dict[tuple[int, int, bool], Commanded] = {}
+
+    @property
+    def accelerating(self) -> bool:
+        """Whether anything at work takes the rotors' acceleration."""
+        return any("rotor_acceleration" in form.requires for form, _ in self.others)
+
+    def start_of(self, loading: Loading, chain: Chain) -> Commanded:
+        """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
+        key = (id(loading), FINER if takes_time(chain) else 1, self.holds)
+        if key not in self._starts:
+            self._starts[key] = commanded(loading, key[1], self.holds)
+        return self._starts[key]
 
     def raw(self, chain: Chain, theta, loadings=None) -> list[np.ndarray]:
         """Measured minus modelled response of every stretch, (rows, channels or rotors), not whitened."""
         full, values = (theta[0], theta[1:]) if self.scaled else (self.first_full, theta)
         out = []
         for x in self.fitted if loadings is None else loadings:
-            speed = applied(x, chain, values, full, self.first_full, self.volts, self.holds)
+            speed = applied(self.start_of(x, chain), chain, values, full, self.first_full, self.volts, self.holds)
             if self.measured:
                 read = x.motion.rotor_speed if x.speed_read is None else x.speed_read
                 out.append(read - speed)
                 continue
-            moved = loaded_by(replace(x, motion=with_speed(x.motion, speed)), self.setup.vehicle)
+            motion = with_speed(x.motion, speed) if self.accelerating else replace(x.motion, rotor_speed=speed)
+            moved = loaded_by(replace(x, motion=motion), self.setup.vehicle)
             left = moved.reading - moved.load
             for form, given in self.others:
                 left = left - form_reading(form, given, moved, self.setup.vehicle)
@@ -281,6 +309,11 @@ class Problem:
             max_nfev=most,
         )
         return ChainFit(chain, found.x, float(2 * found.cost))
+
+    def fit_if_near(self, chain: Chain, start: np.ndarray, cost: float) -> ChainFit:
+        """As `fit`, but left after a few steps where these end far above a cost that is to be reached."""
+        quick = self.fit(chain, start, QUICK_FIT)
+        return self.fit(chain, quick.theta) if quick.cost < (1 + FAR) * cost + ALIKE else quick
 
     def covariance(self, fit: ChainFit) -> tuple[np.ndarray, int]:
         """Block-robust covariance of the parameters, and the number of blocks."""
@@ -641,7 +674,7 @@ def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]
         if pair[0] == key or pair[0] in taken or pair[0] in out or len(pair[1].parameters) > size + 1:
             continue
         chain = ordered((*rest, pair))
-        fit = problem.fit(chain, best_start(problem, chain, best, pair))
+        fit = problem.fit_if_near(chain, best_start(problem, chain, best, pair), best.cost)
         if fit.cost < best.cost + ALIKE:
             out.append(pair[0])
     out += [k for k in rest_in_other_forms(problem, best, rest, forms) if k not in out]
@@ -663,7 +696,7 @@ def rest_in_other_forms(problem: Problem, best: ChainFit, rest: Chain, forms) ->
             chain = ordered(tuple(pair if k == key else (k, f) for k, f in rest))
             if sum(len(f.parameters) for _, f in chain) > most:
                 continue
-            fit = problem.fit(chain, best_start(problem, chain, best, pair))
+            fit = problem.fit_if_near(chain, best_start(problem, chain, best, pair), best.cost)
             if fit.cost < best.cost + ALIKE:
                 out.append(key)
     return out
@@ -714,7 +747,9 @@ def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
     values = result.fit.values(problem.scaled)
     out = []
     for x in setup.loadings:
-        speed = applied(x, result.fit.chain, values, result.full_speed, problem.first_full, problem.volts, result.holds)
+        chain = result.fit.chain
+        start = commanded(x, FINER if takes_time(chain) else 1, result.holds)
+        speed = applied(start, chain, values, result.full_speed, problem.first_full, problem.volts, result.holds)
         command = x.command * (result.full_speed / problem.first_full)
         out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
     return tuple(out)
