@@ -52,5 +52,4 @@ EFFECT = Effect(
     confusers=("mount_tilt", "sensor_origin", "thrust_tilt"),
     separating_manoeuvre="put known weights on along one axis after the other",
     kind="sensor",
-    exact=True,
 )

@@ -90,6 +90,11 @@ def forms(vehicle):
     )
 
 
+def cubic_and_square(motion, vehicle, values):
+    """T_i += c_3 ω_i³ + Δc_2 ω_i²."""
+    return lift_at_hubs(values[0] * motion.rotor_speed**3 + values[1] * motion.rotor_speed**2, vehicle)
+
+
 def power_of_speed(vehicle):
     """Contribution T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2 + e), ω_h the hover speed.
 
@@ -123,7 +128,18 @@ def reading_forms(instrument):
         ("rotor_speed",),
         settles=("thrust",),
     )
-    return tuple(on_stand(form) for form in (*forms(vehicle), power))
+    plain = forms(vehicle)
+    cube = next(f.parameters for f in plain if f.name == "cubic term")
+    square = next(f.parameters[1:] for f in plain if f.name == "linear term and its own square")
+    cubic = Form(
+        "cubic term and its own square",
+        "T_i = (C_F + Δc_2) ω_i² + c_3 ω_i³",
+        cube + square,
+        cubic_and_square,
+        ("rotor_speed",),
+        must_show=(0, 1),
+    )
+    return tuple(on_stand(form) for form in (*plain, cubic, power))
 
 
 EFFECT = Effect(

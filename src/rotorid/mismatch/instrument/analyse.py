@@ -17,7 +17,7 @@ from rotorid.mismatch.decide import WIDEST_TRUST, wrong_values
 from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
-from rotorid.mismatch.instrument.company import without_company
+from rotorid.mismatch.instrument.company import needless_values, without_company
 from rotorid.mismatch.instrument.decide import findings_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
@@ -59,10 +59,15 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
             reasons["battery_sag"] = why
     size = sizes_of_values(model)
 
+    refused: set[str] = set()
+
     def values_of(selection: Selection) -> dict[str, tuple[float, float]]:
-        return wrong_values(model.regression, model.search, selection, None, size, moving=False)
+        return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
 
     model, values = without_needless(model, values_of)
+    while needless := needless_values(model, values):
+        refused |= needless
+        values = values_of(model.selection)
     found = findings_of(model, company)
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
@@ -71,6 +76,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     elif why:
         reasons["quantisation"] = why
 
+    refused = set()
     plain = values_of(Selection([], model.selection.fit))
     findings += absorbed(model, values, findings)
     traces, before, after = make_traces(setup, model, plain, values)

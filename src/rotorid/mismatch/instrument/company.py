@@ -11,13 +11,15 @@ geometry or a definition (`Effect.exact`) have that form and no other.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, hold_offset, in_training
+from rotorid.mismatch.decide import WIDEST_TRUST
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, hold_offset, in_training, settled_by
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.instrument.values import selection_of
 from rotorid.mismatch.regression import Regression, build
@@ -30,6 +32,8 @@ WEAKER = 0.5
 """An effect is the weaker one of two where it adds less than this share of what the other explains by itself."""
 OF_ITS_OWN = 0.5
 """Share of what an effect explains that must remain beside the stronger one's free form."""
+LATE_ROWS = (1, 2, 4, 8)
+"""Rows by which a free form may also be late."""
 FREE = "free form"
 
 
@@ -103,6 +107,7 @@ def freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) 
                     own[:, None] * gain,
                     own[:, None] * hats(np.abs(own) / largest[c])[:, 1:-1],
                     np.gradient(own)[:, None],
+                    *(later(own, rows)[:, None] for rows in LATE_ROWS),
                 ],
                 axis=1,
             )
@@ -111,6 +116,11 @@ def freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) 
             blocks.append(block)
         out.append(np.concatenate(blocks, axis=2))
     return out
+
+
+def later(values: np.ndarray, rows: int) -> np.ndarray:
+    """Values (n,) some rows later, the first held before."""
+    return np.concatenate([np.full(min(rows, len(values)), values[0]), values[:-rows]])[: len(values)]
 
 
 def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regression:
@@ -142,16 +152,19 @@ def beta_of(fit, cols: np.ndarray) -> np.ndarray:
 
 
 def left_of(model: ReadingModel, weak: str, strong: str, active: list[str], channels: list[int]) -> float:
-    """Share of what `weak` explains that remains beside a free form of `strong`; 0 where it is not significant."""
+    """Share of what `weak` explains that remains beside a free form of `strong`; 0 where it is not significant.
+
+    `weak` is a term at work or a believed value, which then is as free as one that is called wrong.
+    """
     always, fit = model.search.always, model.regression.fit(model.search.always + active)
-    free = freed(model, strong, beta_of(fit, model.regression.columns([strong])), channels)
-    small = beside(model, active, free)
-    rest = [k for k in active if k != weak]
-    with_it, without = small.fit([*always, FREE, *active]), small.fit([*always, FREE, *rest])
+    small = beside(model, active, freed(model, strong, beta_of(fit, model.regression.columns([strong])), channels))
+    every = [*always, *active]
+    rest, loose = [k for k in every if k != weak], {weak: WIDEST_TRUST} if weak in always else {}
+    with_it = small.fit([FREE, *every], loose=loose)
     if small.wald(with_it, small.columns([weak]), int(small.training.sum())) > KEEP_P:
         return 0.0
-    before = small.explained([*always, *active]) - small.explained([*always, *rest])
-    return float((with_it.gain - without.gain) / max(before, 1e-9))
+    before = small.fit(every, loose=loose).gain - small.fit(rest).gain
+    return float((with_it.gain - small.fit([FREE, *rest]).gain) / max(before, 1e-9))
 
 
 def stronger_ones(model: ReadingModel, key: str, active: list[str]) -> list[tuple[str, list[int]]]:
@@ -159,20 +172,42 @@ def stronger_ones(model: ReadingModel, key: str, active: list[str]) -> list[tupl
 
     Not by the sizes in the fit: two that make up for each other's form are both large.
     """
-    search, size = model.search, sizes(model, active)
-    explained, out = model.regression.explained, []
+    search, regression = model.search, model.regression
+    size = sizes(model, active)
+    own = size.get(key)
+    if own is None:
+        fit = regression.fit([*search.always, *active], loose={key: WIDEST_TRUST})
+        own = search.sizes_of(key, beta_of(fit, regression.columns([key])))
+    out = []
     for other in active:
         if other == key or catalogue()[search.terms[other].effect].exact:
             continue
-        rest = [k for k in active if k not in (key, other)]
-        none, alone, weak, both = (
-            explained([*search.always, *rest, *some]) for some in ((), (other,), (key,), (other, key))
+        rest = [k for k in (*search.always, *active) if k not in (key, other)]
+        loose = {key: WIDEST_TRUST} if key in search.always else {}
+        none, alone = regression.fit(rest).gain, regression.fit([*rest, other]).gain
+        weak, both = (
+            regression.fit([*rest, key], loose=loose).gain,
+            regression.fit([*rest, other, key], loose=loose).gain,
         )
         if alone < weak or both - alone > WEAKER * (alone - none):
             continue
-        shared = [c for c in model.setup.instrument.channels if size[other][c] > size[key][c] * SHARE_OF_LARGEST]
+        shared = [c for c in model.setup.instrument.channels if size[other][c] > own[c] * SHARE_OF_LARGEST]
         if shared:
             out.append((other, shared))
+    return out
+
+
+def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
+    """Of believed values that seem wrong those that only make up for the form of an effect at work.
+
+    Also those that a form's own parameters say again: another power of the speed has no C_F to believe.
+    """
+    active = model.selection.active
+    settled = settled_by([model.search.terms[k] for k in active])
+    out = settled & set(values)
+    for key in set(values) - settled:
+        if any(left_of(model, key, s, active, c) < OF_ITS_OWN for s, c in stronger_ones(model, key, active)):
+            out.add(key)
     return out
 
 
@@ -215,4 +250,4 @@ def exchangeable(model: ReadingModel, key: str, strong: str) -> bool:
     return beyond < SHARE_OF_LARGEST**2 * own
 
 
-__all__ = ["Companion", "without_company"]
+__all__ = ["Companion", "needless_values", "without_company"]
