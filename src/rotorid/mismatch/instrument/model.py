@@ -114,6 +114,26 @@ class ReadingSearch(Search):
             return []
         return [c for c in super().candidates(active) if self._allowed(self.terms[c.key])]
 
+    def _next(self, active, dropped):
+        """As for flights; where a richer form of what is at work explains more than any newcomer it comes first.
+
+        It takes the other's place in `active`. What is of many parameters may enter so, for it has its cause already.
+        """
+        added = super()._next(active, dropped)
+        if self.rich or added is None:
+            return added
+        best, found = self.worth([*active, *added]), None
+        for place, key in enumerate(active):
+            for term in self.terms.values():
+                if term.kind == "effect" and term.effect == self.terms[key].effect and not self._allowed(term):
+                    trial = [*active[:place], term.key, *active[place + 1 :]]
+                    if (worth := self.worth(trial)) > best:
+                        best, found = worth, trial
+        if found is None or not self._all_physical(found):
+            return added
+        active[:] = found
+        return self._next(active, dropped)
+
     def best_form(self, key, active):
         if self.rich:
             return super().best_form(key, active)
