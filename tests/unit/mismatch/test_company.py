@@ -12,7 +12,7 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.loading import forms_of, rotation_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import OFFSET, form_reading, make_terms
-from rotorid.mismatch.instrument.company import hats, without_company
+from rotorid.mismatch.instrument.company import hats, later, without_company
 from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model, reading_model
 from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
 from rotorid.mismatch.voltmeter import is_noise
@@ -21,6 +21,8 @@ from tests.unit.mismatch.test_instrument import instrument_for, stand_loading, s
 
 C_F, RATE_HZ = 1.4e-6, 50.0
 HUBS = ((0.09, 0.09, "ccw"), (0.09, -0.09, "cw"), (-0.09, -0.09, "ccw"), (-0.09, 0.09, "cw"))
+SIX = tuple((0.12 * np.cos(k * np.pi / 3), 0.12 * np.sin(k * np.pi / 3), ("ccw", "cw")[k % 2]) for k in range(6))
+PLACES = {1: ((0.0, 0.0, "ccw"),), 4: HUBS, 6: SIX}
 
 
 def form_named(key: str, name: str, vehicle: Vehicle):
@@ -111,8 +113,8 @@ def test_a_structure_rings_under_a_part_of_the_load() -> None:
 def runs_of(change, rotors: int = 4, count: int = 3, seconds: float = 40.0, noise=(0.02, 0.002)) -> list[Run]:
     """Runs of a tared stand; `change(speed, wrench, time_s)` gives the true wrench (n, 6) from the believed one."""
     made = []
-    hubs = np.array([h[:2] for h in HUBS])[:rotors] if rotors > 1 else np.zeros((1, 2))
-    spin = np.array([1.0, -1.0, 1.0, -1.0])[:rotors]
+    hubs = np.array([h[:2] for h in PLACES[rotors]])
+    spin = np.array([1.0 if h[2] == "ccw" else -1.0 for h in PLACES[rotors]])
     for number in range(count):
         rng = np.random.default_rng(number)
         t = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
@@ -134,12 +136,11 @@ def runs_of(change, rotors: int = 4, count: int = 3, seconds: float = 40.0, nois
 
 
 def stand_set(change, rotors: int = 4, **more) -> RecordingSet:
-    places = HUBS if rotors > 1 else ((0.0, 0.0, "ccw"),)
     content = {
         "name": "stand",
         "kind": "stand",
         "mass_kg": 0.65,
-        "rotors": [{"x_m": x, "y_m": y, "spin": s} for x, y, s in places],
+        "rotors": [{"x_m": x, "y_m": y, "spin": s} for x, y, s in PLACES[rotors]],
         "thrust_coefficient_n_s2": C_F,
         "torque_coefficient_n_m_s2": 1.9e-8,
         "rotor_radius_m": 0.06,
@@ -255,3 +256,55 @@ def test_a_model_says_which_effect_only_made_up_for_another() -> None:
     kept = {model.search.terms[k].effect for k in model.selection.active}
     assert len(kept & curves) == 1
     assert all(c.effect in model.selection.not_established and c.either for c in company if c.effect in curves)
+
+
+def test_rows_later_hold_the_first() -> None:
+    assert later(np.array([1.0, 2.0, 3.0, 4.0]), 2).tolist() == [1.0, 1.0, 1.0, 2.0]
+    assert later(np.array([1.0, 2.0]), 8).tolist() == [1.0, 1.0]
+
+
+def test_a_cube_beside_its_own_square_by_hand() -> None:
+    """Two rotors and two more at 1000 rad/s: four times 1e-9 · 1e9 − 2e-7 · 1e6 = 0.8 N of thrust."""
+    vehicle = stand_vehicle(sensor_mount="tilting")
+    loading = still(stand_loading(vehicle), rotor_speed=np.full((1500, 4), 1000.0))
+    form = form_named("thrust_curve", "cubic term and its own square", vehicle)
+    assert form_reading(form, (1e-9, -2e-7), loading, vehicle)[0, 2] == pytest.approx(-4 * 0.8)
+
+
+def test_a_coefficient_that_makes_up_for_a_curve_is_not_called_wrong() -> None:
+    """Thrust that falls short of the square by 9 % u⁵ at full speed: a curve, whatever C_F fits it best."""
+
+    def change(speed, wrench, t):
+        wrench[:, 2] *= 1.03 - 0.09 * (speed[:, 0] / 1800.0) ** 5
+        return wrench
+
+    analysis = analyse_instrument(stand_set(change, rotors=1))
+    # Of one rotor the curve of the thrust and that of the sensor are functions of the same load.
+    assert set(named(analysis)) in ({"thrust_curve"}, {"load_nonlinearity"}) and not analysis.values
+
+
+def test_a_wrong_coefficient_alone_is_called_wrong() -> None:
+    def change(speed, wrench, t):
+        wrench[:, 2] *= 1.08
+        return wrench
+
+    analysis = analyse_instrument(stand_set(change, rotors=1))
+    believed, _, low, high = analysis.values["thrust_coefficient_n_s2"]
+    assert not named(analysis) and low < 1.08 * believed < high
+
+
+def test_rotors_that_lean_apart_come_before_a_newcomer() -> None:
+    """Six rotors lean forward, each its own way: four sums do not hold six thrusts, so no crosstalk."""
+    lean = np.array([0.01, 0.04, 0.02, 0.05, 0.0, 0.03])
+
+    def change(speed, wrench, t):
+        force = C_F * speed**2 * lean
+        wrench[:, 0] += force.sum(axis=1)
+        wrench[:, 5] -= force @ np.array([h[1] for h in SIX])
+        wrench[:, 3] -= (1.9e-8 * speed**2 * lean) @ np.array([1.0, -1.0] * 3)  # torques lean with their axes
+        return wrench
+
+    found = named(analyse_instrument(stand_set(change, rotors=6)))
+    assert set(found) == {"thrust_tilt"}
+    values = {p.symbol: p.value for p in found["thrust_tilt"].parameters}
+    assert [values[f"eps_x{k + 1}"] for k in range(6)] == pytest.approx(lean.tolist(), abs=1.5e-3)
