@@ -159,9 +159,6 @@ class Form:
     """Whether the contribution takes a `Loading` (an instrument's) in place of a `Motion`."""
     settles: tuple[str, ...] = ()
     """Believed values (`thrust` …) that the form's own nonlinear parameters say again: held while those are fitted."""
-    of_reading: tuple[int, ...] = ()
-    """Linear parameters s of Ω_m = (1 + s) Ω for which recordings give the reading Ω_m alone: a fit to it is of
-    s/(1 + s)."""
     of_reading: tuple[tuple[int, int], ...] = ()
     """Linear parameters p of Ω_m = (1 + s) Ω + p (s itself, a bias) and the index of their s, where recordings give the
     reading Ω_m alone: a fit to it is of p/(1 + s)."""
