@@ -15,9 +15,9 @@ from rotorid.effects.loading import CHANNELS, UNITS
 from rotorid.mismatch.analyse import throttle_or_thrust
 from rotorid.mismatch.decide import WIDEST_TRUST, wrong_values
 from rotorid.mismatch.findings import Analysis, Finding, Trace
+from rotorid.mismatch.instrument.approximate import needless_values, without_company
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
-from rotorid.mismatch.instrument.company import needless_values, without_company
 from rotorid.mismatch.instrument.decide import findings_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model

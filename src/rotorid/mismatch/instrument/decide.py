@@ -11,7 +11,7 @@ from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import estimates, held_out_gain
 from rotorid.mismatch.findings import Estimate, Finding
-from rotorid.mismatch.instrument.company import Companion
+from rotorid.mismatch.instrument.approximate import Companion
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     active_values,

@@ -11,8 +11,8 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import forms_of, rotation_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
+from rotorid.mismatch.instrument.approximate import hats, later, without_company
 from rotorid.mismatch.instrument.columns import OFFSET, form_reading, make_terms
-from rotorid.mismatch.instrument.company import hats, later, without_company
 from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model, reading_model
 from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
 from rotorid.mismatch.voltmeter import is_noise
