@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter
-from rotorid.effects.loading import AXES, UNITS, bracketed, cross_channels
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import AXES, UNITS, bracketed, cross_channels, one_per_channel
 
 CURVE = "curvature of the characteristic"
 
@@ -30,7 +30,27 @@ def reading_forms(instrument):
             Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group
         )
         forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
+        forms.append(_s_shape(instrument, group, "S-shape" + suffix))
     return tuple(forms)
+
+
+def _s_shape(instrument, group, name):
+    """y = F + a sin(π F/(s F_max)): right at no load and at the full scale, s times the largest load recorded.
+
+    Its slope at no load is a part of the curve: what it takes there of the linear gain is no wrong calibration.
+    """
+    largest = np.array(instrument.largest)
+
+    def contribution(loading, vehicle, values):
+        reading = np.zeros((loading.size, 6))
+        turn = np.sin(np.pi * loading.load / (values[-1] * largest))
+        reading[:, list(group)] = turn[:, list(group)] * np.asarray(values[:-1])
+        return Contribution(reading=reading)
+
+    own = one_per_channel("a", "{}", group, meaning=CURVE)
+    starts = (0.8, 1.0, 1.3, 1.7)
+    scale = Parameter("s", "1", 0.7, 3.0, True, starts, "full scale by the largest load")
+    return Form(name, "y = F + a sin(π F/(s F_max))", (*own, scale), contribution)
 
 
 def _both(pairs):
