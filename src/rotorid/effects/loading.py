@@ -86,7 +86,7 @@ class Loading:
     temperature_c: np.ndarray | None = None
     """The temperature itself, (n,), °C."""
     session_time_s: np.ndarray | None = None
-    """Time since the session's start, (n,), s: `Instrument.session_clock` says whether pauses are in it."""
+    """Time since the first sample of the set, (n,), s: `Instrument.session_clock` says whether pauses are in it."""
     distance: np.ndarray | None = None
     """Distance to a wall or fixture, (n,), m."""
     command: np.ndarray | None = None

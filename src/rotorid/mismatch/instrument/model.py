@@ -12,6 +12,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.instrument.columns import rows_of, term_columns
+from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import (
@@ -333,14 +334,18 @@ def reading_model(
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
-    sizes = size_function(rows, regression, noise, max(1, int(setup.rate_hz)) if not short else 1)
+    per_second = max(1, int(setup.rate_hz)) if not short else 1
+    sizes = size_function(rows, regression, noise, per_second, resolution(setup))
     search = ReadingSearch(regression, sizes, np.zeros(6))
     selection = search.run(active)
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
 
 
-def size_function(rows: list[Rows], regression: Regression, noise: np.ndarray, per: int):
-    """Size of a term by channel: its rms over the strongest tenth of the seconds, in units of the noise, (6,)."""
+def size_function(rows: list[Rows], regression: Regression, noise: np.ndarray, per: int, least=0.0):
+    """Size of a term by channel: its rms over the strongest tenth of the seconds, in units of the noise, (6,).
+
+    What stays below `least`, (6,), own unit, in a channel is within its resolution there: size 0.
+    """
     loud = np.where(np.isfinite(noise), noise, np.inf)
     margin = {t.key: TARE_MARGIN if t.effect == "tare_offset" else 1.0 for t in regression.terms}
     margin |= {t.key: 2 * TARE_MARGIN for t in regression.terms if t.key == "tare_offset/own in each run"}
@@ -353,8 +358,8 @@ def size_function(rows: list[Rows], regression: Regression, noise: np.ndarray, p
             count = max(1, len(square) // per)
             whole = len(square) // count * count
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
-        strongest = np.quantile(np.concatenate(energies), STRONGEST, axis=0)
-        return np.sqrt(strongest) / loud / margin[key]
+        strongest = np.sqrt(np.quantile(np.concatenate(energies), STRONGEST, axis=0))
+        return np.where(strongest > least, strongest, 0.0) / loud / margin[key]
 
     return sizes
 

@@ -290,7 +290,7 @@ def first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> flo
 
 
 def session(recordings: RecordingSet) -> tuple[list[float], float, bool]:
-    """When in the session each run started, s; when it ended, s (0 of a single run); whether its clock ran on.
+    """When in the session each run started, s; how long it was, s (0 of a single run); whether its clock ran on.
 
     Runs are in the order of time. Where each has a clock of its own the pauses between them are not known, and the
     next is taken to start when the one before ends.
@@ -303,10 +303,8 @@ def session(recordings: RecordingSet) -> tuple[list[float], float, bool]:
     if not ran_on:
         starts = [0.0, *np.cumsum(lengths[:-1]).tolist()]
         return starts, starts[-1] + lengths[-1], False
-    # The clock's own zero is the session's start unless it lies further back than the session is long (a date).
-    first, last = float(runs[0].time_s[0]), float(runs[-1].time_s[-1])
-    zero = 0.0 if 0.0 <= first < last - first else first
-    return [float(r.time_s[0]) - zero for r in runs], last - zero, True
+    first = float(runs[0].time_s[0])
+    return [float(r.time_s[0]) - first for r in runs], float(runs[-1].time_s[-1]) - first, True
 
 
 def set_up(recordings: RecordingSet) -> Setup:
