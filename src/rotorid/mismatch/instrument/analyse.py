@@ -7,6 +7,7 @@ on the load or on its reading, with the believed values free, 4. nonlinear param
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
 from rotorid.mismatch.instrument.values import without_needless
 from rotorid.mismatch.select import Selection
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import changed_vehicle
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -219,7 +221,7 @@ def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list
     base = regression.fit(held + model.selection.active)
     taken, out = {f.id for f in findings}, {}
     for term in regression.terms:
-        if term.kind != "effect" or term.effect in taken or term.effect in out:
+        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
             continue
         fit = regression.fit([*held, *model.selection.active, term.key])
         p = regression.wald(fit, regression.columns([term.key]), search.blocks)
@@ -237,6 +239,9 @@ def make_traces(setup: Setup, model: ReadingModel, plain: dict, values: dict):
     loose = {k: WIDEST_TRUST for k in (*plain, *values)}
     only = regression.fit(nuisance + list(plain), loose=loose)
     full = regression.fit(nuisance + list(values) + model.selection.active, loose=loose)
+    # What has no name is in the fit, so that nothing else takes it up, and not in what is delivered.
+    unnamed = regression.columns([k for k in model.selection.active if model.search.terms[k].effect in UNKNOWNS])
+    full = replace(full, beta=np.where(np.isin(full.columns, unnamed), 0.0, full.beta))
     traces, before, after = [], [], []
     for r in model.rows:
         y = np.nan_to_num(r.y)

@@ -18,6 +18,7 @@ from rotorid.mismatch.instrument.model import (
     in_training,
     nonlinear_deviation,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 SHOWS = 0.33
 """A channel counts where the contribution is at least this share of its strongest, in units of the noise."""
@@ -43,6 +44,8 @@ def findings_of(model: ReadingModel) -> list[Finding]:
     with_it, contributions = model.regression.fit(search.always + selection.active), Contributions(model.rows)
     out = []
     for key in selection.active:
+        if search.terms[key].effect in UNKNOWNS:
+            continue  # told as unexplained
         term, effect = search.terms[key], effects[search.terms[key].effect]
         channels = main_channels(model, key)
         without = search.without(key, selection.active)
@@ -73,6 +76,8 @@ def findings_of(model: ReadingModel) -> list[Finding]:
             )
         )
     for effect_id, reason in selection.not_established.items():
+        if effect_id in UNKNOWNS:
+            continue
         name = effects[effect_id].name
         out.append(Finding(id=effect_id, status="not_established", sentence=f"{name} did not hold: {reason}"))
     return out

@@ -26,6 +26,7 @@ from rotorid.mismatch.regression import (
 )
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import (
+    COST_OF_UNKNOWN,
     COST_PER_EFFECT,
     COST_PER_PARAMETER,
     EXPECTED_HELD_OUT,
@@ -34,6 +35,7 @@ from rotorid.mismatch.select import (
     Search,
     Selection,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 SHORT = 60
 """Stretches of fewer rows are too short to learn the colour of their noise from: they are taken as blocks."""
@@ -147,7 +149,9 @@ class ReadingSearch(Search):
         bias = limited_bias(gram, share * reg.bias_gram[np.ix_(cols, cols)])
         beta = ridge_inverse(gram - bias + np.diag(reg.precision[cols])) @ (cross - share * reg.bias_cross[cols])
         gain = float(2 * cross @ beta - beta @ gram @ beta)
-        return gain - COST_PER_PARAMETER * sum(self.terms[k].size for k in keys) - COST_PER_EFFECT * len(keys)
+        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
+        parameters = sum(self.terms[k].size for k in keys)
+        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def failed_held_out(self, active):
         """The term whose own part should help on the held-out blocks and does most harm there instead.
