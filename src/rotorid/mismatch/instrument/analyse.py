@@ -18,6 +18,7 @@ from rotorid.mismatch.decide import WIDEST_TRUST, wrong_values
 from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
+from rotorid.mismatch.instrument.company import without_remainders
 from rotorid.mismatch.instrument.decide import findings_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
@@ -44,12 +45,19 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     terms, reasons = make_terms(setup)
     measured = all(x.measured for x in setup.loadings)
     chain = find_chain(setup)
-    model = fitted_model(setup, terms, loadings=None if chain is None or measured else moved(setup, chain))
+    loadings = None if chain is None or measured else moved(setup, chain)
+    model = fitted_model(setup, terms, loadings=loadings)
     if chain is not None and not measured and model.selection.active:
         # What was found at the reading changes what the commands must explain: once more with it known.
         others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
         chain = find_chain(setup, others)
-        model = fitted_model(setup, terms, model.selection.active, moved(setup, chain))
+        loadings = moved(setup, chain)
+        model = fitted_model(setup, terms, model.selection.active, loadings)
+
+    def once_more(active: list[str], refused: dict[str, str]) -> ReadingModel:
+        return fitted_model(setup, model.terms, active, loadings, refused)
+
+    model = without_remainders(model, once_more)
     if chain is None:
         reasons.update({k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in SPEED_IDS})
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,8 +71,9 @@ class ReadingSearch(Search):
 
     rich = False
 
-    def __init__(self, regression: Regression, sizes_of, known_sizes=None):
+    def __init__(self, regression: Regression, sizes_of, known_sizes=None, refused: Mapping[str, str] | None = None):
         super().__init__(regression, sizes_of, known_sizes)
+        self.refused = refused or {}
         self.total_gram = regression.gram[regression.training].sum(axis=0)
         self.total_cross = regression.cross[regression.training].sum(axis=0)
 
@@ -326,9 +328,12 @@ def whole_reading(terms: list[Term], active) -> list[tuple[Form, np.ndarray]]:
 
 
 def reading_model(
-    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None
+    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None, refused=None
 ) -> ReadingModel:
-    """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept."""
+    """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept.
+
+    Ids that are `refused`, with the reason, do not enter.
+    """
     whole = whole_reading(terms, active)
     # Measured speeds are the load: their noise is in regressors and residual, and is learnt by adding it once more.
     noisy = rows_of(setup, terms, setup.noisier, whole) if loadings is None and setup.noisier is not None else None
@@ -340,7 +345,7 @@ def reading_model(
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
     per_second = max(1, int(setup.rate_hz)) if not short else 1
     sizes = size_function(rows, regression, noise, per_second, resolution(setup))
-    search = ReadingSearch(regression, sizes, np.zeros(6))
+    search = ReadingSearch(regression, sizes, np.zeros(6), refused)
     selection = search.run(active)
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
 
@@ -460,20 +465,22 @@ def refined(model: ReadingModel) -> list[Term]:
     return [best.get(t.key, t) for t in model.terms]
 
 
-def fitted_model(setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None) -> ReadingModel:
+def fitted_model(
+    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, refused=None
+) -> ReadingModel:
     """Search and refinement in turn until the same terms with the same values come out.
 
     What is noise is learnt anew after the first refinement: whitened by a ring or a lag that no column had before it,
     the regression would be deaf at the very frequencies where the effect shows.
     """
-    model = reading_model(setup, terms, active, loadings)
+    model = reading_model(setup, terms, active, loadings, refused=refused)
     for number in range(ROUNDS):
         before, start = model.selection.active, nonlinear_values(model)
         if not len(start):
             break
         terms = refined(model)
         kept = (model.noise, model.regression.filters) if number else None
-        model = reading_model(setup, terms, before, loadings, kept)
+        model = reading_model(setup, terms, before, loadings, kept, refused)
         values = nonlinear_values(model)
         if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=SETTLED):
             break
