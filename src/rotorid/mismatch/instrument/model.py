@@ -30,7 +30,9 @@ from rotorid.mismatch.select import (
     COST_OF_UNKNOWN,
     COST_PER_EFFECT,
     COST_PER_PARAMETER,
+    ENTER_P,
     EXPECTED_HELD_OUT,
+    SMALLEST_SIZE,
     UNSTEADY_P,
     UNSTEADY_SHARE,
     Search,
@@ -142,6 +144,20 @@ class ReadingSearch(Search):
         finally:
             self.terms = every
 
+    def second_chance(self, active):
+        """A term that passes every test beside what is at work, whatever was found of it in other company.
+
+        One that the runs held out refuted may have been there with false company, which was refuted after it.
+        """
+        for c in self.candidates(active):
+            holds = c.named and c.score > 0 and c.p_value < ENTER_P and c.physical
+            if not holds or self.terms[c.key].effect in self.refused:
+                continue
+            trial = [*active, c.key]
+            if self.weight(c.key, c.beta, active) >= SMALLEST_SIZE and self._refuted(trial) is None:
+                return c.key
+        return None
+
     def worth(self, keys):
         """As for flights, from the summed Gram matrix alone and without limits of believed values."""
         reg = self.regression
@@ -246,10 +262,16 @@ class ReadingSearch(Search):
         return float(2 * reg.cross[np.ix_(index, fit.columns)].sum(axis=0) @ fit.beta - fit.beta @ gram @ fit.beta)
 
     def run(self, active=None) -> Selection:
-        """Both rounds; the second starts from what the first found."""
+        """Both rounds; the second starts from what the first found, the last once more from what it left out."""
         first = super().run(active)
         self.rich = True
         second = super().run(first.active)
+        while (again := self.second_chance(second.active)) is not None:
+            trail = [*second.trail, f"+ {again}: it holds by itself"]
+            third = super().run([*second.active, again])
+            if again not in third.active:
+                break
+            second = replace(third, trail=trail + third.trail, not_established=second.not_established)
         kept = {self.terms[k].effect for k in second.active}
         dropped = {e: r for e, r in (first.not_established | second.not_established).items() if e not in kept}
         return replace(second, trail=first.trail + second.trail, not_established=dropped)
