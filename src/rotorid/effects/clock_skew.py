@@ -66,7 +66,9 @@ def _forms(instrument, name, span_s, since_s, t):
     alone, both = other_rate(since_s), other_rate_and_start(since_s)
     return (
         Form(f"other rate{name}", f"y(t) = F(t − e {t})", (skew,), alone, excited_by=("load_change",)),
-        Form(f"other rate and start{name}", f"y(t) = F(t − T − e {t})", (skew, late), both, excited_by=("load_change",)),
+        Form(
+            f"other rate and start{name}", f"y(t) = F(t − T − e {t})", (skew, late), both, excited_by=("load_change",)
+        ),
     )
 
 

@@ -159,6 +159,10 @@ class Form:
     """Linear parameters s of Ω_m = (1 + s) Ω for which recordings give the reading Ω_m alone: a fit to it is of
     s/(1 + s)."""
 
+    takes_up: tuple[str, ...] = ()
+    """Believed values (keys of the regression) that the form has a part of its own for: beside it their trust is no
+    room to move in, or the two would share one slope."""
+
     def stated(self, index: int, fitted: float) -> float:
         """The parameter `index` as its equation has it, from the coefficient fitted to recordings."""
         return fitted / (1.0 - fitted) if index in self.of_reading else fitted

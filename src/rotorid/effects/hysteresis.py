@@ -124,9 +124,7 @@ def _exponential_forms(instrument, loaded):
 
     forms = [form("exponential loop", loaded, (width("w", 0.02, 0.06, 0.2),))]
     if 1 < len(loaded) <= 3:
-        forms.append(
-            form("exponential loops of own width", loaded, tuple(width(f"w_{AXES[c]}", 0.06) for c in loaded))
-        )
+        forms.append(form("exponential loops of own width", loaded, tuple(width(f"w_{AXES[c]}", 0.06) for c in loaded)))
         forms += [form(f"exponential loop of {AXES[c]}", (c,), (width("w", 0.02, 0.06, 0.2),)) for c in loaded]
     return forms
 

@@ -1,5 +1,7 @@
 """A reading that is not proportional to the load on its own axis."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
@@ -30,7 +32,8 @@ def reading_forms(instrument):
             Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group
         )
         forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
-        forms.append(_s_shape(instrument, group, "S-shape" + suffix))
+        gains = tuple(f"gain_{AXES[c][-1].lower()}" for c in group if c < 3) + (("gain",) if group == loaded else ())
+        forms.append(replace(_s_shape(instrument, group, "S-shape" + suffix), takes_up=gains))
     return tuple(forms)
 
 

@@ -50,7 +50,7 @@ class Instrument:
     session_s: float = 0.0
     """How long the session was, all runs together, as far as known; 0 of a single run."""
     session_clock: bool = False
-    """Whether `time_s` runs on from run to run (else each run starts its own, and pauses between them are not known)."""
+    """Whether `time_s` runs on from run to run; else pauses between the runs are not known."""
     returns: tuple[int, ...] = ()
     """Channels whose load also comes back from above to values that are not zero."""
     by_hand: bool = False

@@ -27,7 +27,8 @@ def warming(instrument, name, equation, span_s, elapsed_s, shares):
 
     starts = tuple(share * span_s for share in shares)
     tau = Parameter("tau", "s", 0.08 * span_s, 5 * span_s, True, starts, "time of warming up")
-    return Form(name, equation, (*one_per_channel("b", "{}", channels, meaning=DRIFT + " in the end"), tau), contribution)
+    own = one_per_channel("b", "{}", channels, meaning=DRIFT + " in the end")
+    return Form(name, equation, (*own, tau), contribution)
 
 
 def zeroed_at(instrument):
@@ -64,20 +65,10 @@ def reading_forms(instrument):
     if instrument.run_s > 5.0:
         forms.append(warming(instrument, "warming up", text, instrument.run_s, lambda x: x.run_time_s, (0.15, 0.5)))
     if instrument.session_s > 5.0:
-        forms.append(
-            of("linear in the session's time", "y = F + b t_s", "{}/min", lambda x: x.session_time_s / 60.0),
-        )
-        text, shares = "y = F + b (1 − exp(−t_s/τ))", (0.1, 0.25, 0.6)
-        forms.append(
-            warming(
-                instrument,
-                "warming up over the session",
-                text,
-                instrument.session_s,
-                lambda x: x.session_time_s,
-                shares,
-            )
-        )
+        forms.append(of("linear in the session's time", "y = F + b t_s", "{}/min", lambda x: x.session_time_s / 60.0))
+        text, span_s, shares = "y = F + b (1 − exp(−t_s/τ))", instrument.session_s, (0.1, 0.25, 0.6)
+        name = "warming up over the session"
+        forms.append(warming(instrument, name, text, span_s, lambda x: x.session_time_s, shares))
     if instrument.temperature:
         forms.append(of("with temperature", "y = F + b ΔT", "{}/K", lambda x: x.temperature))
     if instrument.temperatures_c[1] > instrument.temperatures_c[0]:

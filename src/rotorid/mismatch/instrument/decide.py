@@ -16,6 +16,7 @@ from rotorid.mismatch.instrument.model import (
     active_values,
     doubt_of_form,
     in_training,
+    kept_values,
     nonlinear_deviation,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -41,14 +42,15 @@ def findings_of(model: ReadingModel) -> list[Finding]:
     effects, search, selection = catalogue(), model.search, model.selection
     rule = in_training(model.setup)
     held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
-    with_it, contributions = model.regression.fit(search.always + selection.active), Contributions(model.rows)
+    always = kept_values(search, selection.active)
+    with_it, contributions = model.regression.fit(always + selection.active), Contributions(model.rows)
     out = []
     for key in selection.active:
         if search.terms[key].effect in UNKNOWNS:
             continue  # told as unexplained
         term, effect = search.terms[key], effects[search.terms[key].effect]
         channels = main_channels(model, key)
-        without = search.without(key, selection.active)
+        without = model.regression.fit(always + [k for k in selection.active if k != key])
         values = active_values(model, key)
         if term.form.nonlinear:
             sd = nonlinear_deviation(model, key, model.loadings)

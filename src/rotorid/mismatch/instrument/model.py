@@ -292,6 +292,12 @@ class ReadingModel:
     """One sigma of a row's noise by channel, (6,); NaN where a channel is not compared."""
 
 
+def kept_values(search: Search, active: list[str]) -> list[str]:
+    """Terms that stand beside effects always, less believed values that a form at work takes up."""
+    taken = {v for k in active for v in search.terms[k].form.takes_up}
+    return [k for k in search.always if k not in taken]
+
+
 def in_training(setup: Setup):
     """Rule of prepare.training_rule for the stretches of a set."""
     return training_rule(setup.split, list(setup.loadings))
@@ -369,6 +375,9 @@ def reading_model(
     sizes = size_function(rows, regression, noise, per_second, resolution(setup))
     search = ReadingSearch(regression, sizes, np.zeros(6), refused)
     selection = search.run(active)
+    always = kept_values(search, selection.active)
+    if always != search.always:
+        selection = replace(selection, fit=regression.fit(always + selection.active, jackknife=True))
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
 
 
@@ -418,7 +427,8 @@ def refined(model: ReadingModel) -> list[Term]:
         index[i] = pieces_of(stretches[k], setup.average)[i - owner.index(k)]
     channels = list(setup.instrument.channels)
     timing = [k for k in search.always if search.terms[k].kind == "nuisance"]
-    fixed = [k for k in (*search.always, *model.selection.active) if k not in moving and k not in timing]
+    always = kept_values(search, model.selection.active)
+    fixed = [k for k in (*always, *model.selection.active) if k not in moving and k not in timing]
     reg = model.regression
 
     def white(values):
@@ -551,7 +561,8 @@ def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, lo
         else t
         for t in model.terms
     ]
-    chosen = [t for t in at_work if t.kind != "effect" or t.key in model.selection.active]
+    stay = (*kept_values(model.search, model.selection.active), *model.selection.active)
+    chosen = [t for t in at_work if t.key in stay]
     slopes = [
         Term(f"{key}/slope{i}", "slope", term.effect, form, tuple(values), 1, (np.inf,), slope_of=i)
         for i in form.nonlinear

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from rotorid.mismatch.instrument.model import ReadingModel
+from rotorid.mismatch.instrument.model import ReadingModel, kept_values
 from rotorid.mismatch.select import Selection
 
 MOST_MORE = 3
@@ -62,6 +62,6 @@ def richer_forms(model: ReadingModel) -> list[Selection]:
 def selection_of(model: ReadingModel, active: list[str]) -> Selection:
     """A selection of other terms, fitted and tested as the search does in the end."""
     search = model.search
-    fit = search.regression.fit(search.always + active, jackknife=True)
+    fit = search.regression.fit(kept_values(search, active) + active, jackknife=True)
     p_values = {k: search.judge(k, active, search.without(k, active), jackknife=True).p_value for k in active}
     return replace(model.selection, active=active, fit=fit, p_values=p_values)
