@@ -32,6 +32,11 @@ def reading_forms(instrument):
             Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group
         )
         forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
+        fifth = tuple(Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group) + tuple(
+            Parameter(f"a_5_{AXES[c]}", f"1/{bracketed(UNITS[c])}4", meaning=CURVE) for c in group
+        )
+        odd = _both(pairs, lambda x: x.load**3, lambda x: x.load**5)
+        forms.append(Form("cube and fifth power" + suffix, "y = F + a_3 F³ + a_5 F⁵", fifth, odd))
         gains = tuple(f"gain_{AXES[c][-1].lower()}" for c in group if c < 3) + (("gain",) if group == loaded else ())
         forms.append(replace(_s_shape(instrument, group, "S-shape" + suffix), takes_up=gains))
     return tuple(forms)
@@ -56,8 +61,8 @@ def _s_shape(instrument, group, name):
     return Form(name, "y = F + a sin(π F/(s F_max))", (*own, scale), contribution)
 
 
-def _both(pairs):
-    square, cube = cross_channels(pairs, lambda x: x.load**2), cross_channels(pairs, lambda x: x.load**3)
+def _both(pairs, one=lambda x: x.load**2, other=lambda x: x.load**3):
+    square, cube = cross_channels(pairs, one), cross_channels(pairs, other)
 
     def contribution(loading, vehicle, values):
         first, second = square(loading, vehicle, values[: len(pairs)]), cube(loading, vehicle, values[len(pairs) :])

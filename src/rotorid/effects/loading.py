@@ -47,6 +47,10 @@ class Instrument:
     """Whether a temperature is recorded that changes within a run."""
     temperatures_c: tuple[float, float] = (0.0, 0.0)
     """Lowest and highest temperature of the set, where one is recorded; alike where it says nothing."""
+    first_temperature_c: float = 0.0
+    """Temperature of the set's first sample."""
+    zero_temperature_c: float | None = None
+    """Temperature at which the readings suggest that the zero was right: where the search for it starts."""
     session_s: float = 0.0
     """How long the session was, all runs together, as far as known; 0 of a single run."""
     session_clock: bool = False

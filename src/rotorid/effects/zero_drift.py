@@ -10,9 +10,8 @@ from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import AXES, on_channels, one_per_channel
 
 DRIFT = "drift of the zero"
-REACH_K = 1.0
+REACH = 1.0
 """How far outside the temperatures recorded, as a share of their span, the zero may have been right."""
-STARTS = 6
 
 
 def warming(instrument, name, equation, span_s, elapsed_s, shares):
@@ -42,8 +41,10 @@ def zeroed_at(instrument):
         return Contribution(reading=reading)
 
     low, high = instrument.temperatures_c
-    reach = REACH_K * (high - low)
-    starts = tuple(np.linspace(low - reach / 2, high + reach / 2, STARTS).tolist())
+    reach = REACH * (high - low)
+    guess = instrument.zero_temperature_c
+    start = instrument.first_temperature_c if guess is None else guess
+    starts = (float(np.clip(start, low - reach, high + reach)),)
     zero = Parameter("T_0", "°C", low - reach, high + reach, True, starts, "temperature at which the zero was right")
     own = one_per_channel("b", "{}/K", channels, meaning=DRIFT)
     return Form("with temperature, zero at T_0", "y = F + b (T − T_0)", (*own, zero), contribution)
@@ -72,6 +73,9 @@ def reading_forms(instrument):
     if instrument.temperature:
         forms.append(of("with temperature", "y = F + b ΔT", "{}/K", lambda x: x.temperature))
     if instrument.temperatures_c[1] > instrument.temperatures_c[0]:
+        first = instrument.first_temperature_c
+        text = "with temperature over the session"
+        forms.append(of(text, "y = F + b (T − T_first)", "{}/K", lambda x: x.temperature_c - first))
         forms.append(zeroed_at(instrument))
     return tuple(forms)
 

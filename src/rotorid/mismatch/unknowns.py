@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import on_channels
+from rotorid.effects.loading import AXES, on_channels
 
 SWING_DAMPING = 0.05
 SWING_STARTS_RAD_S = (4.0, 8.0, 16.0)
@@ -108,9 +108,29 @@ def gain_forms(instrument):
     if high > low:
         forms.append(_gain("with temperature", "1/K", loaded, lambda x: x.temperature_c - low))
     runs = instrument.training or instrument.runs
+    if len(runs) > 1:
+        forms.append(_mixture_of_each(runs, loaded, instrument.channels))
     for run in runs if len(runs) > 1 else ():
         forms.append(_gain(f"in {run}", "1", loaded, lambda x, run=run: np.full(x.size, float(x.run == run))))
     return tuple(forms)
+
+
+def _mixture_of_each(runs, loaded, channels):
+    """y_i = F_i + M_ij(run) F_j, the mean of M over the runs nothing: that would be crosstalk or a gain.
+
+    A clamp that was moved, a cell that was calibrated anew.
+    """
+    entries = [(run, i, j) for run in runs[:-1] for i in channels for j in loaded]
+
+    def contribution(loading, vehicle, values):
+        reading = np.zeros((loading.size, 6))
+        for (run, i, j), value in zip(entries, values, strict=True):
+            if loading.run in (run, runs[-1]):
+                reading[:, i] += (value if loading.run == run else -value) * loading.load[:, j]
+        return Contribution(reading=reading)
+
+    parameters = tuple(Parameter(f"M_{AXES[i]},{AXES[j]}({run})", "1") for run, i, j in entries)
+    return Form("loads mixed anew in each run", "y_i = F_i + M_ij(run) F_j", parameters, contribution)
 
 
 def _gain(name, unit, channels, factor):
@@ -144,7 +164,7 @@ SWING = Effect(
 GAIN = Effect(
     id="unknown_gain",
     name="a gain that changes",
-    sentence="the reading's gain changes with time or temperature",
+    sentence="what the reading makes of its load changes with time or temperature or from run to run",
     forms=lambda vehicle: (),
     reading_forms=gain_forms,
     source="empirical",

@@ -199,13 +199,18 @@ class ReadingSearch(Search):
     def unsteady(self, active):
         """A term one of whose coefficients differs from run to run, beyond doubt and by much.
 
-        Each coefficient is refitted in the runs that excite it, all others held.
+        Each coefficient is refitted in the runs that excite it, all others held. A term without a name, which may
+        say that something differs from run to run, makes no other steady.
         """
         reg = self.regression
         fit = reg.fit(self.always + active)
+        unnamed = reg.columns([k for k in active if self.terms[k].effect in UNKNOWNS])
+        fit = replace(fit, beta=np.where(np.isin(fit.columns, unnamed), 0.0, fit.beta))
         place = {c: i for i, c in enumerate(fit.columns)}
         runs = np.unique(reg.run[reg.training])
         for key in active:
+            if self.terms[key].effect in UNKNOWNS:
+                continue
             for column in reg.columns([key]):
                 beta = fit.beta[place[column]]
                 total = reg.gram[reg.training][:, column, column].sum()

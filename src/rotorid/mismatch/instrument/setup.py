@@ -422,10 +422,30 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
         temperature=all(x.temperature is not None for x in loadings)
         and any(np.ptp(x.temperature) > LEAST_WARMTH_K for x in loadings),
         temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > LEAST_WARMTH_K else (0.0, 0.0),
+        first_temperature_c=float(warmth[0]),
+        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > LEAST_WARMTH_K else None,
         session_s=session_s,
         session_clock=session_clock,
         distance=distance_column(recordings),
     )
+
+
+def zero_temperature(loadings: tuple[Loading, ...], channels: tuple[int, ...]) -> float | None:
+    """Temperature, °C, at which all readings less loads would be nothing if they went with it; None if none do.
+
+    From a line y = b T + z + g F in every channel: T_0 = −Σ w b z / Σ w b², w one over the squares left.
+    """
+    warmth = np.concatenate([x.temperature_c for x in loadings])
+    above = below = 0.0
+    for c in channels:
+        load = np.concatenate([x.load[:, c] for x in loadings])
+        left = np.concatenate([x.reading[:, c] for x in loadings]) - load
+        columns = np.stack([warmth - warmth.mean(), np.ones_like(warmth), load], axis=1)
+        (slope, middle, gain), *_ = np.linalg.lstsq(columns, left, rcond=1e-9)
+        weight = 1.0 / max(float(np.sum((left - columns @ (slope, middle, gain)) ** 2)), 1e-300)
+        above += weight * slope * middle
+        below += weight * slope**2
+    return float(warmth.mean() - above / below) if below > 0 else None
 
 
 def comes_back(loadings: tuple[Loading, ...], channel: int, largest: float) -> bool:
