@@ -437,9 +437,9 @@ def zero_temperature(loadings: tuple[Loading, ...], channels: tuple[int, ...]) -
     """
     warmth = np.concatenate([x.temperature_c for x in loadings])
     above = below = 0.0
-    for c in channels:
-        load = np.concatenate([x.load[:, c] for x in loadings])
-        left = np.concatenate([x.reading[:, c] for x in loadings]) - load
+    for k in channels:
+        load = np.concatenate([x.load[:, k] for x in loadings])
+        left = np.concatenate([x.reading[:, k] for x in loadings]) - load
         columns = np.stack([warmth - warmth.mean(), np.ones_like(warmth), load], axis=1)
         (slope, middle, gain), *_ = np.linalg.lstsq(columns, left, rcond=1e-9)
         weight = 1.0 / max(float(np.sum((left - columns @ (slope, middle, gain)) ** 2)), 1e-300)
