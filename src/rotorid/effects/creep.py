@@ -78,7 +78,7 @@ def reading_forms(instrument):
     if span > 16 * shortest:
         text = "y = F + c (F after a lag of t_c) + d (F after a lag of t_d)"
         quick = Parameter("t_c", "s", shortest, span, True, (0.03 * span, 0.12 * span), "shorter time constant")
-        slow = Parameter("t_d", "s", 0.2 * span, 6 * span, True, (0.5 * span, 2 * span), "longer time constant")
+        slow = Parameter("t_d", "s", 0.2 * span, 6 * span, True, (span,), "longer time constant")
         for alike in (True, False) if len(loaded) > 1 else (True,):
             shares, contribution = _two_times(loaded, alike)
             where = "alike on all channels" if alike else "own on each channel"

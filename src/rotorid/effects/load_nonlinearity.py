@@ -32,13 +32,15 @@ def reading_forms(instrument):
             Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group
         )
         forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
+        gains = tuple(f"gain_{AXES[c][-1].lower()}" for c in group if c < 3) + (("gain",) if group == loaded else ())
+        forms.append(replace(_s_shape(instrument, group, "S-shape" + suffix), takes_up=gains))
+        if group != loaded:
+            continue
         fifth = tuple(Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group) + tuple(
             Parameter(f"a_5_{AXES[c]}", f"1/{bracketed(UNITS[c])}4", meaning=CURVE) for c in group
         )
         odd = _both(pairs, lambda x: x.load**3, lambda x: x.load**5)
-        forms.append(Form("cube and fifth power" + suffix, "y = F + a_3 F³ + a_5 F⁵", fifth, odd))
-        gains = tuple(f"gain_{AXES[c][-1].lower()}" for c in group if c < 3) + (("gain",) if group == loaded else ())
-        forms.append(replace(_s_shape(instrument, group, "S-shape" + suffix), takes_up=gains))
+        forms.append(Form("cube and fifth power", "y = F + a_3 F³ + a_5 F⁵", fifth, odd))
     return tuple(forms)
 
 
@@ -56,7 +58,7 @@ def _s_shape(instrument, group, name):
         return Contribution(reading=reading)
 
     own = one_per_channel("a", "{}", group, meaning=CURVE)
-    starts = (0.8, 1.0, 1.3, 1.7)
+    starts = (0.9, 1.4) if len(group) > 1 else (1.2,)
     scale = Parameter("s", "1", 0.7, 3.0, True, starts, "full scale by the largest load")
     return Form(name, "y = F + a sin(π F/(s F_max))", (*own, scale), contribution)
 

@@ -67,7 +67,7 @@ def reading_forms(instrument):
         forms.append(warming(instrument, "warming up", text, instrument.run_s, lambda x: x.run_time_s, (0.15, 0.5)))
     if instrument.session_s > 5.0:
         forms.append(of("linear in the session's time", "y = F + b t_s", "{}/min", lambda x: x.session_time_s / 60.0))
-        text, span_s, shares = "y = F + b (1 − exp(−t_s/τ))", instrument.session_s, (0.1, 0.25, 0.6)
+        text, span_s, shares = "y = F + b (1 − exp(−t_s/τ))", instrument.session_s, (0.15, 0.5)
         name = "warming up over the session"
         forms.append(warming(instrument, name, text, span_s, lambda x: x.session_time_s, shares))
     if instrument.temperature:

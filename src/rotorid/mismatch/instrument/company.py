@@ -132,9 +132,10 @@ def remainder(model: ReadingModel) -> Remainder | None:
     whole = regression.explained(search.always + active)
     alone = {k: whole - regression.explained(search.always + [x for x in active if x != k]) for k in active}
     named = [k for k in active if search.terms[k].effect not in UNKNOWNS]
+    free_ids = {e for e, columns in FREE.items() if columns(model.loadings[0], model.setup.instrument)}
     found = []
     for key in named:
-        strong = [k for k in named if alone[key] < BESIDE * alone[k] and search.terms[k].effect in FREE]
+        strong = [k for k in named if alone[key] < BESIDE * alone[k] and search.terms[k].effect in free_ids]
         if not strong:
             continue
         ids = tuple(dict.fromkeys(search.terms[k].effect for k in strong))
