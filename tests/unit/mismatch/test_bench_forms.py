@@ -273,6 +273,20 @@ def test_beside_an_s_shape_the_gains_stay_at_their_belief():
     assert set(model.search.always) - set(kept_values(model.search, [key])) == {"gain_z"}
 
 
+def test_a_reading_that_saturates_has_no_wrong_gain():
+    """Right up to 15 N of 20 N: its slope is one at small loads, and 0.9 or so over all."""
+    analysis = analyse_instrument(recorded(lambda load, run, warmth: np.clip(load, -15.0, 15.0)))
+    assert named(analysis) == {"load_nonlinearity"} and not analysis.values
+
+
+def test_a_wrong_gain_stays_wrong_beside_a_curve():
+    analysis = analyse_instrument(
+        recorded(lambda load, run, warmth: 1.035 * load + 0.3 * np.array([1, -0.8, 0.9]) * (load / 20.0) ** 3)
+    )
+    assert named(analysis) == {"load_nonlinearity"}
+    assert analysis.values["reading_gain"][2] < 1.035 < analysis.values["reading_gain"][3]
+
+
 def test_a_coarse_reading_resolves_half_a_step_and_noise_of_half_a_step_all():
     quiet = set_up(recorded(lambda load, run, warmth: load, noise_n=1e-6, step_n=0.4))
     assert resolution(quiet)[:3] == pytest.approx([0.2] * 3, rel=0.2)

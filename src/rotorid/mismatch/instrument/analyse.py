@@ -6,7 +6,7 @@ on the load or on its reading, with the believed values free, 4. nonlinear param
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitte
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.instrument.values import without_needless
+from rotorid.mismatch.instrument.values import curved_gains, without_needless
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import changed_vehicle
@@ -67,10 +67,14 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
             reasons["battery_sag"] = why
     size = sizes_of_values(model)
 
-    def values_of(selection: Selection) -> dict[str, tuple[float, float]]:
-        return wrong_values(model.regression, model.search, selection, None, size, moving=False)
+    def values_of(selection: Selection, refused: Collection[str] = ()) -> dict[str, tuple[float, float]]:
+        return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
 
     model, values = without_needless(model, values_of)
+    curved: set[str] = set()
+    while more := curved_gains(model, values) - curved:
+        curved |= more
+        values = values_of(model.selection, curved)
     found = findings_of(model)
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
