@@ -251,6 +251,21 @@ def test_what_a_narrow_form_leaves_over_is_a_remainder():
     assert remainder(model_with(lambda *a: loop(*a) + 0.04, [play, "tare_offset/constant"])[2]) is None
 
 
+def test_what_holds_by_itself_has_a_second_chance_unless_it_was_refused():
+    def tilted(load, run, warmth):
+        load[:, 0] += 0.02 * load[:, 2]
+        return load
+
+    setup = set_up(recorded(tilted, runs=3))
+    terms, _ = make_terms(setup)
+    search = reading_model(setup, terms).search
+    chosen = search.second_chance([])
+    assert search.terms[chosen].effect == "crosstalk"
+    assert search.second_chance([chosen]) is None
+    search.refused = {"crosstalk": "said so", "compliance": "said so"}
+    assert search.second_chance([]) is None or search.terms[search.second_chance([])].effect not in search.refused
+
+
 def test_every_free_form_is_nothing_without_load_time_and_warming():
     still = replace(loading(np.zeros(100)), run_time_s=np.zeros(100), session_time_s=np.zeros(100))
     for effect, columns in FREE.items():
