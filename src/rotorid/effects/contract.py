@@ -10,7 +10,7 @@ Frames: world north-east-down, body forward-right-down. All functions take n ins
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -128,6 +128,8 @@ class Parameter:
 
 
 Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]
+Residuals = Sequence[tuple[Motion, dict[str, np.ndarray]]]
+"""Motions of a recording, each with the `force` and `moment` that are not explained, (n, 3) in body axes."""
 
 
 @dataclass(frozen=True)
@@ -155,17 +157,23 @@ class Form:
     (`height`: far from the ground). `always` for a form that is there in any flight. Empty takes the effect's."""
     on_loading: bool = False
     """Whether the contribution takes a `Loading` (an instrument's) in place of a `Motion`."""
-    of_reading: tuple[int, ...] = ()
-    """Linear parameters s of Ω_m = (1 + s) Ω for which recordings give the reading Ω_m alone: a fit to it is of
-    s/(1 + s)."""
+    of_reading: tuple[tuple[int, int], ...] = ()
+    """Linear parameters p of Ω_m = (1 + s) Ω + p (s itself, a bias) and the index of their s, where recordings give the
+    reading Ω_m alone: a fit to it is of p/(1 + s)."""
+    guess: Callable[[Residuals, Vehicle], tuple[tuple[float, ...], ...]] | None = None
+    """From what the believed vehicle leaves: starting values of the nonlinear parameters, where those stated are too
+    far apart to find the right ones. They take the place of those stated; without any, those hold."""
 
     takes_up: tuple[str, ...] = ()
     """Believed values (keys of the regression) that the form has a part of its own for: beside it their trust is no
     room to move in, or the two would share one slope."""
 
-    def stated(self, index: int, fitted: float) -> float:
-        """The parameter `index` as its equation has it, from the coefficient fitted to recordings."""
-        return fitted / (1.0 - fitted) if index in self.of_reading else fitted
+    def stated(self, fitted: np.ndarray) -> np.ndarray:
+        """The linear parameters as their equation has them, from the coefficients fitted to recordings, each (k,)."""
+        out = np.array(fitted, float)
+        for index, scale in self.of_reading:
+            out[self.linear.index(index)] /= 1.0 - fitted[self.linear.index(scale)]
+        return out
 
     @property
     def linear(self) -> tuple[int, ...]:

@@ -27,6 +27,19 @@ def misalignment(motion, vehicle, values):
     )
 
 
+def all_errors(motion, vehicle, values):
+    """Ω_m = (1 + s) Ω + θ × Ω + b."""
+    parts = (
+        bias(motion, vehicle, values[:3]),
+        scale(motion, vehicle, values[3:6]),
+        misalignment(motion, vehicle, values[6:]),
+    )
+    return Contribution(
+        angular_velocity=sum(p.angular_velocity for p in parts),
+        angular_acceleration=parts[1].angular_acceleration + parts[2].angular_acceleration,
+    )
+
+
 def forms(vehicle):
     needs = ("gyroscope", "rotation", "angular_velocity", "angular_acceleration")
 
@@ -41,8 +54,17 @@ def forms(vehicle):
     t = each("theta", "rad", -0.5, 0.5, "turn of the sensor about", 0.003)
     return (
         Form("bias", "Ω_m = Ω + b", b, bias, needs[:2], excited_by=("always",)),
-        Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs, of_reading=(0, 1, 2)),
+        Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs, of_reading=((0, 0), (1, 1), (2, 2))),
         Form("misalignment", "Ω_m = Ω + θ × Ω", t, misalignment, needs),
+        Form(
+            "bias, scale and misalignment",
+            "Ω_m = (1 + s) Ω + θ × Ω + b",
+            b + s + t,
+            all_errors,
+            needs,
+            of_reading=((0, 3), (1, 4), (2, 5), (3, 3), (4, 4), (5, 5)),
+            excited_by=("always",),
+        ),
     )
 
 

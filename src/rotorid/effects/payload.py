@@ -1,75 +1,61 @@
 """A payload that the user did not count: fixed to the frame, or slung below."""
 
-from math import exp, sqrt
-
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.pendulum import likely_lengths, swing
 from rotorid.effects.scale import scale
 
-SWING_RATE_HZ = 100.0
-"""Rate of the pendulum's own steps: thirty a radian for the shortest cable allowed."""
+LENGTHS_M = (0.15, 6.0)
+DAMPING_RATIO = 0.03
 
 
 def slung(motion, vehicle, values):
-    """F = m_p (e·n + L |n'|²) n, n the cable's direction downward, e = g − a what hangs it.
+    """F = m_p (e·n + L |n'|²) n, n the cable's direction downward, e = g − a what hangs it; M = z ẑ × F.
 
-    The pendulum hangs at the centre of mass; `values` are m_p (kg), L (m) and ζ. Needs many instants in a row. How it
-    hung before the first is not known: it starts at rest along the mean of e over its first period, and what that
-    misses fades with the damping. A cable does not push: where it would, the force is zero.
+    The hook is z below the centre of mass, moved by it alone; `values` are m_p (kg), m_p z (kg m), L (m) and ζ. Needs
+    many instants in a row. How it hung before the first is not known: it starts at rest along the mean of e with
+    weights 1 − ω t/π (to zero), and what that misses fades with the damping. A cable does not push: where it would,
+    the force is zero.
     """
-    mass_kg, length_m, damping_ratio = values
-    hanging = -np.einsum("nij,nj->ni", motion.rotation, motion.specific_force)
+    return _pull(motion, vehicle, values, hanging_acceleration(motion))
+
+
+def _pull(motion, vehicle, values, hanging):
+    """Wrench in body axes of what hangs by the accelerations `hanging` (n, 3)."""
+    mass_kg, hook_kg_m, length_m, damping_ratio = values
     direction, rate_square = swing(hanging, motion.time_s, length_m, damping_ratio, vehicle.gravity_m_s2)
-    tension = mass_kg * np.maximum(np.einsum("ni,ni->n", hanging, direction) + length_m * rate_square, 0.0)
-    return Contribution(force=np.einsum("nji,nj->ni", motion.rotation, tension[:, None] * direction))
+    tension = np.maximum(np.einsum("ni,ni->n", hanging, direction) + length_m * rate_square, 0.0)
+    pull = np.einsum("nji,nj->ni", motion.rotation, tension[:, None] * direction)
+    return Contribution(force=mass_kg * pull, moment=hook_kg_m * np.cross([0.0, 0.0, 1.0], pull))
 
 
-def swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2):
-    """Direction (n, 3) and squared rate (n,), rad²/s², of a spherical pendulum in world axes.
-
-    n'' = (e − (e·n) n)/L − |n'|² n − 2 ζ ω n', ω² = g/L, e = `hanging` (n, 3), m/s2, by leapfrog on blocks of
-    instants, which are averaged before and interpolated between afterwards.
-    """
-    size = len(hanging)
-    dt = float(np.median(np.diff(time_s))) if size > 1 else 1.0 / SWING_RATE_HZ
-    block = max(1, min(round(1.0 / (SWING_RATE_HZ * dt)), size))
-    edges = np.arange(0, size, block)
-    counts = np.diff(np.append(edges, size))[:, None]
-    coarse, instants = np.add.reduceat(hanging, edges) / counts, np.add.reduceat(time_s, edges) / counts[:, 0]
-    omega = sqrt(gravity_m_s2 / length_m)
-    period = max(1, round(2 * np.pi / omega / (block * dt)))
-    states = _leapfrog(coarse, coarse[:period].mean(axis=0), block * dt, length_m, 2 * damping_ratio * omega)
-    states = np.stack([np.interp(time_s, instants, column) for column in states.T], axis=1)
-    direction = states[:, :3] / np.maximum(np.linalg.norm(states[:, :3], axis=1, keepdims=True), 1e-12)
-    return direction, states[:, 3]
+def hanging_acceleration(motion):
+    """e = g − a in world axes (n, 3), m/s2: what a payload at the centre of mass hangs by."""
+    return -np.einsum("nij,nj->ni", motion.rotation, motion.specific_force)
 
 
-def _leapfrog(hanging, start, dt, length_m, damping):
-    """Direction and squared rate of a pendulum at even instants, (n, 4), from rest along `start`."""
-    # Plain numbers: a step of an array of three costs ten times as much.
-    kept = exp(-damping * dt)
-    pull = sqrt(kept) * dt / length_m
-    length = sqrt(float(start @ start))
-    x, y, z = (start / length).tolist() if length > 0 else (0.0, 0.0, 1.0)
-    # Rates live half a step behind: a half step back from rest.
-    u, v, w = (-0.5 * pull * (hanging[0] - (hanging[0] @ (x, y, z)) * np.array((x, y, z)))).tolist()
-    before = u * u + v * v + w * w
-    states = []
-    for e_x, e_y, e_z in hanging.tolist():
-        along = e_x * x + e_y * y + e_z * z
-        u = kept * u + pull * (e_x - along * x)
-        v = kept * v + pull * (e_y - along * y)
-        w = kept * w + pull * (e_z - along * z)
-        after = u * u + v * v + w * w
-        states.append((x, y, z, 0.5 * (before + after)))
-        before = after
-        x, y, z = x + dt * u, y + dt * v, z + dt * w
-        longer = sqrt(x * x + y * y + z * z)
-        x, y, z = x / longer, y / longer, z / longer
-        # The rate is carried along the sphere: it turns with the direction and keeps its size.
-        u, v, w = u * longer - dt * after * x, v * longer - dt * after * y, w * longer - dt * after * z
-    return np.array(states)
+def slung_in_air(motion, vehicle, values):
+    """As `slung`, but slowed by the air that it moves through and not by its swing: e = g − a − 2 ζ ω v."""
+    _, _, length_m, damping_ratio = values
+    slowed = 2 * damping_ratio * np.sqrt(vehicle.gravity_m_s2 / length_m)
+    through_air = np.einsum("nij,nj->ni", motion.rotation, motion.air_velocity)
+    return _pull(motion, vehicle, values, hanging_acceleration(motion) - slowed * through_air)
+
+
+def slung_starts(parts, vehicle):
+    """The likeliest lengths of a cable, each with a guess of its damping."""
+    stretches = []
+    for motion, left in parts:
+        velocity = np.zeros_like(motion.specific_force) if motion.velocity is None else motion.velocity
+        pulls = [left["force"]]
+        if "moment" in left:
+            # M = z ẑ × F: the force that the moment is of.
+            pulls.append(np.cross(left["moment"], [0.0, 0.0, 1.0]))
+        world = [np.einsum("nij,nj->ni", motion.rotation, x)[:, :2] for x in (velocity, *pulls)]
+        stretches.append((motion.time_s, hanging_acceleration(motion), world[0], world[1:]))
+    found = likely_lengths(stretches, LENGTHS_M, DAMPING_RATIO, vehicle.gravity_m_s2)
+    return tuple((length, DAMPING_RATIO) for length in found)
 
 
 def rigid(motion, vehicle, values):
@@ -98,6 +84,18 @@ def forms(vehicle):
         Parameter("m_p x", "kg m", -mass, mass, meaning="its mass times its place forward"),
         Parameter("m_p y", "kg m", -mass, mass, meaning="its mass times its place to the right"),
     )
+    cable = (
+        m_p,
+        Parameter(
+            "m_p z",
+            "kg m",
+            -mass * size.arm_m,
+            mass * size.arm_m,
+            meaning="its mass times how far below the centre its hook is",
+        ),
+        Parameter("L", "m", *LENGTHS_M, True, (0.3, 0.6, 1.2, 2.4), "length of the cable"),
+        Parameter("ζ", "1", 0.002, 0.3, True, (DAMPING_RATIO,), "damping of its swing, share of the critical"),
+    )
     products = tuple(
         Parameter(name, "kg m2", -bound, bound, meaning="product of inertia that it adds")
         for name in ("J_xy", "J_xz", "J_yz")
@@ -114,16 +112,23 @@ def forms(vehicle):
         Form("rigid", "F = −m_p a, M = −m_p r × a", (m_p, *places), rigid, ("specific_force",), must_show=(0,)),
         Form(
             "slung",
-            "F = m_p (e·n + L |n'|²) n, n'' = (e − (e·n) n)/L − |n'|² n − 2ζω n', e = g − a",
-            (
-                m_p,
-                Parameter("L", "m", 0.15, 6.0, True, (0.3, 0.6, 1.2, 2.4), "length of the cable"),
-                Parameter("ζ", "1", 0.002, 0.3, True, (0.03,), "damping of its swing, share of the critical"),
-            ),
+            "F = m_p (e·n + L |n'|²) n, M = z ẑ × F, n'' = (e − (e·n) n)/L − |n'|² n − 2ζω n', e = g − a",
+            cable,
             slung,
             ("specific_force", "rotation"),
             memory=True,
             excited_by=("always",),
+            guess=slung_starts,
+        ),
+        Form(
+            "slung, slowed by the air",
+            "F = m_p (e·n + L |n'|²) n, M = z ẑ × F, n'' = (e − (e·n) n)/L − |n'|² n − 2ζω n', e = g − a − 2ζω v",
+            cable,
+            slung_in_air,
+            ("specific_force", "rotation", "velocity"),
+            memory=True,
+            excited_by=("always",),
+            guess=slung_starts,
         ),
     )
 
@@ -137,7 +142,8 @@ EFFECT = Effect(
     sign="positive m_p pulls down; (x, y) is where it hangs from the believed centre of mass",
     validity=(
         "rigid: a point mass in the rotor plane, its own inertia left out. Slung: any angle, cable taut, hung at "
-        "the centre of mass and at rest when the recording starts, damped in proportion to its swing alone"
+        "the centre of mass and at rest when the recording starts, damped in proportion to its swing or to its speed"
+        " through the air"
     ),
     excited_by=("specific_force", "angular_velocity", "angular_acceleration"),
     confusers=("com_offset",),

@@ -37,6 +37,7 @@ from rotorid.mismatch.values import (
     throttle_scale,
     with_square_term,
     without_common_scale,
+    without_scale_of_curve,
     without_values_in_question,
 )
 from rotorid.mismatch.within_trust import beyond_trust, settled
@@ -78,6 +79,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     if found.commanded and any(f.id == "battery_sag" and f.status in CLAIMED for f in findings):
         # At which voltage the believed values hold is not stated: the largest in the set is only a guess.
         told = without_common_scale(told)
+    if found.commanded:
+        told = without_scale_of_curve(findings, told)
 
     delivered = residuals_of(model, fit)
     before, after, depends = dependence(prepared, model, segments, noisy)

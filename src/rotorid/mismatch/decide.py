@@ -67,10 +67,10 @@ def estimates(
     reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
     other = beta if suggested is None else coefficients(regression, suggested, key)[0]
     out = []
-    for index, value, also, sd in zip(term.form.linear, beta, other, np.sqrt(variance), strict=False):
+    for k, (index, value, also, sd) in enumerate(zip(term.form.linear, beta, other, np.sqrt(variance), strict=False)):
         parameter = term.form.parameters[index]
         ends = (value, min(value, also) - reach * sd, max(value, also) + reach * sd)
-        middle, low, high = (float(term.form.stated(index, x)) for x in ends)
+        middle, low, high = (float(term.form.stated(np.where(np.arange(len(beta)) == k, x, beta))[k]) for x in ends)
         out.append(Estimate(parameter.symbol, middle, parameter.unit, low, high))
     return tuple(out)
 
@@ -154,9 +154,7 @@ def wrench_findings(
         status = "ambiguous" if alternatives else "established"
         values = np.array(term.values, float)
         if term.form.linear:
-            values[list(term.form.linear)] = [
-                term.form.stated(i, b) for i, b in zip(term.form.linear, beta, strict=True)
-            ]
+            values[list(term.form.linear)] = term.form.stated(beta)
         parameters = ()
         if term.form.linear:
             stated = estimates(regression, selection.fit, search, key, beside)

@@ -210,17 +210,24 @@ def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[
             if reason:
                 why = why or reason
                 continue
-            found += form_terms(effect.id, form)
+            found += form_terms(effect.id, form, guesses(form, segments, vehicle, groups))
         terms += found
         if why and not found and effect.id not in UNKNOWNS:
             reasons[effect.id] = why
     return terms, reasons
 
 
-def form_terms(effect_id: str, form: Form) -> list[Term]:
-    """One term per starting point of a form's nonlinear parameters."""
-    starts = [()]
-    for index in form.nonlinear:
+def guesses(form: Form, segments: list[Segment], vehicle: Vehicle, groups) -> tuple[tuple[float, ...], ...]:
+    """Starting points of a form's nonlinear parameters that these recordings suggest."""
+    if form.guess is None or "force" not in groups:
+        return ()
+    return form.guess([(s.motion, residual(s, vehicle)) for s in segments], vehicle)
+
+
+def form_terms(effect_id: str, form: Form, suggested: tuple[tuple[float, ...], ...] = ()) -> list[Term]:
+    """One term per starting point of a form's nonlinear parameters: those `suggested`, or else the form's own."""
+    starts = list(suggested) or [()]
+    for index in () if suggested else form.nonlinear:
         starts = [s + (v,) for s in starts for v in form.parameters[index].starts]
     terms = []
     for number, start in enumerate(starts):

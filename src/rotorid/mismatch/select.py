@@ -92,13 +92,20 @@ class Search:
     """Ids that are not to enter, with the reason."""
 
     def __init__(
-        self, regression: Regression, sizes_of, known_sizes: np.ndarray | None = None, harms=None, joint_sizes=None
+        self,
+        regression: Regression,
+        sizes_of,
+        known_sizes: np.ndarray | None = None,
+        harms=None,
+        joint_sizes=None,
+        contradicted=None,
     ):
         """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
 
         `known_sizes`, same shape, are of effects that are in the model already (between command and rotor speed).
         `harms(key, with_it, without)` says whether a term makes one of its channels worse on the held-out rows.
         `joint_sizes(columns, beta)` gives the size of a contribution as it is, of one term or several together, (12,).
+        `contradicted(key, fit)` says whether a second sensor shows that an error of the first is none.
         """
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
@@ -106,6 +113,7 @@ class Search:
         self.sizes_of = sizes_of
         self.harms = harms
         self.joint_sizes = joint_sizes
+        self.contradicted = contradicted
         self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
@@ -350,7 +358,11 @@ class Search:
         return None
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
-        """A term that the held-out runs or the runs among themselves speak against, with the reason."""
+        """A term that another sensor, the held-out runs or the runs among themselves speak against, with the reason."""
+        if self.contradicted is not None:
+            fit = self.regression.fit(self.always + active)
+            if (none := next((k for k in active if self.contradicted(k, fit)), None)) is not None:
+                return none, "the comparison of two sensors shows nothing of it"
         if (failed := self.failed_held_out(active)) is not None:
             return failed, "it did not help on the held-out runs"
         if (unsteady := self.unsteady(active)) is not None:
@@ -515,7 +527,10 @@ class Search:
                 continue
             if len(other.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
                 continue
-            both = self.judge(key, [*rest, term.key], self.regression.fit(self.always + rest + [term.key]))
+            beside = self.regression.fit(self.always + rest + [term.key])
+            if self.contradicted is not None and self.contradicted(term.key, beside):
+                continue
+            both = self.judge(key, [*rest, term.key], beside)
             alike = len(other.beta) < len(own.beta) and both.gain < SHARE_OF_LARGEST**2 * own.gain
             if both.p_value > ALTERNATIVE_P or alike:
                 found.append(term.effect)

@@ -17,6 +17,8 @@ from rotorid.recordings import RecordingSet, Vehicle, columns
 
 IN_QUESTION = {"payload": {"mass", "thrust"}, "throttle_curve": {"thrust", "torque", "speed"}}
 """Values that an id would change by itself; thrust in a payload's is its ratio to the mass."""
+SLOPE = "a_1"
+"""Symbol of what a throttle curve adds to the slope between command and speed."""
 
 
 def believed_value(vehicle: Vehicle, key: str) -> float:
@@ -112,6 +114,19 @@ def without_common_scale(values: Values) -> Values:
     if "torque" in values and abs(change) > max(VALUE_Z * sd, SMALLEST_CHANGE):
         kept["torque"] = (change, sd)
     return kept
+
+
+def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
+    """Values without a thrust that the slope of a throttle curve would make up for within its own interval.
+
+    Where rotor speeds are known from commands alone, a thrust coefficient larger by x is a slope larger by x/2.
+    """
+    curve = next((f for f in findings if f.id == "throttle_curve" and f.status in ("established", "ambiguous")), None)
+    slope = next((p for p in curve.parameters if p.symbol == SLOPE), None) if curve else None
+    if slope is None or "thrust" not in values:
+        return values
+    reach = (slope.high - slope.low) / 2 / max(1.0 + slope.value, 1e-3)
+    return without_common_scale(values) if abs(values["thrust"][0]) / 2 < reach else values
 
 
 def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.louder import NOISE_BAND, band_power
@@ -32,6 +33,7 @@ from rotorid.mismatch.speedpath import (
     commanded_path,
     smoothed_acceleration,
 )
+from rotorid.mismatch.two_sensors import refute
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 
@@ -206,8 +208,14 @@ def searched(
         acts = regression.columns([key])
         return spoils_a_channel(contributions, held, acts, with_it, without, noise, per)
 
+    errors = {t.key for t in terms if t.effect in catalogue() and catalogue()[t.effect].kind == "sensor"}
+    fitted_rows = [r for r in rows if r.run in prepared.split.training]
+
+    def contradicted(key: str, fit: Fit) -> bool:
+        return key in errors and refute(fitted_rows, fit, regression.columns([key]), noise)
+
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
-    search = Search(regression.without_winds(), sizes_of, known_sizes, harms, seconds.sizes)
+    search = Search(regression.without_winds(), sizes_of, known_sizes, harms, seconds.sizes, contradicted)
     selection = search.run(start)
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.pendulum import likely_lengths
 from rotorid.effects.scale import hover_inflow_m_s, scale
 from tests.unit.mismatch.test_rows import still
 from tests.unit.vehicle.thesis import thesis_vehicle
@@ -52,7 +53,21 @@ FORCE_AND_MOMENT = [
         *("payload", "rigid", [0.1, 0.005, 0.0], dict(specific_force=row(0, 0, -G))),
         *((0, 0, 0.1 * G), (0, -0.005 * G, 0)),
     ),
-    ("payload", "slung", [0.1, 0.5, 0.05], dict(specific_force=row(0, 0, -G)), (0, 0, 0.1 * G), None),
+    ("payload", "slung", [0.1, 0.01, 0.5, 0.05], dict(specific_force=row(0, 0, -G)), (0, 0, 0.1 * G), None),
+    # Hung along what holds it, (1, 0, G) here: on a hook 10 cm below it turns the nose up, ẑ × F = (−F_y, F_x, 0).
+    (
+        *("payload", "slung", [0.1, 0.01, 0.5, 0.05], dict(specific_force=row(-1, 0, -G))),
+        *((0.1, 0, 0.1 * G), (0, 0.01, 0)),
+    ),
+    # Flown at 2 m/s north through the air it trails by 2 ζ ω v, ω = √(g/L): 0.1 · 4.4294 · 2 m/s2.
+    (
+        *("payload", "slung, slowed by the air", [0.1, 0.0, 0.5, 0.05]),
+        *(
+            dict(specific_force=row(0, 0, -G), velocity=row(2, 0, 0)),
+            (-0.1 * 0.1 * np.sqrt(G / 0.5) * 2, 0, 0.1 * G),
+            None,
+        ),
+    ),
     ("rotational_damping", "linear", [1e-3, 2e-3, 0], dict(angular_velocity=row(3, -1, 5)), None, (-3e-3, 2e-3, 0)),
     ("rotational_damping", "quadratic", [1e-3, 1e-3, 0], dict(angular_velocity=row(3, -2, 5)), None, (-9e-3, 4e-3, 0)),
     # rotor 1 (ccw) speeds up by 1000 rad/s²: the airframe turns clockwise
@@ -157,7 +172,7 @@ def test_a_vortex_ring_takes_most_at_the_hover_inflow():
         np.testing.assert_allclose(added.force, [[0, 0, 0.3 * left * 4 * T]], atol=1e-9)
 
 
-def slung_pull(world):
+def slung_pull(world, values=(0.1, 0.0, 1.0, 0.05)):
     """Force (n, 3), N, of 0.1 kg on 1 m below a level vehicle with specific force `world` (n, 3), at 200 Hz."""
     size = len(world)
     level = np.tile(NORTH, (size, 1, 1))
@@ -169,7 +184,7 @@ def slung_pull(world):
         rotation=level,
     )
     slung = {f.name: f for f in catalogue()["payload"].forms(thesis_vehicle())}["slung"]
-    return slung.contribution(motion, thesis_vehicle(), np.array([0.1, 1.0, 0.05])).force
+    return slung.contribution(motion, thesis_vehicle(), np.array(values)).force
 
 
 def test_a_slung_load_swings_at_its_own_frequency():
@@ -185,6 +200,21 @@ def test_a_slung_load_swings_at_its_own_frequency():
     assert np.diff(t[peaks]).mean() == pytest.approx(2.0022, rel=0.005)
     # Undamped it would swing from 0 to −2 m_p; ζ = 0.05 leaves 1 + exp(−π ζ) of it, and −m_p in the end.
     assert pull.min() == pytest.approx(-0.1 * (1 + np.exp(-0.05 * np.pi)), rel=0.01)
+
+
+def test_the_length_of_a_cable_shows_in_a_force_and_in_the_moment_on_its_hook():
+    """A minute below a vehicle that is shaken about the level: 1.4 m is found among 15 cm to 6 m, to a hundredth."""
+    rng = np.random.default_rng(3)
+    world = np.tile([0.0, 0.0, -G], (12_000, 1))
+    world[:, :2] += 0.3 * np.repeat(rng.standard_normal((120, 2)), 100, axis=0)
+    force = slung_pull(world, [0.1, 0.0, 1.4, 0.02])[:, :2] + 0.1 * rng.standard_normal((12_000, 2))
+    parts = (np.arange(12_000) / 200.0, -world, np.zeros((12_000, 2)))
+    noise = 0.1 * rng.standard_normal((12_000, 2))
+    for pulls in ([force], [noise, force]):
+        found = likely_lengths([(*parts, pulls)], (0.15, 6.0), 0.03, G)
+        assert found[0] == pytest.approx(1.4, rel=0.02)
+    short = [x[:200] for x in parts]
+    assert likely_lengths([(*short, [force[:200]])], (0.15, 6.0), 0.03, G) == ()
 
 
 def test_a_slung_load_swings_far_and_pulls_with_its_turning():
@@ -219,8 +249,9 @@ def test_bounds_follow_the_vehicle():
 
 
 def test_a_scale_fitted_to_the_reading_itself_is_stated_of_what_it_should_have_read():
-    """Ω_m = 1.08 Ω: the reading is off by 0.08 Ω = 0.08 / 1.08 of itself."""
-    scale = next(f for f in catalogue()["gyro_error"].forms(thesis_vehicle()) if f.name == "scale")
-    assert [scale.stated(i, 0.08 / 1.08) for i in range(3)] == pytest.approx([0.08] * 3)
-    bias = next(f for f in catalogue()["gyro_error"].forms(thesis_vehicle()) if f.name == "bias")
-    assert bias.stated(0, 0.08) == 0.08
+    """Ω_m = 1.08 Ω + 0.02: of the reading 0.08 / 1.08 and 0.02 / 1.08 are error."""
+    forms = {f.name: f for f in catalogue()["gyro_error"].forms(thesis_vehicle())}
+    assert forms["scale"].stated(np.full(3, 0.08 / 1.08)) == pytest.approx([0.08] * 3)
+    whole = forms["bias, scale and misalignment"].stated(np.array([*[0.02 / 1.08] * 3, *[0.08 / 1.08] * 3, 0.1, 0, 0]))
+    assert whole == pytest.approx([0.02] * 3 + [0.08] * 3 + [0.1, 0, 0])
+    assert forms["bias"].stated(np.array([0.08, 0, 0])) == pytest.approx([0.08, 0, 0])

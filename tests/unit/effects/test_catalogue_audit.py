@@ -366,14 +366,21 @@ def test_the_simulator_turns_the_rotors_as_the_speed_path_says(effect, form):
 # --- that it recovers its own parameters
 
 
-def fitted(function, form) -> tuple[np.ndarray, np.ndarray]:
-    """Least squares of `function(values)`, in units of its noise: estimate and one-sigma."""
+def fitted(function, form, suggested=()) -> tuple[np.ndarray, np.ndarray]:
+    """Least squares of `function(values)`, in units of its noise: estimate and one-sigma.
+
+    It starts at the best of the form's own starting values, or of those `suggested` by the recording.
+    """
     low, high = (np.array([getattr(p, side) for p in form.parameters]) for side in ("low", "high"))
     count = max(len(p.starts) for p in form.parameters) or 1
     starts = [
         np.array([p.starts[min(k, len(p.starts) - 1)] if p.starts else 0.0 for p in form.parameters])
         for k in range(count)
     ]
+    if suggested:
+        starts = [np.zeros(len(form.parameters)) for _ in suggested]
+        for start, values in zip(starts, suggested, strict=True):
+            start[list(form.nonlinear)] = values
     best = min(starts, key=lambda v: np.sum(function(np.clip(v, low, high)) ** 2))
     inside = np.clip(best, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
     found = least_squares(
@@ -402,12 +409,15 @@ def test_a_form_recovers_its_own_parameters(effect, form):
         return np.concatenate([p.get(g, zero).ravel() / NOISE[g] for p in parts for g in groups])
 
     truth = np.concatenate([m[g].ravel() / NOISE[g] for m in measured for g in groups])
-    found, sd = fitted(lambda v: model(v) - truth, form)
+    suggested = (
+        form.guess(list(zip([s.motion for s in stretches], measured, strict=True)), vehicle) if form.guess else ()
+    )
+    found, sd = fitted(lambda v: model(v) - truth, form, suggested)
     # First order in a sensor's own error, as above.
     allowed = 0.05 * np.abs(values).max() if effect.kind == "sensor" else 0.0
     np.testing.assert_allclose(found, values, rtol=1e-4, atol=max(allowed, 1e-9))
     noisy = truth + np.random.default_rng(7).standard_normal(len(truth))
-    found, sd = fitted(lambda v: model(v) - noisy, form)
+    found, sd = fitted(lambda v: model(v) - noisy, form, suggested)
     assert (np.abs(found - values) < 4.0 * sd + allowed).all(), (found, values, sd)
     assert (sd / np.abs(values)).min() < 0.25
 

@@ -13,7 +13,9 @@ from rotorid.recordings import RecordingSet, Run, Vehicle
 
 SHORTEST_GAP_S = 0.3
 SHORTEST_GAP_PERIODS = 12
-"""A missing or held stretch counts from this many of the sensor's own periods on."""
+"""A held stretch counts from this many of the sensor's own periods on, a missing one as well."""
+SHORTEST_EMPTY_S = 1.0
+"""Empty cells say themselves that nothing was read: a link that loses half a second now and then is no lost sensor."""
 SHORTEST_FREEZE_PERIODS = 8
 SHORTEST_FREEZE_S = 0.04
 """Where all columns of a sensor stand still at once, a shorter stretch is no chance."""
@@ -131,7 +133,7 @@ def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
         return mask
     gap = np.diff(time_s[index])
     # The second shortest tenth of the recording's habit: a sensor with many holes keeps its own period.
-    longest = max(SHORTEST_GAP_S, SHORTEST_GAP_PERIODS * float(np.median(gap)), 3 * float(np.quantile(gap, 0.98)))
+    longest = max(SHORTEST_EMPTY_S, SHORTEST_GAP_PERIODS * float(np.median(gap)), 3 * float(np.quantile(gap, 0.98)))
     for k in np.flatnonzero(gap > longest):
         mask[index[k] + 1 : index[k + 1]] = True
     return mask
