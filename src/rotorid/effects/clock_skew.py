@@ -29,28 +29,55 @@ def at_other_times(loading, late_s):
     return Contribution(reading=between_samples(loading.load, steps) - loading.load)
 
 
-def other_rate(loading, vehicle, values):
-    """y(t) = F(t − e t), t from the run's start."""
-    return at_other_times(loading, values[0] * loading.run_time_s)
+def _since_run(loading):
+    return loading.run_time_s
 
 
-def other_rate_and_start(loading, vehicle, values):
-    """y(t) = F(t − T − e t), t from the run's start."""
-    return at_other_times(loading, values[1] + values[0] * loading.run_time_s)
+def _since_session(loading):
+    return loading.session_time_s
 
 
-def reading_forms(instrument):
+def other_rate(since_s):
+    """y(t) = F(t − e t), t = `since_s(loading)`."""
+
+    def contribution(loading, vehicle, values):
+        return at_other_times(loading, values[0] * since_s(loading))
+
+    return contribution
+
+
+def other_rate_and_start(since_s):
+    """y(t) = F(t − T − e t), t = `since_s(loading)`."""
+
+    def contribution(loading, vehicle, values):
+        return at_other_times(loading, values[1] + values[0] * since_s(loading))
+
+    return contribution
+
+
+def _forms(instrument, name, span_s, since_s, t):
+    """The two forms of a clock that counts from a start `span_s` before its last sample."""
     dt = 1.0 / instrument.rate_hz
-    rate = 1.0 / max(instrument.rate_hz * instrument.duration_s, 10.0)
+    rate = 1.0 / max(instrument.rate_hz * span_s, 10.0)
     starts = tuple(s * k * rate for k in (3.0, 15.0, 60.0) if k * rate < 0.1 for s in (-1, 1))
     skew = Parameter("e", "1", -0.1, 0.1, True, starts, "seconds lost per second", negligible=rate)
     at_start = tuple(k * dt for k in (-4.0, 4.0))
-    late = Parameter("T", "s", -30 * dt, 60 * dt, True, at_start, "lateness at the start of a run", negligible=2 * dt)
-    text = "y(t) = F(t − T − e t)"
+    late = Parameter("T", "s", -30 * dt, 60 * dt, True, at_start, "lateness at the start", negligible=2 * dt)
+    alone, both = other_rate(since_s), other_rate_and_start(since_s)
     return (
-        Form("other rate", "y(t) = F(t − e t)", (skew,), other_rate, excited_by=("load_change",)),
-        Form("other rate and start", text, (skew, late), other_rate_and_start, excited_by=("load_change",)),
+        Form(f"other rate{name}", f"y(t) = F(t − e {t})", (skew,), alone, excited_by=("load_change",)),
+        Form(
+            f"other rate and start{name}", f"y(t) = F(t − T − e {t})", (skew, late), both, excited_by=("load_change",)
+        ),
     )
+
+
+def reading_forms(instrument):
+    """A clock that each run starts anew, and one that runs on through the session, as `time_s` then does."""
+    forms = _forms(instrument, "", instrument.duration_s, _since_run, "t")
+    if instrument.session_clock:
+        forms += _forms(instrument, " over the session", instrument.session_s, _since_session, "t_s")
+    return forms
 
 
 EFFECT = Effect(

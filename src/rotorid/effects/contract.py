@@ -157,14 +157,16 @@ class Form:
     (`height`: far from the ground). `always` for a form that is there in any flight. Empty takes the effect's."""
     on_loading: bool = False
     """Whether the contribution takes a `Loading` (an instrument's) in place of a `Motion`."""
-    settles: tuple[str, ...] = ()
-    """Believed values (`thrust` …) that the form's own nonlinear parameters say again: held while those are fitted."""
     of_reading: tuple[tuple[int, int], ...] = ()
     """Linear parameters p of Ω_m = (1 + s) Ω + p (s itself, a bias) and the index of their s, where recordings give the
     reading Ω_m alone: a fit to it is of p/(1 + s)."""
     guess: Callable[[Residuals, Vehicle], tuple[tuple[float, ...], ...]] | None = None
     """From what the believed vehicle leaves: starting values of the nonlinear parameters, where those stated are too
     far apart to find the right ones. They take the place of those stated; without any, those hold."""
+
+    takes_up: tuple[str, ...] = ()
+    """Believed values (keys of the regression) that the form has a part of its own for: beside it their trust is no
+    room to move in, or the two would share one slope."""
 
     def stated(self, fitted: np.ndarray) -> np.ndarray:
         """The linear parameters as their equation has them, from the coefficients fitted to recordings, each (k,)."""

@@ -42,6 +42,25 @@ def _own(channels):
     return contribution
 
 
+def _two_times(channels, alike):
+    """y = F + c (F after t_c) + d (F after t_d), the shares alike on all channels or own."""
+
+    def contribution(loading, vehicle, values):
+        reading = np.zeros((loading.size, 6))
+        shares = np.reshape(values[:-2], (2, -1))
+        for own, tau_s in zip(shares, values[-2:], strict=True):
+            reading[:, list(channels)] += creeping(loading, tau_s)[:, list(channels)] * own
+        return Contribution(reading=reading)
+
+    if alike:
+        shares = tuple(Parameter(n, "1", -0.05, 0.3, meaning="share of the load") for n in "cd")
+    else:
+        shares = tuple(
+            p for n in "cd" for p in one_per_channel(n, "1", channels, low=-0.05, high=0.3, meaning="share of the load")
+        )
+    return shares, contribution
+
+
 def reading_forms(instrument):
     span = instrument.duration_s
     shortest = max(0.5, 10.0 / instrument.rate_hz)
@@ -56,6 +75,14 @@ def reading_forms(instrument):
     if len(loaded) > 1:
         own = one_per_channel("c", "1", loaded, low=-0.05, high=0.3, meaning="share of the load")
         forms.append(Form("own on each channel", text, (*own, tau), _own(loaded)))
+    if span > 16 * shortest:
+        text = "y = F + c (F after a lag of t_c) + d (F after a lag of t_d)"
+        quick = Parameter("t_c", "s", shortest, span, True, (0.03 * span, 0.12 * span), "shorter time constant")
+        slow = Parameter("t_d", "s", 0.2 * span, 6 * span, True, (span,), "longer time constant")
+        for alike in (True, False) if len(loaded) > 1 else (True,):
+            shares, contribution = _two_times(loaded, alike)
+            where = "alike on all channels" if alike else "own on each channel"
+            forms.append(Form(f"two time constants, {where}", text, (*shares, quick, slow), contribution))
     return tuple(forms)
 
 
@@ -71,8 +98,8 @@ EFFECT = Effect(
         "comes back likewise after unloading"
     ),
     validity=(
-        "one exponential with one time constant, linear in the load, from rest; several time constants at "
-        "once and a change with temperature are left out"
+        "one or two exponentials, linear in the load, from rest; what the sensor bore before the run and a change with "
+        "temperature are left out"
     ),
     excited_by=("load_change",),
     confusers=("zero_drift", "wall_interference", "battery_sag", "amplifier_filter"),

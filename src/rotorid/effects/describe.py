@@ -42,6 +42,9 @@ EXAMPLE_STAND = Instrument(
     runs=("first", "second"),
     tilts=True,
     temperature=True,
+    temperatures_c=(20.0, 30.0),
+    session_s=200.0,
+    session_clock=True,
     returns=ALL_CHANNELS,
     distance="wall_distance_m",
 )
@@ -88,7 +91,8 @@ Written by `rotorid effects --markdown`; a test holds that this page is the cata
 velocity. The number after "catalogue" in a source is the row of the project's list of omitted physics. Ranges are
 physical bounds for the thesis's quadrotor (0.652 kg, 0.125 m arms); they scale with the vehicle. Forms "on an
 instrument" are those of kinds `stand` and `bench`: F is the load that the believed values predict at the sensor, y the
-reading, f a frequency; their ranges are those of a stand read at 100 Hz for 60 s.
+reading, f a frequency; their ranges are those of a stand read at 100 Hz for 60 s, in a session of 200 s between 20 °C
+and 30 °C.
 
 An effect is one file of `src/rotorid/effects/`; the forms inside one id compete. Any form can be switched on in a
 vehicle file and is then simulated and recorded:

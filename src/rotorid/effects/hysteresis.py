@@ -28,6 +28,28 @@ def play(load, width):
     return _play(np.ascontiguousarray(load), width)
 
 
+@njit(cache=True)
+def _settling(load, width):
+    out = np.empty_like(load)
+    state, before = 0.0, 0.0
+    for i in range(len(load)):
+        step = load[i] - before
+        towards = 1.0 if step > 0.0 else -1.0
+        state = towards + (state - towards) * np.exp(-abs(step) / width)
+        before = load[i]
+        out[i] = state
+    return out
+
+
+def settling(load, width):
+    """Branch z of a load (n,) from none: dz = (dF − |dF| z)/width, exact for steps of any length, (n,).
+
+    A turned load changes branch by an exponential of the way gone since (P. Dahl, A Solid Friction Model, 1968, with
+    exponent one; the rate-independent Duhem and Bouc-Wen loops of that exponent are the same).
+    """
+    return _settling(np.ascontiguousarray(load), width)
+
+
 def branches(instrument, share):
     """Branch of each channel between −1 (load falling) and 1 (rising), (n, 6), by the play operator."""
 
@@ -71,6 +93,7 @@ def reading_forms(instrument):
                 own = one_per_channel("h", "{}", (c,), meaning=HALF)
                 for shape, signal in (("play", branches(instrument, share)), ("lens", lens(instrument, share))):
                     forms.append(Form(f"{name} {shape} of {AXES[c]}", text, own, cross_channels(((c, c),), signal)))
+    forms += _exponential_forms(instrument, loaded)
     shares = tuple(Parameter(f"h_{n}", "1", meaning=HALF + " by the largest load") for n in ("narrow", "wide"))
     forms.append(Form("two plays, alike on all channels", text, shares, _alike(instrument, loaded)))
     if len(loaded) == 1:
@@ -85,6 +108,37 @@ def reading_forms(instrument):
         )
         forms.append(Form("three plays, alike on forces and on moments", text, own, _of_a_range(instrument, groups)))
     return tuple(forms)
+
+
+def _exponential_forms(instrument, loaded):
+    """Loops of exponentials: one width for all channels, by their largest loads, then one of its own for each."""
+    text = "y = F + h z, dz = (dF − |dF| z)/(w F_max)"
+    meaning = "way to the other branch by the largest load"
+
+    def width(name, *starts):
+        return Parameter(name, "1", 0.002, 0.6, True, starts, meaning)
+
+    def form(name, channels, widths):
+        own = one_per_channel("h", "{}", channels, meaning=HALF)
+        return Form(name, text, (*own, *widths), _exponential(instrument, channels))
+
+    forms = [form("exponential loop", loaded, (width("w", 0.02, 0.06, 0.2),))]
+    if 1 < len(loaded) <= 3:
+        forms.append(form("exponential loops of own width", loaded, tuple(width(f"w_{AXES[c]}", 0.06) for c in loaded)))
+        forms += [form(f"exponential loop of {AXES[c]}", (c,), (width("w", 0.02, 0.06, 0.2),)) for c in loaded]
+    return forms
+
+
+def _exponential(instrument, channels):
+    def contribution(loading, vehicle, values):
+        reading, load = np.zeros((loading.size, 6)), change_of_load(loading)
+        heights, widths = values[: len(channels)], values[len(channels) :]
+        for i, c in enumerate(channels):
+            width = widths[i if len(widths) > 1 else 0] * instrument.largest[c]
+            reading[:, c] = heights[i] * settling(load[:, c], width)
+        return Contribution(reading=reading)
+
+    return contribution
 
 
 def _alike(instrument, loaded):
@@ -139,8 +193,8 @@ EFFECT = Effect(
     ),
     validity=(
         "a loop independent of the rate of loading, by play operators whose half widths are 2, 5 and 15 per cent of "
-        "the largest load; shows only where loads come back from above, and what was loaded before the run is not "
-        "known"
+        "the largest load or by exponentials of the way since the load turned; shows only where loads come back from "
+        "above, and what was loaded before the run is not known"
     ),
     excited_by=("load_change",),
     confusers=("creep", "amplifier_filter", "motor_lag"),

@@ -1,9 +1,11 @@
 """A reading that is not proportional to the load on its own axis."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter
-from rotorid.effects.loading import AXES, UNITS, bracketed, cross_channels
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import AXES, UNITS, bracketed, cross_channels, one_per_channel
 
 CURVE = "curvature of the characteristic"
 
@@ -30,11 +32,39 @@ def reading_forms(instrument):
             Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group
         )
         forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
+        gains = tuple(f"gain_{AXES[c][-1].lower()}" for c in group if c < 3) + (("gain",) if group == loaded else ())
+        forms.append(replace(_s_shape(instrument, group, "S-shape" + suffix), takes_up=gains))
+        if group != loaded:
+            continue
+        fifth = tuple(Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group) + tuple(
+            Parameter(f"a_5_{AXES[c]}", f"1/{bracketed(UNITS[c])}4", meaning=CURVE) for c in group
+        )
+        odd = _both(pairs, lambda x: x.load**3, lambda x: x.load**5)
+        forms.append(Form("cube and fifth power", "y = F + a_3 F³ + a_5 F⁵", fifth, odd))
     return tuple(forms)
 
 
-def _both(pairs):
-    square, cube = cross_channels(pairs, lambda x: x.load**2), cross_channels(pairs, lambda x: x.load**3)
+def _s_shape(instrument, group, name):
+    """y = F + a sin(π F/(s F_max)): right at no load and at the full scale, s times the largest load recorded.
+
+    Its slope at no load is a part of the curve: what it takes there of the linear gain is no wrong calibration.
+    """
+    largest = np.array(instrument.largest)
+
+    def contribution(loading, vehicle, values):
+        reading = np.zeros((loading.size, 6))
+        turn = np.sin(np.pi * loading.load / (values[-1] * largest))
+        reading[:, list(group)] = turn[:, list(group)] * np.asarray(values[:-1])
+        return Contribution(reading=reading)
+
+    own = one_per_channel("a", "{}", group, meaning=CURVE)
+    starts = (0.9, 1.4) if len(group) > 1 else (1.2,)
+    scale = Parameter("s", "1", 0.7, 3.0, True, starts, "full scale by the largest load")
+    return Form(name, "y = F + a sin(π F/(s F_max))", (*own, scale), contribution)
+
+
+def _both(pairs, one=lambda x: x.load**2, other=lambda x: x.load**3):
+    square, cube = cross_channels(pairs, one), cross_channels(pairs, other)
 
     def contribution(loading, vehicle, values):
         first, second = square(loading, vehicle, values[: len(pairs)]), cube(loading, vehicle, values[len(pairs) :])

@@ -44,7 +44,17 @@ class Instrument:
     tilts: bool = False
     """Whether the mount's attitude differs between runs or within one."""
     temperature: bool = False
-    """Whether a temperature is recorded that changes."""
+    """Whether a temperature is recorded that changes within a run."""
+    temperatures_c: tuple[float, float] = (0.0, 0.0)
+    """Lowest and highest temperature of the set, where one is recorded; alike where it says nothing."""
+    first_temperature_c: float = 0.0
+    """Temperature of the set's first sample."""
+    zero_temperature_c: float | None = None
+    """Temperature at which the readings suggest that the zero was right: where the search for it starts."""
+    session_s: float = 0.0
+    """How long the session was, all runs together, as far as known; 0 of a single run."""
+    session_clock: bool = False
+    """Whether `time_s` runs on from run to run; else pauses between the runs are not known."""
     returns: tuple[int, ...] = ()
     """Channels whose load also comes back from above to values that are not zero."""
     by_hand: bool = False
@@ -77,6 +87,10 @@ class Loading:
     """Roll and pitch of the mount, (n,) each, rad."""
     temperature: np.ndarray | None = None
     """Change of temperature since the run's first sample, (n,), K."""
+    temperature_c: np.ndarray | None = None
+    """The temperature itself, (n,), °C."""
+    session_time_s: np.ndarray | None = None
+    """Time since the first sample of the set, (n,), s: `Instrument.session_clock` says whether pauses are in it."""
     distance: np.ndarray | None = None
     """Distance to a wall or fixture, (n,), m."""
     command: np.ndarray | None = None

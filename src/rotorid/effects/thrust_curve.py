@@ -126,7 +126,7 @@ def reading_forms(instrument):
         (excess, more),
         power_of_speed(vehicle),
         ("rotor_speed",),
-        settles=("thrust",),
+        takes_up=("thrust",),
     )
     plain = forms(vehicle)
     cube = next(f.parameters for f in plain if f.name == "cubic term")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -86,6 +87,9 @@ class Selection:
 
 class Search:
     """Forward search with replacement of forms, backward checks and pair moves."""
+
+    refused: Mapping[str, str] = {}
+    """Ids that are not to enter, with the reason."""
 
     def __init__(
         self,
@@ -287,7 +291,7 @@ class Search:
         """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
         active = list(active or [])
         trail: list[str] = []
-        refuted: dict[str, str] = {}
+        refuted: dict[str, str] = dict(self.refused)
         for _ in range(MOST_EFFECTS):
             dropped = dict(refuted)
             active = self._grown(active, dropped, trail)

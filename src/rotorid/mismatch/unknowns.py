@@ -11,6 +11,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.loading import AXES, on_channels
 
 SWING_DAMPING = 0.05
 SWING_STARTS_RAD_S = (4.0, 8.0, 16.0)
@@ -92,6 +93,53 @@ def _swing_forms(vehicle):
     )
 
 
+def gain_forms(instrument):
+    """y = F + g x F on each loaded channel of a bench, x the temperature, the time, or one after the other each run.
+
+    On a stand what turns the rotors changes with time and temperature, too.
+    """
+    if not instrument.bench:
+        return ()
+    loaded = tuple(c for c in instrument.channels if c in instrument.loaded)
+    forms = [_gain("with the time in a run", "1/min", loaded, lambda x: x.run_time_s / 60.0)]
+    if instrument.session_s > 0:
+        forms.append(_gain("with the session's time", "1/min", loaded, lambda x: x.session_time_s / 60.0))
+    low, high = instrument.temperatures_c
+    if high > low:
+        forms.append(_gain("with temperature", "1/K", loaded, lambda x: x.temperature_c - low))
+    runs = instrument.training or instrument.runs
+    if len(runs) > 1:
+        forms.append(_mixture_of_each(runs, loaded, instrument.channels))
+    for run in runs if len(runs) > 1 else ():
+        forms.append(_gain(f"in {run}", "1", loaded, lambda x, run=run: np.full(x.size, float(x.run == run))))
+    return tuple(forms)
+
+
+def _mixture_of_each(runs, loaded, channels):
+    """y_i = F_i + M_ij(run) F_j, the mean of M over the runs nothing: that would be crosstalk or a gain.
+
+    A clamp that was moved, a cell that was calibrated anew.
+    """
+    entries = [(run, i, j) for run in runs[:-1] for i in channels for j in loaded]
+
+    def contribution(loading, vehicle, values):
+        reading = np.zeros((loading.size, 6))
+        for (run, i, j), value in zip(entries, values, strict=True):
+            if loading.run in (run, runs[-1]):
+                reading[:, i] += (value if loading.run == run else -value) * loading.load[:, j]
+        return Contribution(reading=reading)
+
+    parameters = tuple(Parameter(f"M_{AXES[i]},{AXES[j]}({run})", "1") for run, i, j in entries)
+    return Form("loads mixed anew in each run", "y_i = F_i + M_ij(run) F_j", parameters, contribution)
+
+
+def _gain(name, unit, channels, factor):
+    def signal(loading):
+        return loading.load * factor(loading)[:, None]
+
+    return on_channels(name, "y = F + g x F", "g", unit, channels, signal)
+
+
 PLACE = Effect(
     id="unknown_place",
     name="a force that depends on the place in the room",
@@ -113,11 +161,20 @@ SWING = Effect(
     forms=_swing_forms,
     source="empirical",
 )
-UNKNOWNS = {e.id: e for e in (PLACE, HEADING, SWING)}
+GAIN = Effect(
+    id="unknown_gain",
+    name="a gain that changes",
+    sentence="what the reading makes of its load changes with time or temperature or from run to run",
+    forms=lambda vehicle: (),
+    reading_forms=gain_forms,
+    source="empirical",
+)
+UNKNOWNS = {e.id: e for e in (PLACE, HEADING, SWING, GAIN)}
 DEPENDS_ON = {
     "unknown_place": ("position",),
     "unknown_heading": ("heading",),
     "unknown_swing": ("specific_force", "time_s"),
+    "unknown_gain": ("load", "time_s"),
 }
 """Regime variables that each depends on, for the verdict."""
 LEAST_TURN_RAD = 0.25

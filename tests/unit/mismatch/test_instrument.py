@@ -73,7 +73,9 @@ def stand_loading(vehicle: Vehicle, seconds: float = 30.0, tilt=(0.2, -0.1), see
     moment[:, 0], moment[:, 1] = thrust @ hubs[:, 1], -thrust @ hubs[:, 0]
     heavy = weight(motion, vehicle)
     load = at_sensor(force, moment, motion, vehicle) + heavy
-    return Loading("a", t, t, load, load, heavy[0], motion, (roll, pitch))
+    return Loading(
+        "a", t, t, load, load, heavy[0], motion, (roll, pitch), 1e-2 * t, 20 + 1e-2 * t, session_time_s=t + 100.0
+    )
 
 
 def instrument_for(loading: Loading, vehicle: Vehicle) -> Instrument:
@@ -92,6 +94,11 @@ def instrument_for(loading: Loading, vehicle: Vehicle) -> Instrument:
         largest=largest,
         tilts=True,
         returns=every,
+        temperature=True,
+        temperatures_c=(20.0, 20.3),
+        first_temperature_c=20.0,
+        session_s=200.0,
+        session_clock=True,
     )
 
 

@@ -7,6 +7,7 @@ on the load or on its reading, with the believed values free, 4. nonlinear param
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,14 +19,16 @@ from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_company
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
+from rotorid.mismatch.instrument.company import without_remainders
 from rotorid.mismatch.instrument.decide import findings_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.instrument.values import without_needless
+from rotorid.mismatch.instrument.values import curved_gains, without_needless
 from rotorid.mismatch.select import Selection
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import changed_vehicle
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -43,13 +46,19 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     terms, reasons = make_terms(setup)
     measured = all(x.measured for x in setup.loadings)
     chain = find_chain(setup)
-    model = fitted_model(setup, terms, loadings=None if chain is None or measured else moved(setup, chain))
-    model, company = without_company(model)
+    loadings = None if chain is None or measured else moved(setup, chain)
+    model = fitted_model(setup, terms, loadings=loadings)
     if chain is not None and not measured and model.selection.active:
         # What was found at the reading changes what the commands must explain: once more with it known.
         others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
         chain = find_chain(setup, others)
-        model, company = without_company(fitted_model(setup, terms, model.selection.active, moved(setup, chain)))
+        loadings = moved(setup, chain)
+        model = fitted_model(setup, terms, model.selection.active, loadings)
+
+    def once_more(active: list[str], refused: dict[str, str]) -> ReadingModel:
+        return fitted_model(setup, model.terms, active, loadings, refused)
+
+    model, company = without_company(without_remainders(model, once_more))
     if chain is None:
         reasons.update({k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in SPEED_IDS})
     else:
@@ -65,7 +74,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
 
     model, values = without_needless(model, values_of)
-    while needless := needless_values(model, values):
+    while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection)
     found = findings_of(model, company)
@@ -233,7 +242,7 @@ def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list
     base = regression.fit(held + model.selection.active)
     taken, out = {f.id for f in findings}, {}
     for term in regression.terms:
-        if term.kind != "effect" or term.effect in taken or term.effect in out:
+        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
             continue
         fit = regression.fit([*held, *model.selection.active, term.key])
         p = regression.wald(fit, regression.columns([term.key]), search.blocks)
@@ -251,6 +260,9 @@ def make_traces(setup: Setup, model: ReadingModel, plain: dict, values: dict):
     loose = {k: WIDEST_TRUST for k in (*plain, *values)}
     only = regression.fit(nuisance + list(plain), loose=loose)
     full = regression.fit(nuisance + list(values) + model.selection.active, loose=loose)
+    # What has no name is in the fit, so that nothing else takes it up, and not in what is delivered.
+    unnamed = regression.columns([k for k in model.selection.active if model.search.terms[k].effect in UNKNOWNS])
+    full = replace(full, beta=np.where(np.isin(full.columns, unnamed), 0.0, full.beta))
     traces, before, after = [], [], []
     for r in model.rows:
         y = np.nan_to_num(r.y)

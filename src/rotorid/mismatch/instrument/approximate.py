@@ -19,7 +19,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.decide import WIDEST_TRUST
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, hold_offset, in_training, settled_by
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, hold_offset, in_training
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.instrument.values import selection_of
 from rotorid.mismatch.regression import Regression, build
@@ -203,7 +203,7 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     Also those that a form's own parameters say again: another power of the speed has no C_F to believe.
     """
     active = model.selection.active
-    settled = settled_by([model.search.terms[k] for k in active])
+    settled = {v for k in active for v in model.search.terms[k].form.takes_up}
     out = settled & set(values)
     for key in set(values) - settled:
         if any(left_of(model, key, s, active, c) < OF_ITS_OWN for s, c in stronger_ones(model, key, active)):

@@ -12,6 +12,7 @@ from rotorid.effects.loading import Loading, at_sensor, forms_of, weight
 from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
 from rotorid.mismatch.prepare import form_terms
 from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "gain": 0.03}
@@ -69,7 +70,8 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
     reasons: dict[str, str] = {}
     if not setup.steady_points and not setup.instrument.by_hand:
         terms.append(Term(OFFSET, "nuisance", prior_sd=(0.5 / setup.instrument.rate_hz,)))
-    for effect in catalogue().values():
+    empirical = [e for e in UNKNOWNS.values() if e.reading_forms]
+    for effect in (*catalogue().values(), *empirical):
         if effect.id in SPEED_IDS or effect.id in MISTAKES or effect.id == "quantisation":
             continue
         if setup.instrument.by_hand and effect.id in QUICK:
@@ -90,7 +92,7 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
                     continue
             found += form_terms(effect.id, form)
         terms += found
-        if not found:
+        if not found and effect.id not in UNKNOWNS:
             reasons[effect.id] = why or _reason(effect.id, setup)
     return terms, reasons
 

@@ -17,8 +17,10 @@ from rotorid.mismatch.instrument.model import (
     active_values,
     doubt_of_form,
     in_training,
+    kept_values,
     nonlinear_deviation,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 SHOWS = 0.33
 """A channel counts where the contribution is at least this share of its strongest, in units of the noise."""
@@ -45,12 +47,15 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
     effects, search, selection = catalogue(), model.search, model.selection
     rule = in_training(model.setup)
     held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
-    with_it, contributions = model.regression.fit(search.always + selection.active), Contributions(model.rows)
+    always = kept_values(search, selection.active)
+    with_it, contributions = model.regression.fit(always + selection.active), Contributions(model.rows)
     out = []
     for key in selection.active:
+        if search.terms[key].effect in UNKNOWNS:
+            continue  # told as unexplained
         term, effect = search.terms[key], effects[search.terms[key].effect]
         channels = main_channels(model, key)
-        without = search.without(key, selection.active)
+        without = model.regression.fit(always + [k for k in selection.active if k != key])
         values = active_values(model, key)
         if term.form.nonlinear:
             sd = nonlinear_deviation(model, key, model.loadings)
@@ -80,7 +85,7 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
         )
     named = {a for f in out for a in f.alternatives}
     for effect_id, reason in selection.not_established.items():
-        if effect_id in named:
+        if effect_id in named or effect_id in UNKNOWNS:
             continue
         name = effects[effect_id].name
         out.append(Finding(id=effect_id, status="not_established", sentence=f"{name} did not hold: {reason}"))

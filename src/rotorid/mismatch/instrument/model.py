@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of, term_columns
+from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import (
@@ -25,14 +27,18 @@ from rotorid.mismatch.regression import (
 )
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import (
+    COST_OF_UNKNOWN,
     COST_PER_EFFECT,
     COST_PER_PARAMETER,
+    ENTER_P,
     EXPECTED_HELD_OUT,
+    SMALLEST_SIZE,
     UNSTEADY_P,
     UNSTEADY_SHARE,
     Search,
     Selection,
 )
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 SHORT = 60
 """Stretches of fewer rows are too short to learn the colour of their noise from: they are taken as blocks."""
@@ -70,8 +76,9 @@ class ReadingSearch(Search):
 
     rich = False
 
-    def __init__(self, regression: Regression, sizes_of, known_sizes=None, joint_sizes=None):
-        super().__init__(regression, sizes_of, known_sizes, joint_sizes=joint_sizes)
+    def __init__(self, regression: Regression, sizes_of, joint_sizes=None, refused: Mapping[str, str] | None = None):
+        super().__init__(regression, sizes_of, np.zeros(6), joint_sizes=joint_sizes)
+        self.refused = refused or {}
         self.total_gram = regression.gram[regression.training].sum(axis=0)
         self.total_cross = regression.cross[regression.training].sum(axis=0)
 
@@ -160,6 +167,20 @@ class ReadingSearch(Search):
         finally:
             self.terms = every
 
+    def second_chance(self, active):
+        """A term that passes every test beside what is at work, whatever was found of it in other company.
+
+        One that the runs held out refuted may have been there with false company, which was refuted after it.
+        """
+        for c in self.candidates(active):
+            holds = c.named and c.score > 0 and c.p_value < ENTER_P and c.physical
+            if not holds or self.terms[c.key].effect in self.refused:
+                continue
+            trial = [*active, c.key]
+            if self.weight(c.key, c.beta, active) >= SMALLEST_SIZE and self._refuted(trial) is None:
+                return c.key
+        return None
+
     def worth(self, keys):
         """As for flights, from the summed Gram matrix alone; of believed values only the offset in time has a limit."""
         reg = self.regression
@@ -171,7 +192,9 @@ class ReadingSearch(Search):
         limit = np.where(np.isin(cols, reg.columns(reg.keys_of("nuisance"))), reg.limit[cols], np.inf)
         beta = bounded(normal, cross - share * reg.bias_cross[cols], limit)[0]
         gain = float(2 * cross @ beta - beta @ gram @ beta)
-        return gain - COST_PER_PARAMETER * sum(self.terms[k].size for k in keys) - COST_PER_EFFECT * len(keys)
+        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
+        parameters = sum(self.terms[k].size for k in keys)
+        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def failed_held_out(self, active):
         """The term whose own part should help on the held-out blocks and does most harm there instead.
@@ -201,13 +224,18 @@ class ReadingSearch(Search):
     def unsteady(self, active):
         """A term one of whose coefficients differs from run to run, beyond doubt and by much.
 
-        Each coefficient is refitted in the runs that excite it, all others held.
+        Each coefficient is refitted in the runs that excite it, all others held. A term without a name, which may
+        say that something differs from run to run, makes no other steady.
         """
         reg = self.regression
         fit = reg.fit(self.always + active)
+        unnamed = reg.columns([k for k in active if self.terms[k].effect in UNKNOWNS])
+        fit = replace(fit, beta=np.where(np.isin(fit.columns, unnamed), 0.0, fit.beta))
         place = {c: i for i, c in enumerate(fit.columns)}
         runs = np.unique(reg.run[reg.training])
         for key in active:
+            if self.terms[key].effect in UNKNOWNS:
+                continue
             for column in reg.columns([key]):
                 beta = fit.beta[place[column]]
                 total = reg.gram[reg.training][:, column, column].sum()
@@ -264,10 +292,16 @@ class ReadingSearch(Search):
         return float(2 * reg.cross[np.ix_(index, fit.columns)].sum(axis=0) @ fit.beta - fit.beta @ gram @ fit.beta)
 
     def run(self, active=None) -> Selection:
-        """Both rounds; the second starts from what the first found."""
+        """Both rounds; the second starts from what the first found, the last once more from what it left out."""
         first = super().run(active)
         self.rich = True
         second = super().run(first.active)
+        while (again := self.second_chance(second.active)) is not None:
+            trail = [*second.trail, f"+ {again}: it holds by itself"]
+            third = super().run([*second.active, again])
+            if again not in third.active:
+                break
+            second = replace(third, trail=trail + third.trail, not_established=second.not_established)
         kept = {self.terms[k].effect for k in second.active}
         dropped = {e: r for e, r in (first.not_established | second.not_established).items() if e not in kept}
         return replace(second, trail=first.trail + second.trail, not_established=dropped)
@@ -286,6 +320,12 @@ class ReadingModel:
     selection: Selection
     noise: np.ndarray
     """One sigma of a row's noise by channel, (6,); NaN where a channel is not compared."""
+
+
+def kept_values(search: Search, active: list[str]) -> list[str]:
+    """Terms that stand beside effects always, less believed values that a form at work takes up."""
+    taken = {v for k in active for v in search.terms[k].form.takes_up}
+    return [k for k in search.always if k not in taken]
 
 
 def in_training(setup: Setup):
@@ -346,9 +386,12 @@ def whole_reading(terms: list[Term], active) -> list[tuple[Form, np.ndarray]]:
 
 
 def reading_model(
-    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None
+    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None, refused=None
 ) -> ReadingModel:
-    """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept."""
+    """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept.
+
+    Ids that are `refused`, with the reason, do not enter.
+    """
     whole = whole_reading(terms, active)
     # Measured speeds are the load: their noise is in regressors and residual, and is learnt by adding it once more.
     noisy = rows_of(setup, terms, setup.noisier, whole) if loadings is None and setup.noisier is not None else None
@@ -359,10 +402,13 @@ def reading_model(
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
     hold_offset(regression, setup)
-    joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1)
+    joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1, resolution(setup))
     sizes = size_function(regression, joint_sizes)
-    search = ReadingSearch(regression, sizes, np.zeros(6), joint_sizes=joint_sizes)
+    search = ReadingSearch(regression, sizes, joint_sizes, refused)
     selection = search.run(active)
+    always = kept_values(search, selection.active)
+    if always != search.always:
+        selection = replace(selection, fit=regression.fit(always + selection.active, jackknife=True))
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
 
 
@@ -373,8 +419,11 @@ def hold_offset(regression: Regression, setup: Setup) -> None:
             regression.limit[regression.columns([key])] = MOST_OFFSET / setup.instrument.rate_hz
 
 
-def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int):
-    """Size of columns with coefficients: rms over the strongest tenth of the seconds, in units of the noise, (6,)."""
+def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
+    """Size of columns with coefficients: rms over the strongest tenth of the seconds, in units of the noise, (6,).
+
+    What stays below `least`, (6,), own unit, in a channel is within its resolution there: size 0.
+    """
     loud = np.where(np.isfinite(noise), noise, np.inf)
 
     def sizes(cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
@@ -384,7 +433,8 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int):
             count = max(1, len(square) // per)
             whole = len(square) // count * count
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
-        return np.sqrt(np.quantile(np.concatenate(energies), STRONGEST, axis=0)) / loud
+        strongest = np.sqrt(np.quantile(np.concatenate(energies), STRONGEST, axis=0))
+        return np.where(strongest > least, strongest, 0.0) / loud
 
     return sizes
 
@@ -419,9 +469,8 @@ def refined(model: ReadingModel) -> list[Term]:
         index[i] = pieces_of(stretches[k], setup.average)[i - owner.index(k)]
     channels = list(setup.instrument.channels)
     timing = [k for k in search.always if search.terms[k].kind == "nuisance"]
-    settled = settled_by([search.terms[k] for k in moving])
-    known = (*moving, *timing, *settled)
-    fixed = [k for k in (*search.always, *model.selection.active) if k not in known]
+    always = kept_values(search, model.selection.active)
+    fixed = [k for k in (*always, *model.selection.active) if k not in moving and k not in timing]
     reg = model.regression
 
     def white(values):
@@ -432,8 +481,8 @@ def refined(model: ReadingModel) -> list[Term]:
     prior = reg.precision[reg.columns(fixed)]
     spans = [(k, i) for k in moving for i in search.terms[k].form.nonlinear]
     start = np.array([search.terms[k].values[i] for k, i in spans])
-    limits = [search.terms[k].form.parameters[i] for k, i in spans]
-    low, high = np.array([p.low for p in limits]), np.array([p.high for p in limits])
+    parameters = [search.terms[k].form.parameters[i] for k, i in spans]
+    low, high = np.array([p.low for p in parameters]), np.array([p.high for p in parameters])
     span = np.where(np.isfinite(high - low), high - low, 0.0)
     scale = np.where(start == 0.0, 0.02 * span, np.maximum(np.abs(start), 1e-9))
 
@@ -461,7 +510,7 @@ def refined(model: ReadingModel) -> list[Term]:
 
     def residual(theta):
         target, free = y, list(base)
-        weights = list(prior)
+        weights, limits = list(prior), [np.inf] * len(base)
         moved = list(with_values(theta).values())
         whole = whole_reading(moved, moving)
         for term in [*(search.terms[k] for k in timing), *moved]:
@@ -469,18 +518,18 @@ def refined(model: ReadingModel) -> list[Term]:
             if term.kind == "nuisance":
                 free += own
                 weights += [1.0 / term.prior_sd[0] ** 2]
+                limits += [MOST_OFFSET / setup.instrument.rate_hz]
                 continue
             if term.form.linear:
                 free += own
                 weights += [0.0] * len(own)
+                limits += [np.inf] * len(own)
             else:
                 target = target - own[0]
         if not free:
             return target
         x = np.stack(free, axis=1)
-        gram = x.T @ x + np.diag(weights)
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        beta = unit * np.linalg.solve(gram * np.outer(unit, unit) + 1e-10 * np.eye(len(gram)), unit * (x.T @ target))
+        beta = bounded(x.T @ x + np.diag(weights), x.T @ target, np.array(limits))[0]
         return target - x @ beta
 
     start = np.clip(start, low + 1e-9 * scale, high - 1e-9 * scale)
@@ -491,25 +540,22 @@ def refined(model: ReadingModel) -> list[Term]:
     return [best.get(t.key, t) for t in model.terms]
 
 
-def settled_by(terms: list[Term]) -> set[str]:
-    """Believed values that parameters of some terms at work say again."""
-    return {value for t in terms for value in t.form.settles}
-
-
-def fitted_model(setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None) -> ReadingModel:
+def fitted_model(
+    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, refused=None
+) -> ReadingModel:
     """Search and refinement in turn until the same terms with the same values come out.
 
     What is noise is learnt anew after the first refinement: whitened by a ring or a lag that no column had before it,
     the regression would be deaf at the very frequencies where the effect shows.
     """
-    model = reading_model(setup, terms, active, loadings)
+    model = reading_model(setup, terms, active, loadings, refused=refused)
     for number in range(ROUNDS):
         before, start = model.selection.active, nonlinear_values(model)
         if not len(start):
             break
         terms = refined(model)
         kept = (model.noise, model.regression.filters) if number else None
-        model = reading_model(setup, terms, before, loadings, kept)
+        model = reading_model(setup, terms, before, loadings, kept, refused)
         values = nonlinear_values(model)
         if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=SETTLED):
             break
@@ -558,8 +604,8 @@ def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, lo
         else t
         for t in model.terms
     ]
-    chosen = [t for t in at_work if t.kind != "effect" or t.key in model.selection.active]
-    chosen = [t for t in chosen if t.key not in settled_by([own])]
+    stay = (*kept_values(model.search, model.selection.active), *model.selection.active)
+    chosen = [t for t in at_work if t.key in stay]
     slopes = [
         Term(f"{key}/slope{i}", "slope", term.effect, form, tuple(values), 1, (np.inf,), slope_of=i)
         for i in form.nonlinear

@@ -9,6 +9,11 @@ from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
 from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 
+CROSS_S = 10.0
+"""Blocks of a run by which every other is judged."""
+LEAST_CHANGE = 0.02
+"""Spread of a load in one run, by its spread over all, from which the run says what depends on it."""
+
 
 def probes(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
     """Generic inputs on the rows of a stretch, by the names that a person knows."""
@@ -65,25 +70,103 @@ def _inputs(model: ReadingModel) -> tuple[list[str], list[np.ndarray]]:
     ]
 
 
+def _changing(model: ReadingModel, names: list[str], inputs: list[np.ndarray]) -> tuple[list[str], list[np.ndarray]]:
+    """The inputs with, on a bench, every load times what a gain may change with: time and temperature."""
+    if not model.setup.instrument.bench:
+        return names, inputs
+    at = {n: i for i, n in enumerate(names)}
+    loads = [n for n in names if n.startswith("load_") and not n.endswith("_squared")]
+    pairs = [(load, other) for load in loads for other in ("time_s", "temperature_c") if other in at]
+    added = [np.stack([z[:, at[a]] * z[:, at[b]] for a, b in pairs], axis=1) for z in inputs] if pairs else None
+    if added is None:
+        return names, inputs
+    return names + [b for _, b in pairs], [np.hstack([z, x]) for z, x in zip(inputs, added, strict=True)]
+
+
 def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.ndarray]):
-    """p-values by channel that residuals (n, 6) do not depend on the inputs, before and after, and on what they do."""
-    names, inputs = _inputs(model)
+    """p-values by channel that residuals (n, 6) do not depend on the inputs, before and after, and on what they do.
+
+    Neither on the inputs over all runs nor on the loads in any one run: the smaller p-value times the tests made.
+    """
+    names, inputs = _changing(model, *_inputs(model))
     first, last, depends = {}, {}, {}
     for c in model.setup.instrument.channels:
-        taps = model.regression.filters[c]
-        first[CHANNELS[c]], _ = _wald([b[:, c] for b in before], inputs, taps, model.setup.rate_hz)
-        last[CHANNELS[c]], t = _wald([a[:, c] for a in after], inputs, taps, model.setup.rate_hz)
-        if last[CHANNELS[c]] < ALARM_P:
+        taps, rate_hz = model.regression.filters[c], model.setup.rate_hz
+        p_first, _ = _wald([b[:, c] for b in before], inputs, taps, rate_hz)
+        p_last, t = _wald([a[:, c] for a in after], inputs, taps, rate_hz)
+        first[CHANNELS[c]] = min(1.0, 2 * min(p_first, in_a_run(model, before, c)))
+        p_run = in_a_run(model, after, c)
+        last[CHANNELS[c]] = min(1.0, 2 * min(p_last, p_run))
+        if p_last < ALARM_P:
             for i in np.argsort(-np.abs(t))[:2]:
                 depends.setdefault(names[i].removesuffix("_squared"), 0)
+        if p_run < ALARM_P:
+            depends.setdefault("run", 0)
     return first, last, list(depends)
+
+
+def _loads(model: ReadingModel) -> dict[str, tuple[list[int], list[np.ndarray]]]:
+    """Run to its rows' numbers and their loads, (n, k) each, of a bench; a stand's loads are not known so well."""
+    if not model.setup.instrument.bench:
+        return {}
+    names, inputs = _inputs(model)
+    columns = [i for i, n in enumerate(names) if n.startswith("load_") and not n.endswith("_squared")]
+    runs: dict[str, tuple[list[int], list[np.ndarray]]] = {}
+    for k, (rows, z) in enumerate(zip(model.rows, inputs, strict=True)):
+        numbers, loads = runs.setdefault(rows.run, ([], []))
+        numbers.append(k)
+        loads.append(z[:, columns])
+    return runs
+
+
+def in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) -> float:
+    """p-value that residuals (n, 6) depend on the loads in no run, of the run where it is smallest times their number.
+
+    What changes from run to run (a clamp that slips, a gain that is set anew) cancels over all of them.
+    """
+    taps, rate_hz, runs = model.regression.filters[channel], model.setup.rate_hz, _loads(model)
+    found = [
+        _wald([residuals[k][:, channel] for k in numbers], z, taps, rate_hz)[0]
+        for numbers, loads in runs.values()
+        if (z := _varying(loads))[0].shape[1]
+    ]
+    return min(1.0, len(found) * min(found, default=1.0))
+
+
+def _varying(loads: list[np.ndarray]) -> list[np.ndarray]:
+    """Loads of one run less those that do not change in it."""
+    keep = np.concatenate(loads).std(axis=0) > LEAST_CHANGE
+    return [z[:, keep] for z in loads]
+
+
+def explained_in_runs(model: ReadingModel, after: list[np.ndarray], channel: int) -> np.ndarray:
+    """Energy of residuals (n, 6) that each run's own dependence on the loads explains, by part of the rows, (k,).
+
+    Judged crosswise: every other block of a run by what the blocks between them say.
+    """
+    out = np.zeros(len(after))
+    for numbers, loads in _loads(model).values():
+        z = [np.hstack([np.ones((len(x), 1)), x]) for x in _varying(loads)]
+        count = np.cumsum([0, *(len(x) for x in z)])
+        every, y = np.concatenate(z), np.concatenate([after[k][:, channel] for k in numbers])
+        block = np.arange(len(y)) // max(1, int(CROSS_S * model.setup.rate_hz)) % 2
+        left = y.copy()
+        for half in (0, 1):
+            fitted, judged = block == half, block != half
+            if fitted.any():
+                left[judged] -= every[judged] @ np.linalg.lstsq(every[fitted], y[fitted], rcond=1e-6)[0]
+        for i, k in enumerate(numbers):
+            part = slice(count[i], count[i + 1])
+            out[k] = y[part] @ y[part] - left[part] @ left[part]
+    return out
 
 
 def leftover(model: ReadingModel, before, after, p_after, depends, approximate=()):
     """Share of the mismatch that stays unexplained, its channels, and a plain description.
 
     A ridge regression on all inputs and their products stands for "whatever could be explained"; it is fitted on the
-    training runs and judged on the held-out ones. `approximate` names effects whose form is known to leave something.
+    training runs and judged on the held-out ones. What differs from run to run is fitted and judged within each.
+    `approximate` names effects whose form is known to leave something.
     """
     _, inputs = _inputs(model)
     split = model.setup.split
@@ -100,6 +183,7 @@ def leftover(model: ReadingModel, before, after, p_after, depends, approximate=(
         count = sum(len(after[i]) for i in judged)
         energy = sum(float(after[i][:, c] @ after[i][:, c]) for i in judged)
         flexible = min(sum(float(np.sum((after[i][:, c] - features[i] @ beta) ** 2)) for i in judged), energy)
+        flexible = min(flexible, energy - float(explained_in_runs(model, after, c)[judged].sum()))
         start = sum(float(before[i][:, c] @ before[i][:, c]) for i in judged)
         gained = np.sqrt(max(energy - flexible, 0.0) / count)
         if p_after[CHANNELS[c]] < ALARM_P and gained > SMALLEST_SHARE_OF_NOISE * np.sqrt(flexible / count):

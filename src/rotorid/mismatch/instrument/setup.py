@@ -7,6 +7,7 @@ of the rotors moved to the sensor, and the weight where the reading was not zero
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -32,6 +33,8 @@ MOST_VALUES = 45_000
 """Samples times channels that are analysed; longer sets are averaged over several samples first."""
 LOADED_SHARE = 0.05
 BACK_SHARE = 0.05
+LEAST_WARMTH_K = 0.1
+"""A temperature that changes by less says nothing."""
 STEADY_HZ = 5.0
 """Below this rate a recording is a list of steady points: nothing that takes time can be seen."""
 
@@ -202,6 +205,7 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
                 motion=motion,
                 attitude=None if tilt is None else (tilt[:, 0], tilt[:, 1]),
                 temperature=None if temperature is None else temperature - others[c.TEMPERATURE][0],
+                temperature_c=temperature,
                 command=ordered,
                 measured=speed is not None,
                 keep=_within(time_s, stamps[good], GAP_STEPS * dt_s),
@@ -307,6 +311,24 @@ def first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> flo
     return float(np.sqrt(abs(square))) if square else 1000.0
 
 
+def session(recordings: RecordingSet) -> tuple[list[float], float, bool]:
+    """When in the session each run started, s; how long it was, s (0 of a single run); whether its clock ran on.
+
+    Runs are in the order of time. Where each has a clock of its own the pauses between them are not known, and the
+    next is taken to start when the one before ends.
+    """
+    runs = recordings.runs
+    lengths = [float(r.time_s[-1] - r.time_s[0]) for r in runs]
+    if len(runs) < 2:
+        return [0.0], 0.0, False
+    ran_on = all(b.time_s[0] > a.time_s[-1] for a, b in pairwise(runs))
+    if not ran_on:
+        starts = [0.0, *np.cumsum(lengths[:-1]).tolist()]
+        return starts, starts[-1] + lengths[-1], False
+    first = float(runs[0].time_s[0])
+    return [float(r.time_s[0]) - first for r in runs], float(runs[-1].time_s[-1]) - first, True
+
+
 def set_up(recordings: RecordingSet) -> Setup:
     """Split, stretches and loads of a set."""
     vehicle = recordings.vehicle
@@ -326,8 +348,11 @@ def set_up(recordings: RecordingSet) -> Setup:
             full, estimated = measured_full_speed(recordings), True
         elif throttle:
             full, estimated = first_full_speed(recordings, channels), True
+    starts, _, _ = session(recordings)
     loadings = [
-        loaded_by(x, vehicle) for run in recordings.runs for x in stretches_of(run, vehicle, channels, dt_s, full)
+        replace(loaded_by(x, vehicle), session_time_s=start + x.run_time_s)
+        for run, start in zip(recordings.runs, starts, strict=True)
+        for x in stretches_of(run, vehicle, channels, dt_s, full)
     ]
     noisier = None
     if vehicle.kind == "stand" and loadings:
@@ -402,6 +427,9 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
         loaded.insert(0, int(np.argmax(spread[:3])))
     largest = np.maximum(np.abs(np.concatenate([x.load - x.rest for x in loadings])).max(axis=0), 1e-9)
     attitudes = [np.concatenate([x.attitude[i] for x in loadings]) for i in (0, 1)] if loadings[0].attitude else []
+    _, session_s, session_clock = session(recordings)
+    known = [x.temperature_c for x in loadings if x.temperature_c is not None]
+    warmth = np.concatenate(known) if len(known) == len(loadings) else np.zeros(1)
     return Instrument(
         vehicle=vehicle,
         channels=channels,
@@ -415,9 +443,32 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
         returns=tuple(k for k in loaded if comes_back(loadings, k, float(largest[k]))),
         tilts=any(np.ptp(a) > 0.02 for a in attitudes),
         temperature=all(x.temperature is not None for x in loadings)
-        and any(np.ptp(x.temperature) > 0.1 for x in loadings),
+        and any(np.ptp(x.temperature) > LEAST_WARMTH_K for x in loadings),
+        temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > LEAST_WARMTH_K else (0.0, 0.0),
+        first_temperature_c=float(warmth[0]),
+        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > LEAST_WARMTH_K else None,
+        session_s=session_s,
+        session_clock=session_clock,
         distance=distance_column(recordings),
     )
+
+
+def zero_temperature(loadings: tuple[Loading, ...], channels: tuple[int, ...]) -> float | None:
+    """Temperature, °C, at which all readings less loads would be nothing if they went with it; None if none do.
+
+    From a line y = b T + z + g F in every channel: T_0 = −Σ w b z / Σ w b², w one over the squares left.
+    """
+    warmth = np.concatenate([x.temperature_c for x in loadings])
+    above = below = 0.0
+    for k in channels:
+        load = np.concatenate([x.load[:, k] for x in loadings])
+        left = np.concatenate([x.reading[:, k] for x in loadings]) - load
+        columns = np.stack([warmth - warmth.mean(), np.ones_like(warmth), load], axis=1)
+        (slope, middle, gain), *_ = np.linalg.lstsq(columns, left, rcond=1e-9)
+        weight = 1.0 / max(float(np.sum((left - columns @ (slope, middle, gain)) ** 2)), 1e-300)
+        above += weight * slope * middle
+        below += weight * slope**2
+    return float(warmth.mean() - above / below) if below > 0 else None
 
 
 def comes_back(loadings: tuple[Loading, ...], channel: int, largest: float) -> bool:
