@@ -324,6 +324,21 @@ def test_a_vibration_that_follows_the_rotors():
     assert finding.parameters[0].value == pytest.approx(0.5, rel=0.15)
 
 
+@pytest.mark.parametrize(("size", "seen"), [(0.5, True), (0.0, False)])
+def test_a_vibration_is_seen_with_commands_alone(size, seen):
+    """Commands 8 % below what the rotors turn at, 30 ms ahead of it."""
+    names = {f"rotor_speed_{k}_rad_s": f"rotor_command_{k}_rad_s" for k in range(1, 5)}
+
+    def commanded(table):
+        table = table.rename(columns=names)
+        for name in names.values():
+            table[name] = 0.92 * table[name].shift(-6).ffill()
+        return table
+
+    _, findings, _ = find_mistakes(with_table(recorded(51, 52, vibration=size), commanded))
+    assert ("vibration" in ids(findings)) is seen
+
+
 def test_a_line_at_its_own_frequency_is_no_vibration_of_the_rotors(sound):
     def shake(table):
         table["specific_force_x_m_s2"] += 0.5 * np.cos(2 * np.pi * 31.0 * table["time_s"])

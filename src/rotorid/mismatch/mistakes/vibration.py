@@ -8,14 +8,16 @@ compared with the power at orders beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 from scipy.stats import gamma
 
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.mistakes.axes import signals_of
 from rotorid.mismatch.mistakes.signals import Signals
+from rotorid.mismatch.motion import full_speed
 from rotorid.recordings import RecordingSet
 from rotorid.recordings import columns as c
 
@@ -28,6 +30,12 @@ LEAST_MEDIAN = 3.0
 """Power at the order over that beside it in half of the windows, at least."""
 LEAST_AMPLITUDE = 0.5
 """Line over the reading's own scatter beside it (one sigma a sample), at least, to matter."""
+SCALES = np.arange(0.85, 1.151, 0.015)
+"""Factors on a commanded speed that are tried: the window tells speeds of 18 rad/s apart."""
+COMMAND_LAG_S = 0.03
+"""How late rotors follow their commands, roughly."""
+MOST_WINDOWS = 30
+"""Windows of a run that the factor is found from."""
 LOWEST_HZ = 8.0
 """Aliases below this fall among the flight's own motion and are left out."""
 
@@ -50,7 +58,7 @@ def find(recordings: RecordingSet) -> Finding | None:
     """A vibration that follows the rotors, None where there is no clear one."""
     if recordings.vehicle.kind != "flight":
         return None
-    signals = [s for s in signals_of(recordings) if "rotors" in s.values]
+    signals = turning(recordings)
     lines = []
     for sensor, columns, unit in (
         ("accelerometer", c.SPECIFIC_FORCE, "m/s2"),
@@ -79,6 +87,58 @@ def find(recordings: RecordingSet) -> Finding | None:
         p_value=lines[0].p_value,
         channels=tuple(dict.fromkeys(x.column for x in lines)),
     )
+
+
+def turning(recordings: RecordingSet) -> list[Signals]:
+    """Signals of the runs with their rotors' speed: as read, or as commanded, at the scale at which a line stands out.
+
+    A command is followed late, and its full speed is only believed: half a window's turn too much hides a line.
+    """
+    everything = signals_of(recordings)
+    read = [s for s in everything if "rotors" in s.values]
+    if read:
+        return read
+    full = full_speed(recordings.runs, recordings.vehicle)
+    commanded = [c for s in everything if (c := as_commanded(s, full)) is not None]
+    if not any("accelerometer" in s.values for s in commanded):
+        return []
+    return max(([scaled(s, scale) for s in commanded] for scale in SCALES), key=strongest_line)
+
+
+def as_commanded(s: Signals, full_rad_s: float | None) -> Signals | None:
+    """A run with the rotors turning as commanded, COMMAND_LAG_S late; None without commands."""
+    if "commands" in s.values:
+        speed = s.values["commands"]
+    elif "throttle" in s.values and full_rad_s is not None:
+        speed = full_rad_s * s.values["throttle"]
+    else:
+        return None
+    keep = np.exp(-1.0 / (s.rate_hz * COMMAND_LAG_S))
+    start = np.nan_to_num(speed[:1]) * keep
+    speed = lfilter([1.0 - keep], [1.0, -keep], np.nan_to_num(speed), axis=0, zi=start)[0]
+    return replace(s, values={**s.values, "rotors": speed})
+
+
+def scaled(s: Signals, scale: float) -> Signals:
+    """A run with its rotors turning faster by a factor."""
+    return replace(s, values={**s.values, "rotors": scale * s.values["rotors"]})
+
+
+def strongest_line(signals: list[Signals]) -> float:
+    """Power at the order over that beside it, in half of the windows, of the accelerometer's clearest line."""
+    best = 0.0
+    for axis in range(3):
+        for order in ORDERS:
+            ratios = []
+            for s in signals:
+                length = int(WINDOW_S * s.rate_hz)
+                if "accelerometer" in s.values and length >= 24:
+                    line, beside, _, _ = demodulated(s, "accelerometer", axis, order, length, MOST_WINDOWS)
+                    ratios.append((line / beside).ravel())
+            found = np.concatenate(ratios) if ratios else np.zeros(0)
+            found = found[np.isfinite(found)]
+            best = max(best, float(np.median(found)) if len(found) else 0.0)
+    return best
 
 
 def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, unit: str, order: int) -> Line | None:
@@ -115,19 +175,21 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
     return Line(column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p)
 
 
-def demodulated(s: Signals, sensor: str, axis: int, order: int, length: int) -> tuple[np.ndarray, ...]:
+def demodulated(
+    s: Signals, sensor: str, axis: int, order: int, length: int, most: int | None = None
+) -> tuple[np.ndarray, ...]:
     """Squared amplitude at the order, beside it, number of rotors that share the line, and noise: (windows, rotors).
 
-    NaN where it cannot be told.
+    NaN where it cannot be told. Of no more than `most` windows spread over the run, if stated.
     """
+    count = len(s.time_s) // length
+    rows = np.unique(np.linspace(0, count - 1, min(count, most or count)).astype(int))
     speed = s.values["rotors"]
-    reading = s.values[sensor][:, axis]
-    count = len(reading) // length
     dt = 1.0 / s.rate_hz
     middle = np.zeros_like(speed)
     middle[1:] = (speed[1:] + speed[:-1]) * dt / 2
-    shape = (count, length)
-    x = reading[: count * length].reshape(shape)
+    speed, middle = (x[: count * length].reshape(count, length, -1)[rows] for x in (speed, middle))
+    x = s.values[sensor][: count * length, axis].reshape(count, length)[rows]
     k = np.arange(length)
     # The flight's own slow motion is taken out with a straight line and a taper.
     ramp = (k - k.mean()) / max(np.abs(k - k.mean()).max(), 1)
@@ -135,16 +197,16 @@ def demodulated(s: Signals, sensor: str, axis: int, order: int, length: int) -> 
     x = x - ramp * (x @ ramp / (ramp @ ramp))[:, None]
     taper = np.hanning(length + 2)[1:-1]
     taper = taper / taper.mean()
-    line = np.full((count, speed.shape[1]), np.nan)
+    line = np.full((len(rows), speed.shape[2]), np.nan)
     beside, crowd, floor = (np.full_like(line, np.nan) for _ in range(3))
-    steps = order * middle[: count * length].reshape(count, length, -1)
+    steps = order * middle
     steps[:, 0] = 0.0
     follow = np.exp(-1j * np.cumsum(steps, axis=1))
-    for i in range(speed.shape[1]):
+    for i in range(speed.shape[2]):
         base = x * taper * follow[:, :, i]
         spectrum = np.abs(np.fft.fft(base, axis=1) / length) ** 2 * 4
         # Where the alias comes near zero frequency, flight motion would be taken for a line.
-        turn = order * speed[: count * length, i].reshape(shape).mean(axis=1) * dt
+        turn = order * speed[:, :, i].mean(axis=1) * dt
         turned = np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
         clear = turned / (2 * np.pi * dt) > LOWEST_HZ + 6 / WINDOW_S
         line[clear, i] = spectrum[clear, 0]
