@@ -432,8 +432,8 @@ def refined(model: ReadingModel) -> list[Term]:
     prior = reg.precision[reg.columns(fixed)]
     spans = [(k, i) for k in moving for i in search.terms[k].form.nonlinear]
     start = np.array([search.terms[k].values[i] for k, i in spans])
-    limits = [search.terms[k].form.parameters[i] for k, i in spans]
-    low, high = np.array([p.low for p in limits]), np.array([p.high for p in limits])
+    parameters = [search.terms[k].form.parameters[i] for k, i in spans]
+    low, high = np.array([p.low for p in parameters]), np.array([p.high for p in parameters])
     span = np.where(np.isfinite(high - low), high - low, 0.0)
     scale = np.where(start == 0.0, 0.02 * span, np.maximum(np.abs(start), 1e-9))
 
@@ -461,7 +461,7 @@ def refined(model: ReadingModel) -> list[Term]:
 
     def residual(theta):
         target, free = y, list(base)
-        weights = list(prior)
+        weights, limits = list(prior), [np.inf] * len(base)
         moved = list(with_values(theta).values())
         whole = whole_reading(moved, moving)
         for term in [*(search.terms[k] for k in timing), *moved]:
@@ -469,18 +469,18 @@ def refined(model: ReadingModel) -> list[Term]:
             if term.kind == "nuisance":
                 free += own
                 weights += [1.0 / term.prior_sd[0] ** 2]
+                limits += [MOST_OFFSET / setup.instrument.rate_hz]
                 continue
             if term.form.linear:
                 free += own
                 weights += [0.0] * len(own)
+                limits += [np.inf] * len(own)
             else:
                 target = target - own[0]
         if not free:
             return target
         x = np.stack(free, axis=1)
-        gram = x.T @ x + np.diag(weights)
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        beta = unit * np.linalg.solve(gram * np.outer(unit, unit) + 1e-10 * np.eye(len(gram)), unit * (x.T @ target))
+        beta = bounded(x.T @ x + np.diag(weights), x.T @ target, np.array(limits))[0]
         return target - x @ beta
 
     start = np.clip(start, low + 1e-9 * scale, high - 1e-9 * scale)
