@@ -184,7 +184,8 @@ def test_a_slow_amplifier_is_no_offset_in_time() -> None:
     offset = model.regression.columns([OFFSET])
     assert model.regression.limit[offset] == pytest.approx(MOST_OFFSET / RATE_HZ)
     fit = model.selection.fit
-    assert abs(fit.beta[list(fit.columns).index(offset[0])]) <= MOST_OFFSET / RATE_HZ
+    # To the precision of the bounded solver.
+    assert abs(fit.beta[list(fit.columns).index(offset[0])]) <= (1 + 1e-6) * MOST_OFFSET / RATE_HZ
 
 
 def bowed(speed, wrench, t):
