@@ -33,10 +33,23 @@ from rotorid.mismatch.values import changed_vehicle
 from rotorid.recordings import RecordingSet, Vehicle
 
 ABSORBED_P = 1e-6
+CURVES_OF_ONE_LOAD = ("load_nonlinearity", "thrust_curve")
 LOST_SHARE = 0.15
 """Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained."""
 SPEED_LEFT = "what was found between command and rotor speed does not carry over to the runs held out"
 ABSORBED_GAIN = 50.0
+
+
+def one_load(finding: Finding, setup: Setup) -> Finding:
+    """Thrust and reading of one rotor that does not tilt are curves of one load: which of them is curved stays open."""
+    alone = setup.recordings.vehicle.rotor_count == 1 and not setup.instrument.tilts
+    if not alone or finding.id not in CURVES_OF_ONE_LOAD or finding.status not in ("established", "ambiguous"):
+        return finding
+    if set(finding.channels) != {"force_z"}:
+        return finding
+    return replace(
+        finding, status="ambiguous", alternatives=tuple(sorted({*CURVES_OF_ONE_LOAD, *finding.alternatives}))
+    )
 
 
 def analyse_instrument(recordings: RecordingSet) -> Analysis:
@@ -77,7 +90,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection)
-    found = findings_of(model, company)
+    found = [one_load(f, setup) for f in findings_of(model, company)]
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:

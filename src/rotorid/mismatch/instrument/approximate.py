@@ -25,6 +25,7 @@ from rotorid.mismatch.instrument.values import selection_of
 from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import KEEP_P, SHARE_OF_LARGEST
+from rotorid.mismatch.unknowns import UNKNOWNS
 
 KNOTS = (0.0, 1 / 3, 2 / 3, 1.0)
 """Where the hat functions stand, as shares of the largest."""
@@ -35,6 +36,7 @@ OF_ITS_OWN = 0.5
 LATE_ROWS = (1, 2, 4, 8)
 """Rows by which a free form may also be late."""
 FREE = "free form"
+GAIN = "gain"
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,8 @@ def stronger_ones(model: ReadingModel, key: str, active: list[str]) -> list[tupl
         own = search.sizes_of(key, beta_of(fit, regression.columns([key])))
     out = []
     for other in active:
-        if other == key or catalogue()[search.terms[other].effect].exact:
+        effect = search.terms[other].effect
+        if other == key or effect in UNKNOWNS or catalogue()[effect].exact:
             continue
         rest = [k for k in (*search.always, *active) if k not in (key, other)]
         loose = {key: WIDEST_TRUST} if key in search.always else {}
@@ -205,7 +208,8 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     active = model.selection.active
     settled = {v for k in active for v in model.search.terms[k].form.takes_up}
     out = settled & set(values)
-    for key in set(values) - settled:
+    # Any smooth characteristic has a slope of its own: of gains the curve itself is asked (`values.curved_gains`).
+    for key in (v for v in set(values) - settled if not v.startswith(GAIN)):
         if any(left_of(model, key, s, active, c) < OF_ITS_OWN for s, c in stronger_ones(model, key, active)):
             out.add(key)
     return out
