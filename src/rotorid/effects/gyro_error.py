@@ -27,16 +27,12 @@ def misalignment(motion, vehicle, values):
     )
 
 
-def all_errors(motion, vehicle, values):
-    """Ω_m = (1 + s) Ω + θ × Ω + b."""
-    parts = (
-        bias(motion, vehicle, values[:3]),
-        scale(motion, vehicle, values[3:6]),
-        misalignment(motion, vehicle, values[6:]),
-    )
+def bias_and_scale(motion, vehicle, values):
+    """Ω_m = (1 + s) Ω + b."""
+    scaled = scale(motion, vehicle, values[3:])
     return Contribution(
-        angular_velocity=sum(p.angular_velocity for p in parts),
-        angular_acceleration=parts[1].angular_acceleration + parts[2].angular_acceleration,
+        angular_velocity=bias(motion, vehicle, values[:3]).angular_velocity + scaled.angular_velocity,
+        angular_acceleration=scaled.angular_acceleration,
     )
 
 
@@ -57,10 +53,10 @@ def forms(vehicle):
         Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs, of_reading=((0, 0), (1, 1), (2, 2))),
         Form("misalignment", "Ω_m = Ω + θ × Ω", t, misalignment, needs),
         Form(
-            "bias, scale and misalignment",
-            "Ω_m = (1 + s) Ω + θ × Ω + b",
-            b + s + t,
-            all_errors,
+            "bias and scale",
+            "Ω_m = (1 + s) Ω + b",
+            b + s,
+            bias_and_scale,
             needs,
             of_reading=((0, 3), (1, 4), (2, 5), (3, 3), (4, 4), (5, 5)),
             excited_by=("always",),

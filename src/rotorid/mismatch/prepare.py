@@ -43,7 +43,7 @@ DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inert
 LOWEST_TO_MEAN = 1.08
 MOST_S, PIECE_S = 600.0, 20.0
 """Longer recordings are represented by pieces: memory must not grow with an hour's flight."""
-NOISE_REACH = 3.0
+NOISE_REACH = 5.0
 """Highest frequency, over the cutoff of the analysis, that a sensor's noise is read from."""
 FINEST_HZ = 1.0
 PIECE_SAMPLES, SMOOTHED = 256, 9

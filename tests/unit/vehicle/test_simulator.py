@@ -461,7 +461,7 @@ def test_a_slung_load_swings_in_the_simulator(mass_kg):
     vehicle = thesis_vehicle()
     slung = next(f for f in catalogue()["payload"].forms(vehicle) if f.name == "slung")
     hold = Commands(np.array([0.0]), np.full((1, 4), np.sqrt(0.652 * 9.81 / (4 * CF))))
-    trace = simulate(vehicle, hold, 0.5, 0.005, effects=[(slung, [mass_kg, 0.5, 0.05])])
+    trace = simulate(vehicle, hold, 0.5, 0.005, effects=[(slung, [mass_kg, 0.0, 0.5, 0.05])])
     assert trace.velocity[0, -1, 2] == pytest.approx(mass_kg * 9.81 / (0.652 + mass_kg) * 0.5, rel=1e-3)
 
 
