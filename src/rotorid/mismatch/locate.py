@@ -46,6 +46,8 @@ ON_SHARE_OF_NOISE = 0.15
 LOST_AT_ENDS_S = 1.0
 SMALLEST_SHARE = 0.03
 """Share of a run's mismatch energy below which an interval is not worth a line."""
+NIL = 1e-9
+"""Share of the largest value of a regime's variable below which a value is none."""
 SHORTEST_GAP_S = 0.25
 LONGEST_GAP_S = 2.0
 THROUGHOUT = 0.7
@@ -513,6 +515,8 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     """Share of variance between bins, its p-value, and the range of the bins in which the energy lies."""
     good = np.isfinite(value) & np.isfinite(energy)
     energy, value = energy[good], value[good]
+    # A load turned into other axes is 1e-17 where it should be nothing: two bins of nothing, and no words for either.
+    value = np.where(np.abs(value) < NIL * np.abs(value).max(initial=0.0), 0.0, value)
     edges = np.unique(np.quantile(value, np.linspace(0, 1, REGIME_BINS + 1))) if len(value) else np.zeros(0)
     if len(edges) < 3 or len(value) < 3 * len(edges):
         return None

@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from rotorid.mismatch.locate import locate
+from rotorid.mismatch.locate import _separation, locate
 from tests.unit.mismatch.synthetic import DASH_S, LENGTH_S, analysis, drag_finding
 
 
@@ -98,3 +99,12 @@ def test_two_wild_samples_are_no_mismatch():
 
     assert not locate(spoiled(2, 10.0))
     assert [(f.run, f.channel) for f in locate(spoiled(40, 4.0))] == [("b", "moment_y")]
+
+
+def test_nothing_turned_into_other_axes_is_nothing():
+    """Loads of 1e-17 of the largest are one bin at zero: the range ends there, not at a rounding error."""
+    rng = np.random.default_rng(0)
+    value = np.concatenate([rng.uniform(-1e-17, 1e-17, 400), rng.uniform(1.0, 2.0, 400)])
+    energy = np.where(value > 0.5, 1.0, 20.0) * rng.chisquare(20, 800) / 20
+    _, _, low, high = _separation(energy, value)
+    assert low == 0.0 and 0.0 <= high <= 1.1
