@@ -42,7 +42,7 @@ BOOTSTRAPS = 400
 def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of a term and their covariance."""
     cols = regression.columns([key])
-    where = [list(fit.columns).index(c) for c in cols]
+    where = fit.places(cols)
     return fit.beta[where], fit.covariance[np.ix_(where, where)]
 
 
@@ -140,7 +140,7 @@ def wrench_findings(
         fit = regression.fit([*kept, *active], loose=loose)
         return replace(fit, beta=np.where(np.isin(fit.columns, empirical), 0.0, fit.beta))
 
-    beside = suggested(search, selection.active)
+    beside, with_it = suggested(search, selection.active), delivered(selection.active)
     for key in selection.active:
         term = search.terms[key]
         if term.effect in UNKNOWNS:
@@ -148,7 +148,7 @@ def wrench_findings(
         effect = effects[term.effect]
         beta, _ = coefficients(regression, selection.fit, key)
         rest = [k for k in selection.active if k != key]
-        with_it, without = delivered(selection.active), delivered(rest)
+        without = delivered(rest)
         channels = main_channels(rows, regression.columns([key]), beta, noise)
         alternatives = search.alternatives(key, selection.active)
         status = "ambiguous" if alternatives else "established"

@@ -82,8 +82,12 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     itself could be called wrong (where nothing is `claimed` only as much as makes the error twice the noise's).
     `p_after` and `depends` are those of `dependence`.
     """
-    slow = slow_excess(prepared, model, segments, noisy)
-    channels = channels_of(prepared, model, segments, slow, p_after, delivered, 1.0 if claimed else UNCLAIMED)
+    full = model.full_fit()
+    added = model.contributions.of(full.columns, full.beta)
+    slow = slow_excess(prepared, model, segments, noisy, added)
+    channels = channels_of(
+        prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else UNCLAIMED
+    )
     total = sum(c.explainable / c.noise for c in channels)
     left = [c for c in channels if c.counts]
     if not left or total <= 0:
@@ -103,15 +107,14 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     )
 
 
-def channels_of(prepared, model, segments, slow, p_after, delivered, least) -> list[Channel]:
+def channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[Channel]:
     """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others.
 
-    `least` is how much of the noise's energy must be kept by values to count.
+    `full` is the fit of the whole model, `added` (n, 12) of each stretch what it makes of the channels; `least` is how
+    much of the noise's energy must be kept by values to count.
     """
     _, inputs = standardised(prepared, segments)
-    full = model.full_fit()
     unnamed = model.unnamed(full.columns)
-    added = model.contributions.of(full.columns, full.beta)
     training = [r.run in prepared.split.training for r in model.rows]
     if prepared.split.training == prepared.split.held_out:
         training = [True] * len(training)

@@ -91,6 +91,11 @@ class Fit:
     gain: float
     """Whitened squares explained on the training blocks."""
 
+    def places(self, columns: np.ndarray) -> list[int]:
+        """Where columns of the regression stand among those fitted."""
+        at = list(self.columns)
+        return [at.index(c) for c in columns]
+
 
 @dataclass
 class Regression:
@@ -311,7 +316,7 @@ class Regression:
         Per run the term is refitted with all other coefficients held (DerSimonian and Laird's moment estimate).
         """
         cols = self.columns([key])
-        where = [list(fit.columns).index(c) for c in cols]
+        where = fit.places(cols)
         rest = [i for i in range(len(fit.columns)) if i not in where]
         owns = self.gram[:, cols[:, None], cols]
         lefts = self.cross[:, cols] - self.gram[:, cols[:, None], fit.columns[rest]] @ fit.beta[rest]

@@ -170,7 +170,7 @@ class Search:
             fit = self.regression.fit(self.always + others)
             for k in others:
                 cols = self.regression.columns([k])
-                where = [list(fit.columns).index(c) for c in cols]
+                where = fit.places(cols)
                 largest = np.maximum(largest, self.sizes_of(k, fit.beta[where]))
         if self.terms[key].run:
             # A burst is easily imitated by what the form of a strong effect leaves over.
@@ -386,7 +386,7 @@ class Search:
 
         def sizes(keys: list[str]) -> np.ndarray:
             cols = self.regression.columns(keys)
-            return self.joint_sizes(cols, fit.beta[[list(fit.columns).index(c) for c in cols]])
+            return self.joint_sizes(cols, fit.beta[fit.places(cols)])
 
         alone, found = {k: sizes([k]) for k in named}, set()
         for pair in combinations(named, 2):
@@ -469,7 +469,7 @@ class Search:
                 continue
             spread, p = self.regression.between_runs(fit, key)
             cols = self.regression.columns([key])
-            beta = fit.beta[[list(fit.columns).index(c) for c in cols]]
+            beta = fit.beta[fit.places(cols)]
             runs = len(np.unique(self.regression.run[self.regression.training]))
             # Coefficients of one term have different units: what counts is how much of its contribution changes.
             gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)

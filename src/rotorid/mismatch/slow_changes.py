@@ -17,18 +17,17 @@ more: coloured noise of the sensors stays below four, see benchmarks/mismatch.md
 WELCH_S = 8.0
 
 
-def slow_excess(prepared, model, segments, noisy) -> dict[str, tuple[float, float]]:
+def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tuple[float, float]]:
     """Slow changes of the residual that the sensors cannot have made: channel to (rms in its unit, frequency in Hz).
 
     A regression on known inputs cannot see a mass that slides or a tank that slops; the noise can: it is known what
     the sensors' own noise does to each channel (`noisy` are the same segments with that noise added once more).
+    `contributions` (n, 12) of each stretch are the whole model's.
     """
     if not noisy or not all(s.measured_speed for s in segments):
         return {}  # what rotors make of their commands is not known well enough
     rate = prepared.thinner.rate_hz
     fast = tuple(share * prepared.thinner.cutoff_hz for share in FAST_BAND)
-    full = model.full_fit()
-    contributions = model.contributions.of(full.columns, full.beta)
     noise = added_noise(prepared, segments, noisy)
     out = {}
     for c in range(6):

@@ -27,7 +27,7 @@ def shown(rows: list[Rows], fit: Fit, cols: np.ndarray, noise: np.ndarray, where
 
     `noise` (12,) weighs the channels; the standard error is from blocks of rows, so that slow noise counts.
     """
-    own = fit.beta[[list(fit.columns).index(c) for c in cols]]
+    own = fit.beta[fit.places(cols)]
     seen, size = [], []
     for r in rows:
         channels = [c for c in range(*where.indices(12)) if np.isfinite(noise[c]) and r.x[:, c][:, cols].any()]

@@ -233,7 +233,7 @@ def spoils_a_channel(
 
     Squares are compared by blocks of `per` rows without their outermost eighths, as for the whole.
     """
-    own = with_it.beta[[list(with_it.columns).index(c) for c in cols]]
+    own = with_it.beta[with_it.places(cols)]
     rows = contributions.rows
     parts = (contributions.of(*pair) for pair in ((with_it.columns, with_it.beta), (without.columns, without.beta)))
     changes, acts = [], np.zeros(12, bool)
@@ -399,7 +399,7 @@ def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:
     for key in model.selection.active:
         term = model.search.terms[key]
         cols = model.regression.columns([key])
-        where = [list(model.selection.fit.columns).index(c) for c in cols]
+        where = model.selection.fit.places(cols)
         values = np.array(term.values, float)
         if term.form.linear:
             values[list(term.form.linear)] = model.selection.fit.beta[where]

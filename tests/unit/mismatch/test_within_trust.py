@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rotorid.mismatch import within_trust
+from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.within_trust import beyond_trust, in_words, settled
 
 TRUST = {"thrust": 0.05, "mass": 0.005}
-
-
-@dataclass(frozen=True)
-class Fitted:
-    columns: np.ndarray
-    beta: np.ndarray
-    covariance: np.ndarray
 
 
 def model_of(monkeypatch, thrust: float, helps: bool = True):
@@ -36,7 +29,7 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
         def fit(self, keys, loose):
             columns = self.columns(keys).astype(int)
             beta = np.array([thrust if c == 0 else 0.0 for c in columns])
-            return Fitted(columns, beta, 1e-8 * np.eye(len(columns)))
+            return Fit(columns, beta, 1e-8 * np.eye(len(columns)), np.zeros(1), 0.0)
 
     made = Regression()
     made.terms = terms

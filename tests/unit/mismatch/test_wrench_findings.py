@@ -36,7 +36,7 @@ def told(key: str):
         x[:, 0] = rng.standard_normal((size, columns))
         y[:, 0] = x[:, 0].sum(axis=1) + 0.5 * rng.standard_normal(size)
         rows.append(Rows(run, np.arange(size) / RATE_HZ, y, x))
-    values = tuple(0.0 if p.nonlinear is False else 1.0 for p in form.parameters)
+    values = tuple(1.0 if p.nonlinear else 0.0 for p in form.parameters)
     terms = [Term(key, "effect", effect_id, form, values, columns)]
     regression = build(rows, terms, {0: np.array([1.0])}, lambda run, t: run == "a", 1.0, RATE_HZ)
     search = Search(regression, lambda *_: np.ones(12), joint_sizes=lambda *_: np.ones(12))

@@ -6,7 +6,7 @@ on the load or on its reading, with the believed values free, 4. nonlinear param
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -81,15 +81,14 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
             reasons["battery_sag"] = why
     size = sizes_of_values(model)
 
-    refused: set[str] = set()
-
-    def values_of(selection: Selection) -> dict[str, tuple[float, float]]:
+    def values_of(selection: Selection, refused: Collection[str] = ()) -> dict[str, tuple[float, float]]:
         return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
 
     model, values = without_needless(model, values_of)
+    refused: set[str] = set()
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
-        values = values_of(model.selection)
+        values = values_of(model.selection, refused)
     found = [one_load(f, setup) for f in findings_of(model, company)]
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
@@ -98,7 +97,6 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     elif why:
         reasons["quantisation"] = why
 
-    refused = set()
     plain = values_of(Selection([], model.selection.fit))
     findings += absorbed(model, values, findings)
     traces, before, after = make_traces(setup, model, plain, values)

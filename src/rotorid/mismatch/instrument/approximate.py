@@ -18,7 +18,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
-from rotorid.mismatch.decide import WIDEST_TRUST
+from rotorid.mismatch.decide import WIDEST_TRUST, coefficients
 from rotorid.mismatch.instrument.model import ReadingModel, block_length, hold_offset, in_training
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.instrument.values import selection_of
@@ -145,12 +145,7 @@ def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regr
 def sizes(model: ReadingModel, active: list[str]) -> dict[str, np.ndarray]:
     """Size of every term at work by channel, in units of the noise, (6,) each."""
     fit, regression = model.regression.fit(model.search.always + active), model.regression
-    return {k: model.search.sizes_of(k, beta_of(fit, regression.columns([k]))) for k in active}
-
-
-def beta_of(fit, cols: np.ndarray) -> np.ndarray:
-    """Coefficients of columns in a fit."""
-    return fit.beta[[list(fit.columns).index(c) for c in cols]]
+    return {k: model.search.sizes_of(k, coefficients(regression, fit, k)[0]) for k in active}
 
 
 def left_of(model: ReadingModel, weak: str, strong: str, active: list[str], channels: list[int]) -> float:
@@ -159,7 +154,7 @@ def left_of(model: ReadingModel, weak: str, strong: str, active: list[str], chan
     `weak` is a term at work or a believed value, which then is as free as one that is called wrong.
     """
     always, fit = model.search.always, model.regression.fit(model.search.always + active)
-    small = beside(model, active, freed(model, strong, beta_of(fit, model.regression.columns([strong])), channels))
+    small = beside(model, active, freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
     every = [*always, *active]
     rest, loose = [k for k in every if k != weak], {weak: WIDEST_TRUST} if weak in always else {}
     with_it = small.fit([FREE, *every], loose=loose)
@@ -179,7 +174,7 @@ def stronger_ones(model: ReadingModel, key: str, active: list[str]) -> list[tupl
     own = size.get(key)
     if own is None:
         fit = regression.fit([*search.always, *active], loose={key: WIDEST_TRUST})
-        own = search.sizes_of(key, beta_of(fit, regression.columns([key])))
+        own = search.sizes_of(key, coefficients(regression, fit, key)[0])
     out = []
     for other in active:
         effect = search.terms[other].effect
@@ -245,7 +240,7 @@ def exchangeable(model: ReadingModel, key: str, strong: str) -> bool:
     rest = [k for k in model.selection.active if k not in (key, strong)]
     alone = regression.fit([*search.always, *rest, key])
     channels = list(model.setup.instrument.channels)
-    free = freed(model, key, beta_of(alone, regression.columns([key])), channels)
+    free = freed(model, key, coefficients(regression, alone, key)[0], channels)
     small = beside(model, [*rest, key, strong], free)
     own = small.explained([*search.always, *rest, strong]) - small.explained([*search.always, *rest])
     beyond = small.explained([*search.always, FREE, *rest, key, strong]) - small.explained(

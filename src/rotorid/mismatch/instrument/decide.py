@@ -32,7 +32,7 @@ def main_channels(model: ReadingModel, key: str) -> list[int]:
     """Channels that a term shows in, the strongest first."""
     fit, regression = model.selection.fit, model.regression
     cols = regression.columns([key])
-    beta = fit.beta[[list(fit.columns).index(c) for c in cols]]
+    beta = fit.beta[fit.places(cols)]
     size = model.search.sizes_of(key, beta)
     order = np.argsort(-size)
     return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]

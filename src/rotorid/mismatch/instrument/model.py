@@ -210,10 +210,10 @@ class ReadingSearch(Search):
         worst, found = 0.0, None
         for key in active:
             cols = self.regression.columns([key])
-            beta = fit.beta[[list(fit.columns).index(c) for c in cols]]
+            beta = fit.beta[fit.places(cols)]
             cross = self.regression.cross[np.ix_(index, cols)]
             every = self.regression.gram[np.ix_(index, cols, fit.columns)]
-            own = np.array([beta @ g[:, [list(fit.columns).index(c) for c in cols]] @ beta for g in every])
+            own = np.array([beta @ g[:, fit.places(cols)] @ beta for g in every])
             gains = np.sort(2 * cross @ beta - 2 * (every @ fit.beta) @ beta + own)
             cut = max(1, len(gains) // 8)
             gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
@@ -574,7 +574,7 @@ def active_values(model: ReadingModel, key: str) -> np.ndarray:
     values = np.array(term.values, float)
     if term.form.linear:
         fit = model.selection.fit
-        where = [list(fit.columns).index(c) for c in model.regression.columns([key])]
+        where = fit.places(model.regression.columns([key]))
         values[list(term.form.linear)] = fit.beta[where]
     return values
 
