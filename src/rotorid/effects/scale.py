@@ -14,6 +14,8 @@ FASTEST_DECAY_1_S = 5.0
 """Drag stops no multirotor within less than a fifth of a second (published: 0.2 to 0.6 1/s)."""
 LEAST_ROTOR_SHARE = 2e-5
 """No rotor's inertia is a smaller share of its vehicle's (2e-3 in the example of the recording contract)."""
+MOST_OF_STATED = 4.0
+"""A rotor's inertia is at most so many times the one stated."""
 FASTEST_DAMPING_1_S = 20.0
 """Nor does air stop its turning within less than a twentieth."""
 
@@ -87,7 +89,12 @@ def hover_inflow_m_s(vehicle: Vehicle, density_kg_m3: float = AIR_DENSITY_KG_M3)
 
 
 def rotor_inertia(vehicle: Vehicle) -> Parameter:
-    """The moment of inertia of one rotor about its axis, J_r."""
+    """The moment of inertia of one rotor about its axis, J_r.
+
+    No more than a quarter of the vehicle's, which on a stand nobody needs to state rightly, or MOST_OF_STATED times the
+    one that is stated.
+    """
     inertia = scale(vehicle).inertia_kg_m2
     least = LEAST_ROTOR_SHARE * inertia
-    return Parameter("J_r", "kg m2", 0.0, inertia / 4, meaning="inertia of one rotor", negligible=least)
+    most = max(inertia / 4, MOST_OF_STATED * (vehicle.rotor_inertia_kg_m2 or 0.0))
+    return Parameter("J_r", "kg m2", 0.0, most, meaning="inertia of one rotor", negligible=least)

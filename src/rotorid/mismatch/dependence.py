@@ -16,7 +16,7 @@ from scipy.stats import f as f_distribution
 from rotorid.mismatch.between_runs import compared
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import assemble_rows
-from rotorid.mismatch.regression import at_least, quadratic_form
+from rotorid.mismatch.regression import at_least, quadratic_form, spread_of
 from rotorid.mismatch.rows import CHANNELS
 
 ALARM_P = 1e-5
@@ -139,20 +139,21 @@ def left_by(rows, channel: int, added) -> list[np.ndarray]:
     return left if sum(float(x @ x) for x in left) <= sum(float(y @ y) for y in raw) else raw
 
 
-def _wald(parts, inputs, taps, rate_hz, shared=None, most=1.0):
+def _wald(parts, inputs, taps, rate_hz, shared=None, most=1.0, memory=0):
     """Block-robust Hotelling test of a regression of the whitened residual on the whitened inputs.
 
     `shared` holds per stretch what one more draw of the sensors' noise changes in residual (n,) and inputs (n, p);
-    once to `most` times that is taken away, as much as explains most.
+    once to `most` times that is taken away, as much as explains most. Blocks up to `memory` apart may have noise alike.
     """
     size = inputs[0].shape[1]
-    blocks, noise = [], np.zeros(size)
+    blocks, stretches, noise = [], [], np.zeros(size)
     per = max(2, int(BLOCK_S * rate_hz))
     for k, (y, z) in enumerate(zip(parts, inputs, strict=True)):
         yw, zw = _whitened(y, taps), _whitened(z, taps)
         y_noise, z_noise = (0 * yw, 0 * zw) if shared is None else (_whitened(x, taps) for x in shared[k])
         for i in np.array_split(np.arange(len(yw)), max(1, len(yw) // per)):
             blocks.append((zw[i].T @ zw[i], zw[i].T @ yw[i], len(i)))
+            stretches.append(k)
         noise = noise + z_noise.T @ y_noise
     gram = sum(b[0] for b in blocks)
     inverse = np.linalg.pinv(gram, rcond=1e-9, hermitian=True)
@@ -163,7 +164,7 @@ def _wald(parts, inputs, taps, rate_hz, shared=None, most=1.0):
     each = noise / sum(b[2] for b in blocks)
     scores = np.array([c - n * each - g @ beta for g, c, n in blocks])
     plain = inverse
-    robust = inverse @ (scores.T @ scores) @ inverse
+    robust = inverse @ spread_of(scores, np.array(stretches), memory) @ inverse
     covariance = at_least(robust, plain)
     statistic = quadratic_form(beta, covariance)
     count = len(blocks)

@@ -31,6 +31,8 @@ effect's, and squares of a short flight are widely spread."""
 HELP_Z = 0.5
 """Standard errors by which the squares of one channel that an effect acts in must grow without it: it has been found
 already, in the runs fitted, so doubt is not held against it beyond the coin's."""
+SURE_Z = 3.0
+"""Standard errors by which a nuisance must differ from nothing to be delivered."""
 LEAST_EXCITED = 0.1
 """Mean square of an effect on the held-out part, beside that on the fitted one, from which the former can judge it."""
 LEAST_BLOCKS = 8
@@ -45,9 +47,28 @@ ValuesOf = Callable[[WrenchModel, Sequence[str]], Values]
 
 
 def delivered_fit(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
-    """The fit of some effects, the wrong values and the nuisances."""
-    always = model.regression.keys_of("nuisance", "wind")
-    return model.regression.fit([*always, *values, *active], loose={k: WIDEST_TRUST for k in values})
+    """The fit of some effects, the wrong values, winds and those nuisances that are sure."""
+    return with_sure_nuisances(model, [*values, *active], values)
+
+
+def with_sure_nuisances(model: WrenchModel, keys: Sequence[str], values: Values) -> Fit:
+    """The fit of terms, those of `values` held by the widest trust, beside winds and the nuisances that are sure.
+
+    A calm flight does not know the offset between two sensors, and one that is nothing but noise where it was fitted
+    is a mismatch in the first turn held out.
+    """
+    regression = model.regression
+    loose = {k: WIDEST_TRUST for k in values}
+    nuisances = regression.keys_of("nuisance")
+    always = [*regression.keys_of("wind"), *keys]
+    fit = regression.fit([*nuisances, *always], loose=loose)
+    sure = [k for k in nuisances if surely_there(*coefficients(regression, fit, k))]
+    return fit if sure == list(nuisances) else regression.fit([*sure, *always], loose=loose)
+
+
+def surely_there(beta: np.ndarray, covariance: np.ndarray) -> bool:
+    """Whether a nuisance is other than nothing."""
+    return abs(float(beta[0])) > SURE_Z * float(np.sqrt(covariance[0, 0]))
 
 
 def residuals_of(model: WrenchModel, fit: Fit) -> list[np.ndarray]:

@@ -9,7 +9,8 @@ Three sources, in this order of trust:
    `after` allows. Findings at work for most of the flight are listed only where nothing is confined in time:
    their place is a regime, not a time.
 3. What the findings leave, `after`, is whitened, evened out (noise that grows with how hard it is flown is no
-   mismatch) and scanned over windows of 0.5 to 4 s for energy and for a mean other than zero. The threshold is
+   mismatch) and scanned over windows of 0.5 to 4 s for energy (of what moves: the same noise, only louder, is a
+   sensor's matter) and for a mean other than zero. The threshold is
    Bonferroni's over every window of every channel of every run; the spread of both statistics is measured on the
    blocks of the residual themselves, so that colour that whitening left, or noise that comes in bouts, raises the
    threshold. Edges are those of the most likely segment.
@@ -59,6 +60,13 @@ AT_WORK = 0.03
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
 LOUDER = 4.0
 """Energy of a window beside the usual, below which louder noise is not called a mismatch."""
+MOVES_S = 0.2
+"""Lags over which louder residuals may follow each other."""
+FIRST_LAGS = 4
+LIKE = 0.999
+"""Largest correlation that Fisher's transform is taken of."""
+MOVES_Z = 4.0
+"""Standard errors (Fisher's transform) by which louder residuals must follow each other otherwise than usual."""
 WILD = 4.0
 """Whitened residual beyond which a single sample counts no more."""
 SHIFTED = 0.4
@@ -418,8 +426,29 @@ def _louder(traces, white, limit) -> list[Interval]:
             loud = max(float(np.mean(w[start:stop] ** 2)), 1.2)
             likelihood = -0.5 * np.log(loud) + 0.5 * w[a:b] ** 2 * (1.0 - 1.0 / loud)
             first, last = _best_segment(likelihood)
-            out.append(Interval(trace, a + first, a + last, p, False))
+            if _moves(w[a + first : a + last], w, int(MOVES_S / _period(trace))):
+                out.append(Interval(trace, a + first, a + last, p, False))
     return out
+
+
+def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
+    """Whether a whitened residual moves in one part otherwise than in the whole, and is not the same noise, louder.
+
+    What bodies and air do lasts longer than a sample; a sensor that is shaken or badly received is louder, no more.
+    Told by the correlations at one of the first lags, or at all up to `most` together.
+    """
+    count = len(part)
+    lags = np.arange(1, min(most, count - 5) + 1)
+    usual, here = (np.array([_correlation(x, lag) for lag in lags]) for x in (whole, part))
+    sure = (np.arctanh(np.clip(here, -LIKE, LIKE)) - np.arctanh(np.clip(usual, -LIKE, LIKE))) * np.sqrt(
+        count - lags - 3
+    )
+    return len(lags) > 0 and max(np.abs(sure[:FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > MOVES_Z
+
+
+def _correlation(values: np.ndarray, lag: int) -> float:
+    """Autocorrelation at a lag, about nothing."""
+    return float(values[lag:] @ values[:-lag] / max(values @ values, 1e-300))
 
 
 def _shifted(traces, white, parts, limit) -> list[Interval]:
@@ -434,7 +463,9 @@ def _shifted(traces, white, parts, limit) -> list[Interval]:
         count = sum(len(w) // length for w in white)
         least = max(least, float(np.median(np.concatenate(sums) ** 2)) / 0.4549)
         for k, total in enumerate(sums):
-            p = f.sf(total**2 / least, 1, max(count - 1, 1))
+            # Where noise is louder for a while its means are, too.
+            spread = (_window_sums(white[k] ** 2, length) - total**2) / (length - 1)
+            p = f.sf(total**2 / (least * np.maximum(spread, 1.0)), 1, max(count - 1, 1))
             for j in np.flatnonzero((p < limit) & (np.abs(local[k]) > SHIFTED * noise)):
                 start = _window_starts(len(white[k]), length)[j]
                 flagged[k][start : start + length] = True

@@ -123,6 +123,8 @@ class Regression:
     """Whitening filter of each channel."""
     names: dict[str, int]
     """Number of each run."""
+    memory: int = 0
+    """Blocks over which the noise of neighbours may still be alike (1/f noise of a sensor at rest)."""
 
     def keys_of(self, *kinds: str) -> list[str]:
         """Keys of the terms of some kinds."""
@@ -239,7 +241,7 @@ class Regression:
         if jackknife:
             eye = np.eye(len(cols))
             scores = np.linalg.solve(eye[None] - (every[mask] - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
-        spread = scores.T @ scores * count / max(count - 1, 1)
+        spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse
         # With the ridge, or two columns that are copies of each other would seem to be known.
         plain = inverse @ (gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))) @ inverse
@@ -384,6 +386,12 @@ class Regression:
             taken = lsq_linear(forth, -back @ (unit * pull), bounds=(-most / unit, most / unit), method=method).x * unit
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
+    def column_noise(self, key: str) -> float:
+        """Share of the energy of a term of one column, on the training blocks, that is noise of its regressors."""
+        (column,) = self.columns([key])
+        energy = self._total_gram[column, column]
+        return float(self.training.mean() * self.bias_gram[column, column] / energy) if energy > 0 else 0.0
+
     def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
         """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
         return self.own_part(keys, key, beta)[1]
@@ -498,6 +506,20 @@ def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
     root = (vectors * np.sqrt(values)) @ turn
     unscale = np.where(scale > 0, 1.0 / np.where(scale > 0, scale, 1.0), 0.0)
     return (root * np.minimum(share, MOST_ATTENUATION)) @ root.T * np.outer(unscale, unscale)
+
+
+def spread_of(scores: np.ndarray, runs: np.ndarray, memory: int) -> np.ndarray:
+    """Sum of products of the blocks' scores (n, k), and of those up to `memory` apart in one run, (k, k).
+
+    Newey and West, A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance
+    matrix, Econometrica 55, 1987.
+    """
+    total = scores.T @ scores
+    for lag in range(1, min(memory, len(scores) - 1) + 1):
+        same = runs[lag:] == runs[:-lag]
+        product = scores[lag:][same].T @ scores[:-lag][same]
+        total += (1.0 - lag / (memory + 1)) * (product + product.T)
+    return total
 
 
 def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:

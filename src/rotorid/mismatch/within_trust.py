@@ -7,12 +7,12 @@ each held by its trust.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rotorid.mismatch.decide import WIDEST_TRUST, coefficients, relative_change
-from rotorid.mismatch.harmless import Values, delivered_fit, growth, held_out_masks, residuals_of
+from rotorid.mismatch.decide import coefficients, relative_change
+from rotorid.mismatch.harmless import Values, delivered_fit, growth, held_out_masks, residuals_of, with_sure_nuisances
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import PARAMETER_NAMES
@@ -31,9 +31,7 @@ WORTH_A_WORD = 0.002
 
 def all_values(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
     """The fit with every value free: those called wrong (`values`) widely, the others within their trust."""
-    regression = model.regression
-    keys = [*regression.keys_of("nuisance", "wind"), *regression.keys_of("value"), *active]
-    return regression.fit(keys, loose={k: WIDEST_TRUST for k in values})
+    return with_sure_nuisances(model, [*model.regression.keys_of("value"), *active], values)
 
 
 def beyond_trust(model: WrenchModel, values: Values, active: Sequence[str]) -> bool:
@@ -69,17 +67,25 @@ def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequ
         return plain, {}
     held = held_out_masks(prepared, model, model.segments)
     per = max(2, int(prepared.thinner.rate_hz))
-    ratio, z = growth(residuals_of(model, plain), residuals_of(model, free), held, per)
-    worse, better = (ratio > WORSE_RATIO) & (z > LEAST_Z), (ratio < BETTER_RATIO) & (z < -LEAST_Z)
-    if worse.any() or not better.any():
+    if not pays(residuals_of(model, plain), residuals_of(model, free), held, per):
         return plain, {}
     return free, {k: change for k, change in moved.items() if k not in values}
 
 
-def in_words(moved: Values) -> tuple[str, ...]:
+def pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray], per: int) -> bool:
+    """Whether values that move lower the held-out error of some channel and raise that of none.
+
+    Residuals (n, 6 or more) of every stretch without and with it, masks of the held-out rows, rows of a block.
+    """
+    ratio, z = growth(plain, free, held, per)
+    worse, better = (ratio > WORSE_RATIO) & (z > LEAST_Z), (ratio < BETTER_RATIO) & (z < -LEAST_Z)
+    return bool(better.any() and not worse.any())
+
+
+def in_words(moved: Values, names: Mapping[str, str] = PARAMETER_NAMES) -> tuple[str, ...]:
     """Changes that are worth a word: `thrust coefficient −0.7 ± 0.2 %`."""
     return tuple(
-        f"{parameter_words(PARAMETER_NAMES[k])[0]} {100 * change:+.1f} ± {196 * sd:.1f} %".replace("-", "−")
+        f"{parameter_words(names[k])[0]} {100 * change:+.1f} ± {196 * sd:.1f} %".replace("-", "−")
         for k, (change, sd) in moved.items()
         if abs(change) > max(WORTH_A_WORD, sd)
     )

@@ -69,7 +69,7 @@ def drag_finding(**changes) -> Finding:
 def analysis(seed: int = 0, findings=(), bursts=(), dash: bool = True, pole: float = 0.6, **changes) -> Analysis:
     """An analysis of three runs, b held out.
 
-    `bursts` are (run, channel, start_s, stop_s, size): louder noise that nothing explains.
+    `bursts` are (run, channel, start_s, stop_s, size): a slow movement that nothing explains.
     """
     rng = np.random.default_rng(seed)
     runs = tuple(run(n, dash) for n in "abc")
@@ -84,7 +84,7 @@ def analysis(seed: int = 0, findings=(), bursts=(), dash: bool = True, pole: flo
             for name, where, start, stop, size in bursts:
                 inside = (time >= start) & (time <= stop)
                 if (name, where) == (r.name, channel):
-                    after[inside] += size * sigma * rng.normal(0, 1, inside.sum())
+                    after[inside] += coloured(inside.sum(), size * sigma, rng, 0.95)
             taken = np.zeros(len(time))
             if any(f.id == "rotor_drag" for f in findings) and channel == "force_x":
                 taken = -K_D * 4 * HOVER * speed

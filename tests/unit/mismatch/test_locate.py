@@ -15,13 +15,23 @@ def test_noise_of_any_colour_is_located_nowhere(pole):
 
 
 def test_an_unexplained_burst_is_found_to_a_fraction_of_a_second():
-    found = locate(analysis(bursts=[("b", "moment_y", 20.0, 23.0, 3.0)]))
+    found = locate(analysis(bursts=[("b", "moment_y", 20.0, 23.0, 6.0)]))
     assert [(f.run, f.channel) for f in found] == [("b", "moment_y")]
     assert found[0].start_s == pytest.approx(20.0, abs=0.2)
     assert found[0].stop_s == pytest.approx(23.0, abs=0.2)
-    # 120 samples at 10 σ² beside 1560 at 1 σ²: (120 · 10) / (1440 + 1200) = 0.45.
-    assert found[0].energy_share == pytest.approx(0.45, abs=0.1)
+    # 120 samples at 37 σ² beside 1560 at 1 σ²: (120 · 37) / (1440 + 4440) = 0.76.
+    assert found[0].energy_share == pytest.approx(0.76, abs=0.1)
     assert found[0].p_value < 1e-6
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.6, 0.9])
+def test_the_same_noise_louder_for_a_while_is_a_sensor_and_no_mismatch(pole):
+    """Three seconds of three times the noise in one run, in every channel."""
+    for seed in range(5):
+        made = analysis(seed, pole=pole)
+        louder = [np.where((t.time_s > 20) & (t.time_s < 23) & (t.run == "b"), 3.0, 1.0) for t in made.traces]
+        traces = [replace(t, after=t.after * x) for t, x in zip(made.traces, louder, strict=True)]
+        assert not locate(replace(made, traces=tuple(traces)))
 
 
 def test_drag_is_located_in_the_dash_and_its_regime_is_airspeed():
@@ -63,7 +73,7 @@ def test_a_wrong_value_is_wrong_throughout():
 
 
 def test_the_same_analysis_gives_the_same_locations():
-    made = analysis(3, findings=[drag_finding()], bursts=[("a", "moment_x", 5, 7, 3.0)])
+    made = analysis(3, findings=[drag_finding()], bursts=[("a", "moment_x", 5, 7, 6.0)])
     assert locate(made) == locate(made)
 
 

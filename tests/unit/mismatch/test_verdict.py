@@ -81,7 +81,7 @@ def test_an_error_that_did_not_get_smaller_is_not_sold_as_a_gain():
 
 
 def test_a_burst_that_nothing_explains_is_unexplained():
-    made = analysis(bursts=[("b", "moment_y", 20.0, 23.0, 3.0)])
+    made = analysis(bursts=[("b", "moment_y", 20.0, 23.0, 6.0)])
     found = verdict_of(made)
     assert found.verdict == "unexplained"
     assert "pitch moment" in found.sentence and "None of the known effects" in found.sentence

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS, UNITS
 from rotorid.mismatch.analyse import throttle_or_thrust
-from rotorid.mismatch.decide import WIDEST_TRUST, wrong_values
+from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_company
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
@@ -26,10 +27,13 @@ from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitte
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.instrument.values import curved_gains, without_needless
+from rotorid.mismatch.instrument.useful import without_useless
+from rotorid.mismatch.instrument.values import Values, curved_gains, delivered, settled, without_needless
+from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.values import changed_vehicle
+from rotorid.mismatch.values import changed_vehicle, without_common_scale, without_scale_of_curve
+from rotorid.mismatch.within_trust import in_words
 from rotorid.recordings import RecordingSet, Vehicle
 
 ABSORBED_P = 1e-6
@@ -38,6 +42,13 @@ LOST_SHARE = 0.15
 """Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained."""
 SPEED_LEFT = "what was found between command and rotor speed does not carry over to the runs held out"
 ABSORBED_GAIN = 50.0
+
+
+def same_curve(chain: ChainResult) -> dict[str, str]:
+    """Ids that beside a curve of the throttle only say again what it leaves, where speeds are known from it alone."""
+    if not any(f.id == "throttle_curve" and f.status in ("established", "ambiguous") for f in chain.findings):
+        return {}
+    return dict.fromkeys(CURVES_OF_ONE_LOAD, "the curve between throttle and rotor speed takes it up")
 
 
 def one_load(finding: Finding, setup: Setup) -> Finding:
@@ -66,12 +77,21 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
         chain = find_chain(setup, others)
         loadings = moved(setup, chain)
-        model = fitted_model(setup, terms, model.selection.active, loadings)
+        refused = same_curve(chain)
+        active = [k for k in model.selection.active if model.search.terms[k].effect not in refused]
+        model = fitted_model(setup, terms, active, loadings, refused)
 
     def once_more(active: list[str], refused: dict[str, str]) -> ReadingModel:
-        return fitted_model(setup, model.terms, active, loadings, refused)
+        return fitted_model(setup, model.terms, active, loadings, {**model.search.refused, **refused})
 
-    model, company = without_company(without_remainders(model, once_more))
+    def values_in(model: ReadingModel, selection: Selection, refused: Collection[str] = ()) -> Values:
+        size = sizes_of_values(model)
+        return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
+
+    model = without_remainders(model, once_more)
+    model = without_useless(model, once_more, lambda found: values_in(found, found.selection))
+    model, company = without_company(model)
+    values_of = partial(values_in, model)
     if chain is None:
         reasons.update({k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in SPEED_IDS})
     else:
@@ -79,11 +99,6 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         why = supply_reason(setup)
         if why is not None:
             reasons["battery_sag"] = why
-    size = sizes_of_values(model)
-
-    def values_of(selection: Selection, refused: Collection[str] = ()) -> dict[str, tuple[float, float]]:
-        return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
-
     model, values = without_needless(model, values_of)
     refused: set[str] = set()
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
@@ -99,7 +114,10 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
 
     plain = values_of(Selection([], model.selection.fit))
     findings += absorbed(model, values, findings)
-    traces, before, after = make_traces(setup, model, plain, values)
+    fit, moved_values = settled(model, values, model.selection.active)
+    refitted, moved_plain = settled(model, plain, [])
+    traces, before, after = make_traces(setup, model, refitted, fit)
+    told = values if measured else told_of_commands(findings, values)
     next_step, separates, sigma = next_experiment(findings, model)
     p_before, p_after, depends = dependence(model, before, after)
     share, channels, description = leftover(model, before, after, p_after, depends, approximate_forms(model, company))
@@ -119,10 +137,10 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         recordings=recordings,
         split=setup.split,
         believed=setup.vehicle,
-        refitted=improved(setup.vehicle, plain),
-        improved=with_full_speed(improved(setup.vehicle, values), setup, chain),
+        refitted=improved(setup.vehicle, {**moved_plain, **plain}),
+        improved=with_full_speed(improved(setup.vehicle, {**moved_values, **values}), setup, chain),
         findings=tuple(findings),
-        values=named_values(setup, values) | full_speed_value(setup, chain),
+        values=named_values(setup, told) | full_speed_value(setup, chain),
         not_testable={k: v for k, v in reasons.items() if k not in known},
         traces=traces,
         noise_floor=noise_floors(setup, model, chain),
@@ -140,6 +158,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         instrument=setup.instrument,
         loadings=model.loadings,
         notes=(*remarks, *notes_of(setup)),
+        put_right=in_words(moved_values, VALUE_NAMES),
     )
 
 
@@ -264,23 +283,23 @@ def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list
     return list(out.values())
 
 
-def make_traces(setup: Setup, model: ReadingModel, plain: dict, values: dict):
-    """Traces, and residuals (n, 6) of every stretch before and after: values named are changed, others as believed."""
-    regression = model.regression
-    nuisance = regression.keys_of("nuisance")
-    loose = {k: WIDEST_TRUST for k in (*plain, *values)}
-    only = regression.fit(nuisance + list(plain), loose=loose)
-    full = regression.fit(nuisance + list(values) + model.selection.active, loose=loose)
-    # What has no name is in the fit, so that nothing else takes it up, and not in what is delivered.
-    unnamed = regression.columns([k for k in model.selection.active if model.search.terms[k].effect in UNKNOWNS])
-    full = replace(full, beta=np.where(np.isin(full.columns, unnamed), 0.0, full.beta))
-    traces, before, after = [], [], []
-    for r in model.rows:
-        y = np.nan_to_num(r.y)
-        refitted = y - r.x[:, :, only.columns] @ only.beta
-        left = y - r.x[:, :, full.columns] @ full.beta
-        before.append(y)
-        after.append(left)
-        for c in setup.instrument.channels:
-            traces.append(Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], refitted[:, c], left[:, c]))
+def told_of_commands(findings: list[Finding], values: dict) -> dict[str, tuple[float, float]]:
+    """Wrong values to state where rotor speeds are known from commands alone: none that only says their scale.
+
+    At which voltage the believed values hold is not stated, and a curve of the throttle has a slope of its own.
+    """
+    if any(f.id == "battery_sag" and f.status in ("established", "ambiguous") for f in findings):
+        values = without_common_scale(values)
+    return without_scale_of_curve(findings, values)
+
+
+def make_traces(setup: Setup, model: ReadingModel, refitted: Fit, fit: Fit):
+    """Traces, and residuals (n, 6) of every part as believed, and with what is delivered."""
+    before = [np.nan_to_num(r.y) for r in model.rows]
+    again, after = delivered(model, refitted), delivered(model, fit)
+    traces = [
+        Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], values[:, c], left[:, c])
+        for r, y, values, left in zip(model.rows, before, again, after, strict=True)
+        for c in setup.instrument.channels
+    ]
     return tuple(traces), before, after

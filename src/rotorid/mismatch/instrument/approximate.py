@@ -19,7 +19,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.decide import WIDEST_TRUST, coefficients
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, hold_offset, in_training
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, in_training, restrain
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.instrument.values import selection_of
 from rotorid.mismatch.regression import Regression, build
@@ -138,7 +138,7 @@ def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regr
     ]
     per = block_length(setup, rows)
     out = build(rows, [*kept, term], regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz)
-    hold_offset(out, setup)
+    restrain(out, setup)
     return out
 
 

@@ -8,6 +8,7 @@ block-robust.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -58,6 +59,8 @@ ALIKE = 12.0
 
 WITH_A_SCALE = ("power of voltage, own reference", "affine", "quadratic")
 """Forms that hold a scale of their own: with the full speed free they would hold it twice."""
+OF_A_SCALE = ("throttle_curve", "battery_sag")
+"""Ids with such forms."""
 
 Chain = tuple[tuple[str, SpeedForm], ...]
 
@@ -464,7 +467,33 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
         # What came in another's place is whitened by its own residual, and beside it others may be needed.
         dropped = {key: reason for key, reason in dropped.items() if key not in new}
     best = pruned(problem, better_forms(problem, best, forms), dropped)
-    return worded(problem, best, forms, dropped)
+    return worded(problem, without_mere_scale(problem, best, dropped), forms, dropped)
+
+
+def without_mere_scale(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFit:
+    """The chain without forms that only say what another thrust coefficient would.
+
+    Where no speed is measured, speeds that are all a share higher than commanded are a thrust that is larger: a value
+    that is wrong, and no curve of the throttle.
+    """
+    while not problem.measured and not problem.scaled:
+        scaled = copy(problem)
+        scaled.scaled = True
+        found = None
+        for key, form in best.chain:
+            if key not in OF_A_SCALE:
+                continue
+            rest = tuple((k, f) for k, f in best.chain if k != key)
+            kept = [best.theta[place_of(best.chain, k, False)] for k, _ in rest]
+            start = with_unknown(scaled, rest, np.concatenate([[problem.first_full], *kept]))
+            fit = scaled.fit(rest, start)
+            if fit.cost < best.cost + COST_PER_PARAMETER * (len(form.parameters) - 1):
+                found = key, ChainFit(rest, fit.theta[1:], fit.cost)
+        if found is None:
+            return best
+        dropped[found[0]] = "another thrust coefficient explains as much"
+        best = found[1]
+    return best
 
 
 def holding_or_not(problem: Problem, best: ChainFit) -> ChainFit:

@@ -16,10 +16,10 @@ from rotorid.mismatch.instrument.model import (
     ReadingModel,
     active_values,
     doubt_of_form,
-    in_training,
     kept_values,
     nonlinear_deviation,
 )
+from rotorid.mismatch.instrument.values import held_out
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 SHOWS = 0.33
@@ -45,8 +45,7 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
     alternative to it.
     """
     effects, search, selection = catalogue(), model.search, model.selection
-    rule = in_training(model.setup)
-    held = [np.array([rule(r.run, t) is False for t in r.time_s]) for r in model.rows]
+    held = held_out(model)
     always = kept_values(search, selection.active)
     with_it, contributions = model.regression.fit(always + selection.active), Contributions(model.rows)
     out = []

@@ -17,6 +17,7 @@ from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import (
+    MOST_ATTENUATION,
     Regression,
     autoregression,
     bounded,
@@ -45,6 +46,8 @@ SHORT = 60
 MOST_BLOCKS = 150
 LEAST_BLOCKS = 40
 BLOCK_S = 2.0
+MEMORY = 4
+"""Blocks over which the noise of a sensor may be alike beyond what whitening takes away: 1/f noise has no end."""
 ROWS_PER_COLUMN = 8
 STRONGEST = 0.9
 TARE_MARGIN = 2.0
@@ -67,6 +70,8 @@ MOST_OF_A_FORM = 6
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
+UNMOVED = 1e-9
+"""Relative change of a believed value that is held."""
 LATER = ("thrust and torque apart",)
 """Forms of fewer parameters that could swallow several causes as well: they join in the second round, too."""
 
@@ -401,7 +406,7 @@ def reading_model(
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
-    hold_offset(regression, setup)
+    restrain(regression, setup)
     joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1, resolution(setup))
     sizes = size_function(regression, joint_sizes)
     search = ReadingSearch(regression, sizes, joint_sizes, refused)
@@ -412,11 +417,19 @@ def reading_model(
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
 
 
-def hold_offset(regression: Regression, setup: Setup) -> None:
-    """Limit the offset in time between load and reading, in place: what is more is a delay or a filter."""
+def restrain(regression: Regression, setup: Setup) -> None:
+    """Say, in place, how long noise is alike, and limit an offset in time and believed values that nothing excites.
+
+    What is more of an offset is a delay or a filter. Of a value whose column is mostly the speeds' noise (the arm while
+    all rotors turn alike) nothing is said: it stays as believed.
+    """
+    regression.memory = MEMORY
     for key in regression.keys_of("nuisance"):
         if key == OFFSET:
             regression.limit[regression.columns([key])] = MOST_OFFSET / setup.instrument.rate_hz
+    for key in regression.keys_of("value"):
+        if regression.column_noise(key) > MOST_ATTENUATION:
+            regression.limit[regression.columns([key])] = UNMOVED
 
 
 def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
@@ -621,7 +634,7 @@ def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, lo
     regression = build(
         rows, [*chosen, *slopes], model.regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz
     )
-    hold_offset(regression, setup)
+    restrain(regression, setup)
     fit = regression.fit([t.key for t in (*chosen, *slopes)], jackknife=True)
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     at = {c: (b, s) for c, b, s in zip(fit.columns, fit.beta, sd, strict=True)}

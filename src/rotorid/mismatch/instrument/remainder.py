@@ -6,7 +6,7 @@ import numpy as np
 
 from rotorid.effects.loading import CHANNELS, Loading
 from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
-from rotorid.mismatch.instrument.model import ReadingModel
+from rotorid.mismatch.instrument.model import MEMORY, ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 
 CROSS_S = 10.0
@@ -92,8 +92,8 @@ def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.nda
     first, last, depends = {}, {}, {}
     for c in model.setup.instrument.channels:
         taps, rate_hz = model.regression.filters[c], model.setup.rate_hz
-        p_first, _ = _wald([b[:, c] for b in before], inputs, taps, rate_hz)
-        p_last, t = _wald([a[:, c] for a in after], inputs, taps, rate_hz)
+        p_first, _ = _wald([b[:, c] for b in before], inputs, taps, rate_hz, memory=MEMORY)
+        p_last, t = _wald([a[:, c] for a in after], inputs, taps, rate_hz, memory=MEMORY)
         first[CHANNELS[c]] = min(1.0, 2 * min(p_first, in_a_run(model, before, c)))
         p_run = in_a_run(model, after, c)
         last[CHANNELS[c]] = min(1.0, 2 * min(p_last, p_run))
@@ -126,11 +126,11 @@ def in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) -> 
     """
     taps, rate_hz, runs = model.regression.filters[channel], model.setup.rate_hz, _loads(model)
     found = [
-        _wald([residuals[k][:, channel] for k in numbers], z, taps, rate_hz)[0]
+        _wald([residuals[k][:, channel] for k in numbers], z, taps, rate_hz, memory=MEMORY)[0]
         for numbers, loads in runs.values()
         if (z := _varying(loads))[0].shape[1]
     ]
-    return min(1.0, len(found) * min(found, default=1.0))
+    return min(1.0, len(found) * min(found)) if found else 1.0
 
 
 def _varying(loads: list[np.ndarray]) -> list[np.ndarray]:

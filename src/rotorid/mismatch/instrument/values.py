@@ -13,10 +13,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.decide import SMALLEST_CHANGE
-from rotorid.mismatch.instrument.model import ReadingModel, kept_values
+from rotorid.mismatch.decide import SMALLEST_CHANGE, WIDEST_TRUST, coefficients
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, in_training, kept_values
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
+from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
+from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.within_trust import BEYOND_TRUST, pays
+
+Values = Mapping[str, tuple[float, float]]
+"""Relative change of believed values and its one-sigma."""
 
 MOST_MORE = 3
 """Parameters that a richer form may have more."""
@@ -24,8 +30,6 @@ MAY_LOSE = 20.0
 """Whitened squares, less what parameters cost, that a model with one wrong value less may explain less."""
 SMALL_LOADS = 0.3
 """Share of the largest load up to which a load is small."""
-
-Values = Mapping[str, tuple[float, float]]
 
 
 def without_needless(
@@ -111,3 +115,42 @@ def selection_of(model: ReadingModel, active: list[str]) -> Selection:
     fit = search.regression.fit(kept_values(search, active) + active, jackknife=True)
     p_values = {k: search.judge(k, active, search.without(k, active), jackknife=True).p_value for k in active}
     return replace(model.selection, active=active, fit=fit, p_values=p_values)
+
+
+def settled(model: ReadingModel, values: Values, active: list[str]) -> tuple[Fit, dict[str, tuple[float, float]]]:
+    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong.
+
+    As for flights (`within_trust.settled`): those move together, within their trust, and only if it pays.
+    """
+    regression, search = model.regression, model.search
+    loose = {k: WIDEST_TRUST for k in values}
+    plain = regression.fit([*regression.keys_of("nuisance"), *values, *active], loose=loose)
+    free = regression.fit(kept_values(search, active) + active, loose=loose)
+    others = [k for k in regression.keys_of("value") if k in kept_values(search, active) and k not in values]
+    moved = {}
+    for key in others:
+        beta, covariance = coefficients(regression, free, key)
+        moved[key] = (float(beta[0]), float(np.sqrt(covariance[0, 0])))
+    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
+    if any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items()):
+        return plain, {}
+    left = [delivered(model, fit) for fit in (plain, free)]
+    if not pays(*left, held_out(model), block_length(model.setup, model.rows)):
+        return plain, {}
+    return free, moved
+
+
+def held_out(model: ReadingModel) -> list[np.ndarray]:
+    """Mask of the rows held out of every part."""
+    rule = in_training(model.setup)
+    return [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in model.rows]
+
+
+def delivered(model: ReadingModel, fit: Fit) -> list[np.ndarray]:
+    """What values and named effects of a fit leave of every part, (n, 6).
+
+    What has no name is in the fit, so that nothing else takes it up, and not in what is delivered.
+    """
+    unnamed = [k for k in model.selection.active if model.search.terms[k].effect in UNKNOWNS]
+    beta = np.where(np.isin(fit.columns, model.regression.columns(unnamed)), 0.0, fit.beta)
+    return [np.nan_to_num(r.y) - r.x[:, :, fit.columns] @ beta for r in model.rows]
