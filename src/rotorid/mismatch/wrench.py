@@ -16,6 +16,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
+    VALUE_LIMITS,
     Fit,
     Regression,
     autoregression,
@@ -217,6 +218,10 @@ def searched(
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
     search = Search(regression.without_winds(), sizes_of, known_sizes, harms, seconds.sizes, contradicted)
     selection = search.run(start)
+    if (wide := search.values_alone(selection)) is not None:
+        regression = regression.with_room(VALUE_LIMITS[1])
+        search = Search(wide, sizes_of, known_sizes, harms, seconds.sizes, contradicted)
+        selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 
 
