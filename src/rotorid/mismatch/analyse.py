@@ -35,9 +35,8 @@ from rotorid.mismatch.values import (
     only_throttle,
     speed_for_coefficients,
     throttle_scale,
+    told_of_commands,
     with_square_term,
-    without_common_scale,
-    without_scale_of_curve,
     without_values_in_question,
 )
 from rotorid.mismatch.within_trust import beyond_trust, settled
@@ -76,11 +75,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     findings += absorbed_findings(model, values, findings)
     findings, told = with_square_term(findings, told, model)
     told = without_values_in_question(findings, told)
-    if found.commanded and any(f.id == "battery_sag" and f.status in CLAIMED for f in findings):
-        # At which voltage the believed values hold is not stated: the largest in the set is only a guess.
-        told = without_common_scale(told)
     if found.commanded:
-        told = without_scale_of_curve(findings, told)
+        told = told_of_commands(findings, told)
 
     delivered = residuals_of(model, fit)
     before, after, depends = dependence(prepared, model, segments, noisy)

@@ -63,7 +63,7 @@ def with_sure_nuisances(model: WrenchModel, keys: Sequence[str], values: Values)
     always = [*regression.keys_of("wind"), *keys]
     fit = regression.fit([*nuisances, *always], loose=loose)
     sure = [k for k in nuisances if surely_there(*coefficients(regression, fit, k))]
-    return fit if sure == list(nuisances) else regression.fit([*sure, *always], loose=loose)
+    return fit if sure == nuisances else regression.fit([*sure, *always], loose=loose)
 
 
 def surely_there(beta: np.ndarray, covariance: np.ndarray) -> bool:

@@ -43,9 +43,9 @@ EXPECTED_HELD_OUT = 25.0
 MOST_STRAIN = 4.0
 """Standard deviations of trust that an effect may push a believed value to."""
 NEAR_LIMIT = 0.98
+"""Share of the furthest that a believed value may move at which it counts as held there."""
 CANCELLED = 0.1
 """Two contributions cancel each other in a channel where their sum is this share of either."""
-"""Share of the furthest that a believed value may move at which it counts as held there."""
 UNSTEADY_P = 1e-6
 UNSTEADY_SHARE = 0.4
 """A coefficient that spreads by more than this share of itself between runs is no constant of the vehicle."""

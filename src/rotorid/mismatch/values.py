@@ -116,6 +116,17 @@ def without_common_scale(values: Values) -> Values:
     return kept
 
 
+def told_of_commands(findings: list[Finding], values: Values) -> Values:
+    """Wrong values to state where rotor speeds are known from commands alone: none that only says their scale.
+
+    At which voltage the believed values hold is not stated (the largest in the set is only a guess), and a curve of the
+    throttle has a slope of its own.
+    """
+    if any(f.id == "battery_sag" and f.status in ("established", "ambiguous") for f in findings):
+        values = without_common_scale(values)
+    return without_scale_of_curve(findings, values)
+
+
 def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
     """Values without a thrust that the slope of a throttle curve would make up for within its own interval.
 

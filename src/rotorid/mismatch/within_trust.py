@@ -42,7 +42,7 @@ def beyond_trust(model: WrenchModel, values: Values, active: Sequence[str]) -> b
 def strained(model: WrenchModel, values: Values, moved: Values) -> bool:
     """Whether one of the changes of values not called wrong is beyond its trust."""
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
-    return any(abs(moved[k][0]) > BEYOND_TRUST * sd for k, sd in trust.items() if k not in values)
+    return any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items() if k not in values)
 
 
 def changes(model: WrenchModel, fit: Fit) -> Values:

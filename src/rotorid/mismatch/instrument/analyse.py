@@ -32,7 +32,7 @@ from rotorid.mismatch.instrument.values import Values, curved_gains, delivered, 
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.values import changed_vehicle, without_common_scale, without_scale_of_curve
+from rotorid.mismatch.values import changed_vehicle, told_of_commands
 from rotorid.mismatch.within_trust import in_words
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -281,16 +281,6 @@ def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list
             text = f"{name} looked significant with the believed values; the refitted values explain it"
             out[term.effect] = Finding(id=term.effect, status="absorbed", sentence=text, p_value=p)
     return list(out.values())
-
-
-def told_of_commands(findings: list[Finding], values: dict) -> dict[str, tuple[float, float]]:
-    """Wrong values to state where rotor speeds are known from commands alone: none that only says their scale.
-
-    At which voltage the believed values hold is not stated, and a curve of the throttle has a slope of its own.
-    """
-    if any(f.id == "battery_sag" and f.status in ("established", "ambiguous") for f in findings):
-        values = without_common_scale(values)
-    return without_scale_of_curve(findings, values)
 
 
 def make_traces(setup: Setup, model: ReadingModel, refitted: Fit, fit: Fit):

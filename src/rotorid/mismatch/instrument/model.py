@@ -88,7 +88,7 @@ class ReadingSearch(Search):
         self.total_cross = regression.cross[regression.training].sum(axis=0)
 
     def _allowed(self, term: Term) -> bool:
-        if self.rich or "own in each run" in term.key:
+        if self.rich or of_single_runs(term.key):
             return True
         return term.size <= MOST_OF_A_FORM and (term.form is None or term.form.name not in LATER)
 
@@ -325,6 +325,11 @@ class ReadingModel:
     selection: Selection
     noise: np.ndarray
     """One sigma of a row's noise by channel, (6,); NaN where a channel is not compared."""
+
+
+def of_single_runs(key: str) -> bool:
+    """Whether a term has numbers of its own for each run."""
+    return "own in each run" in key
 
 
 def kept_values(search: Search, active: list[str]) -> list[str]:

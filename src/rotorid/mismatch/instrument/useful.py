@@ -15,9 +15,8 @@ import numpy as np
 
 from rotorid.mismatch.harmless import HELP_Z, excited, growth, helps
 from rotorid.mismatch.instrument.decide import main_channels
-from rotorid.mismatch.instrument.model import REFUTED, ReadingModel, block_length
-from rotorid.mismatch.instrument.values import delivered, held_out, settled
-from rotorid.mismatch.select import Search
+from rotorid.mismatch.instrument.model import REFUTED, ReadingModel, block_length, of_single_runs
+from rotorid.mismatch.instrument.values import Values, delivered, held_out, settled
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 USELESS = "without it the error on the runs held out is no larger in any channel that it acts in"
@@ -26,8 +25,7 @@ OF_OTHER_RUNS = "something else explains the runs held out, of which its numbers
 Again = Callable[[list[str], dict[str, str]], ReadingModel]
 """Searches once more from the terms of a list, without the ids refused."""
 
-
-ValuesOf = Callable[[ReadingModel], dict[str, tuple[float, float]]]
+ValuesOf = Callable[[ReadingModel], Values]
 """The believed values that a model's recordings contradict."""
 
 
@@ -35,7 +33,7 @@ def without_useless(model: ReadingModel, again: Again, values_of: ValuesOf) -> R
     """The model less what is of no use on the runs held out, searched anew without it, the least useful first."""
     while (key := useless(model, values_of)) is not None:
         model = refusing(model, key, USELESS, again)
-    for key in [k for k in model.selection.active if of_single_runs(model.search, k)]:
+    for key in [k for k in model.selection.active if of_single_runs(k)]:
         other = refusing(model, key, OF_OTHER_RUNS, again)
         gains = [m.search.held_out_gain(m.selection.active) for m in (model, other)]
         if None not in gains and gains[1] > gains[0] + REFUTED and useless(other, values_of) is None:
@@ -53,11 +51,6 @@ def refusing(model: ReadingModel, key: str, reason: str, again: Again) -> Readin
     return replace(found, selection=replace(found.selection, not_established=told))
 
 
-def of_single_runs(search: Search, key: str) -> bool:
-    """Whether a term has numbers of its own for each run."""
-    return "own in each run" in key
-
-
 def useless(model: ReadingModel, values_of: ValuesOf) -> str | None:
     """The term at work that helps least on the rows held out, if it does not help there at all; None if all do.
 
@@ -72,7 +65,7 @@ def useless(model: ReadingModel, values_of: ValuesOf) -> str | None:
     with_it, found = left(active), []
     fit = regression.fit(search.always + active)
     for key in active:
-        if search.terms[key].effect in UNKNOWNS or of_single_runs(search, key):
+        if search.terms[key].effect in UNKNOWNS or of_single_runs(key):
             continue
         cols = regression.columns([key])
         beta = fit.beta[fit.places(cols)]

@@ -19,7 +19,7 @@ from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.within_trust import BEYOND_TRUST, pays
+from rotorid.mismatch.within_trust import pays, strained
 
 Values = Mapping[str, tuple[float, float]]
 """Relative change of believed values and its one-sigma."""
@@ -122,17 +122,15 @@ def settled(model: ReadingModel, values: Values, active: list[str]) -> tuple[Fit
 
     As for flights (`within_trust.settled`): those move together, within their trust, and only if it pays.
     """
-    regression, search = model.regression, model.search
+    regression, kept = model.regression, kept_values(model.search, active)
     loose = {k: WIDEST_TRUST for k in values}
     plain = regression.fit([*regression.keys_of("nuisance"), *values, *active], loose=loose)
-    free = regression.fit(kept_values(search, active) + active, loose=loose)
-    others = [k for k in regression.keys_of("value") if k in kept_values(search, active) and k not in values]
+    free = regression.fit(kept + active, loose=loose)
     moved = {}
-    for key in others:
+    for key in (k for k in regression.keys_of("value") if k in kept and k not in values):
         beta, covariance = coefficients(regression, free, key)
         moved[key] = (float(beta[0]), float(np.sqrt(covariance[0, 0])))
-    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
-    if any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items()):
+    if strained(model, values, moved):
         return plain, {}
     left = [delivered(model, fit) for fit in (plain, free)]
     if not pays(*left, held_out(model), block_length(model.setup, model.rows)):
