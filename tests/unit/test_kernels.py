@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
 from rotorid.signal import kernels
 
@@ -57,3 +59,14 @@ def test_only_covered_samples_are_kept_and_further_axes_stay():
     out = kernels.apply(kernel, signal)
     assert out.shape == (140, 3, 2)
     np.testing.assert_allclose(out[7, 1, 0], kernel @ signal[7 : 7 + 61, 1, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(400,), (400, 3)])
+def test_quick_filters_give_what_scipy_gives(shape):
+    rng = np.random.default_rng(0)
+    signal, taps = rng.standard_normal(shape).cumsum(axis=0), rng.standard_normal(9)
+    np.testing.assert_allclose(kernels.causal(taps, signal), lfilter(taps, [1.0], signal, axis=0), rtol=1e-9, atol=1e-9)
+    # Wider than the signal, so that it is mirrored more than once.
+    for sigma in (3.0, 250.0):
+        wanted = gaussian_filter1d(signal, sigma, axis=0)
+        np.testing.assert_allclose(kernels.gaussian(signal, sigma), wanted, rtol=1e-9, atol=1e-9)

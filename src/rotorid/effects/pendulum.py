@@ -1,5 +1,6 @@
 """A pendulum below a vehicle: how it swings, and how long its cable may be."""
 
+from functools import lru_cache
 from math import exp, sqrt
 
 import numpy as np
@@ -31,10 +32,19 @@ def swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2):
     coarse, instants = np.add.reduceat(hanging, edges) / counts, np.add.reduceat(time_s, edges) / counts[:, 0]
     omega = sqrt(gravity_m_s2 / length_m)
     recent = np.maximum(1.0 - omega * block * dt * np.arange(len(coarse)) / np.pi, 0.0)
-    states = _leapfrog(coarse, recent @ coarse / recent.sum(), block * dt, length_m, 2 * damping_ratio * omega)
+    start = recent @ coarse / recent.sum()
+    states = _swung(coarse.tobytes(), *start.tolist(), block * dt, length_m, 2 * damping_ratio * omega)
     states = np.stack([np.interp(time_s, instants, column) for column in states.T], axis=1)
     direction = states[:, :3] / np.maximum(np.linalg.norm(states[:, :3], axis=1, keepdims=True), 1e-12)
     return direction, states[:, 3]
+
+
+@lru_cache(maxsize=32)
+def _swung(hanging, start_x, start_y, start_z, dt, length_m, damping):
+    """As `_leapfrog`, remembered: each column that a payload has asks for the same swing."""
+    return _leapfrog(
+        np.frombuffer(hanging).reshape(-1, 3), np.array([start_x, start_y, start_z]), dt, length_m, damping
+    )
 
 
 def _leapfrog(hanging, start, dt, length_m, damping):

@@ -12,7 +12,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch import within_trust
-from rotorid.mismatch.decide import exchangeable, wrench_findings, wrong_values
+from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings, wrong_values
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted, size_of_value
@@ -173,15 +173,24 @@ def lag_alone_notes(chain: Chain | None) -> list[str]:
 
 
 def run_scale_notes(model: WrenchModel) -> list[str]:
-    """What was done about a thrust that differs between runs."""
+    """What was done about a thrust that differs between runs.
+
+    Told is what a flight shows, thrust over mass: both may move together with anything.
+    """
     regression = model.search.regression
     terms = [t for t in regression.terms if t.key.startswith(RUN_SCALE)]
     if not terms:
         return []
     fit = regression.fit(model.search.always + model.selection.active)
-    found = [fit.beta[fit.columns == regression.start[t.key]][0] for t in terms]
-    parts = ", ".join(f"{t.run} {100 * b:+.1f} %" for t, b in zip(terms, found, strict=True))
-    return [f"The thrust coefficient is not the same in every run; each has its own scale ({parts})."]
+
+    def change(key: str) -> float:
+        return float(coefficients(regression, fit, key)[0][0])
+
+    common = change("thrust") - (change("mass") if "mass" in model.search.terms else 0.0)
+    parts = ", ".join(f"{t.run} {100 * (change(t.key) + common):+.1f} %" for t in terms)
+    return [
+        f"The thrust that a rotor speed makes per mass is not the same in every run; each has its own scale ({parts})."
+    ]
 
 
 def wind_finding(model: WrenchModel) -> Finding:

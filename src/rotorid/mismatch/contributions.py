@@ -33,10 +33,13 @@ class Contributions:
 
     def of(self, columns: np.ndarray, beta: np.ndarray) -> list[np.ndarray]:
         """What coefficients `beta` (k,) of some columns add to the channels of each stretch, (n, 12)."""
-        parts = [r.x[:, :, columns] @ beta for r in self.rows]
+        # All columns in one product: to pick some out of an array of gigabytes costs several times as much.
+        whole = np.zeros(self.rows[0].x.shape[2])
+        whole[columns] = beta
+        parts = [_product(r.x, whole) for r in self.rows]
         if self.noisy is None:
             return parts
-        noise = [n.x[:, :, columns] @ beta - p for n, p in zip(self.noisy, parts, strict=True)]
+        noise = [_product(n.x, whole) - p for n, p in zip(self.noisy, parts, strict=True)]
         for run in dict.fromkeys(r.run for r in self.rows):
             own = [k for k, r in enumerate(self.rows) if r.run == run]
             for c in range(parts[0].shape[1]):
@@ -61,6 +64,11 @@ class Contributions:
         taps = np.append(taps, taps[0]) * np.hanning(size + 3)[1:-1]
         half = size // 2
         return [fftconvolve(np.pad(p, half, mode="reflect"), taps, mode="valid") if len(p) > half else p for p in parts]
+
+
+def _product(x: np.ndarray, beta: np.ndarray) -> np.ndarray:
+    """x @ beta, (n, 12)."""
+    return (x.reshape(-1, x.shape[2]) @ beta).reshape(x.shape[:2])
 
 
 def spectrum(parts: list[np.ndarray], size: int) -> np.ndarray:

@@ -10,7 +10,6 @@ possible strength of it explains is no dependence.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from rotorid.mismatch.between_runs import compared
@@ -18,6 +17,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import assemble_rows
 from rotorid.mismatch.regression import at_least, quadratic_form, spread_of
 from rotorid.mismatch.rows import CHANNELS
+from rotorid.signal.kernels import causal
 
 ALARM_P = 1e-5
 SMALLEST_SHARE_OF_NOISE = 0.3
@@ -175,4 +175,4 @@ def _wald(parts, inputs, taps, rate_hz, shared=None, most=1.0, memory=0):
 
 
 def _whitened(x: np.ndarray, taps: np.ndarray) -> np.ndarray:
-    return lfilter(taps, [1.0], x, axis=0)[len(taps) - 1 :]
+    return causal(taps, x)[len(taps) - 1 :]

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from rotorid.effects.contract import Form
 from rotorid.mismatch.decide import wrong_values
@@ -34,6 +33,7 @@ from rotorid.mismatch.wrench import (
     with_wind,
     wrench_model,
 )
+from rotorid.signal.kernels import causal
 
 RUN_P = 1e-6
 RUN_SPREAD = 0.007
@@ -182,7 +182,7 @@ def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
     left = 0.0
     for part in after_residual(model):
         for channel, taps in filters.items():
-            left += float((lfilter(taps, [1.0], part[:, channel])[len(taps) :] ** 2).sum())
+            left += float((causal(taps, part[:, channel])[len(taps) :] ** 2).sum())
     terms = [model.search.terms[k] for k in model.selection.active]
     return left + sum(COST_PER_EFFECT + COST_PER_PARAMETER * t.size for t in terms)
 

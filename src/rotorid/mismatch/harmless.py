@@ -11,6 +11,7 @@ error.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -69,6 +70,12 @@ def with_sure_nuisances(model: WrenchModel, keys: Sequence[str], values: Values)
 def surely_there(beta: np.ndarray, covariance: np.ndarray) -> bool:
     """Whether a nuisance is other than nothing."""
     return abs(float(beta[0])) > SURE_Z * float(np.sqrt(covariance[0, 0]))
+
+
+def nuisances_in(model: WrenchModel, values: Values) -> list[str]:
+    """The nuisances that are delivered."""
+    regression, fit = model.regression, delivered_fit(model, values, model.selection.active)
+    return [k for k in regression.keys_of("nuisance") if np.isin(regression.columns([k]), fit.columns).all()]
 
 
 def residuals_of(model: WrenchModel, fit: Fit) -> list[np.ndarray]:
@@ -169,13 +176,25 @@ def helps(ratio: np.ndarray, z: np.ndarray, channels: list[int]) -> float:
 
 def without(model: WrenchModel, key: str, reason: str = REASON) -> WrenchModel:
     """The model with one effect less, all else fitted anew."""
-    search, old = model.search, model.selection
-    active = [k for k in old.active if k != key]
+    fewer = fitted_anew(model, [k for k in model.selection.active if k != key])
+    reasons = {**fewer.selection.not_established, model.search.terms[key].effect: reason}
+    return replace(fewer, selection=replace(fewer.selection, not_established=reasons))
+
+
+def fitted_anew(model: WrenchModel, active: list[str]) -> WrenchModel:
+    """The model with the terms of `active` alone."""
+    search = model.search
     regression = search.regression
     fit = regression.fit(search.always + active, jackknife=True)
     p_values = {k: regression.wald(fit, regression.columns([k]), search.blocks) for k in active}
-    reasons = {**old.not_established, search.terms[key].effect: reason}
-    return replace(model, selection=replace(old, active=active, fit=fit, p_values=p_values, not_established=reasons))
+    return replace(model, selection=replace(model.selection, active=active, fit=fit, p_values=p_values))
+
+
+def without_nuisance(model: WrenchModel, key: str) -> WrenchModel:
+    """The model with a nuisance held at nothing, all else fitted anew."""
+    search = copy(model.search)
+    search.regression = search.regression.holding(key)
+    return fitted_anew(replace(model, regression=model.regression.holding(key), search=search), model.selection.active)
 
 
 def without_harm(
@@ -183,8 +202,9 @@ def without_harm(
 ) -> tuple[WrenchModel, Values, ValuesOf, bool]:
     """The model less what makes a channel worse on the held-out part, its wrong values, and whether harm is left.
 
-    What goes is the effect or the wrong value without which the channels are best. `values_of` is returned without the
-    values that went. Harm that is left is of what lies between command and speed.
+    What goes is the effect, the wrong value or the nuisance without which the channels are best: a loop that answers
+    the gyroscope's noise makes an offset in time of it, which the next turn contradicts. `values_of` is returned
+    without the values that went. Harm that is left is of what lies between command and speed.
     """
     values = values_of(model, ())
     before = believed_residuals(prepared, model, commanded)
@@ -203,6 +223,7 @@ def without_harm(
                 continue
             options.append((without(model, key), values, refused))
         options += [(model, {k: v for k, v in values.items() if k != key}, (*refused, key)) for key in values]
+        options += [(without_nuisance(model, key), values, refused) for key in nuisances_in(model, values)]
         left = [growth(before, delivered_residuals(*option[:2]), held, per)[0][worse].sum() for option in options]
         if not options or min(left) >= ratio[worse].sum():
             return model, values, less(values_of, refused), True

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.signal import lfilter
 from scipy.stats import chi2, f
 
 from rotorid.mismatch.between_runs import apart
@@ -33,6 +32,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.shares import effort, segments_of, shares
 from rotorid.mismatch.verdict import SMALLEST_P, Location, Regime, rms, with_status
+from rotorid.signal.kernels import causal
 
 FAMILY_ERROR = 0.002
 """Chance of any false interval in a whole set."""
@@ -339,7 +339,7 @@ def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
     for traces in channels.values():
         parts = [np.nan_to_num(t.after) for t in traces]
         taps = autoregression(parts)
-        white = [lfilter(taps, [1.0], p) for p in parts]
+        white = [causal(taps, p) for p in parts]
         # One or two wild samples are a glitch; a mismatch lasts.
         white = [np.clip(w, -WILD, WILD) for w in _evened(traces, white, hard)]
         for w in white:

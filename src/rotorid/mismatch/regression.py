@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import lsq_linear
-from scipy.signal import lfilter
 from scipy.stats import chi2, f
 
 from rotorid.mismatch.rows import Rows, Term
+from rotorid.signal.kernels import causal
 
 HIGHEST_AR_ORDER = 12
 WHITE_SHARE = 0.01
@@ -32,6 +32,8 @@ AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
 MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
+HELD = 1e30
+"""Precision of a coefficient that is held at nothing."""
 MOST_REMEMBERED = 2000
 MOST_EXPLAINED = 200_000
 MOST_DISTRUST = 3.0
@@ -144,13 +146,20 @@ class Regression:
             if term.kind == "value":
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
         self._explained: dict[tuple[str, ...], float] = {}
-        self._fits: dict[tuple[tuple[str, ...], bool], Fit] = {}
+        self._fits: dict[tuple, Fit] = {}
 
     def with_room(self, least: float) -> Regression:
         """The same with believed values that may move by at least a share `least`."""
         wider = replace(self)  # fits remembered are those of the narrower limits
         wider.limit = np.maximum(self.limit, least)
         return wider
+
+    def holding(self, key: str) -> Regression:
+        """The same with a term held at nothing."""
+        held = replace(self, precision=self.precision.copy())
+        held.precision[self.columns([key])] = HELD
+        held.limit = self.limit
+        return held
 
     def without_winds(self) -> Regression:
         """The same without the winds of single runs: every other column less what they take of it.
@@ -214,13 +223,14 @@ class Regression:
         Fits of the training blocks are remembered: a search asks for the same ones over and over.
         """
         keys = tuple(keys)
-        if mask is not None or loose:
-            return self._fit(keys, self.training if mask is None else mask, jackknife, loose)
-        if (keys, jackknife) not in self._fits:
+        if mask is not None:
+            return self._fit(keys, mask, jackknife, loose)
+        asked = keys, jackknife, tuple(sorted((loose or {}).items()))
+        if asked not in self._fits:
             if len(self._fits) > MOST_REMEMBERED:
                 self._fits.clear()
-            self._fits[keys, jackknife] = self._fit(keys, self.training, jackknife, None)
-        return self._fits[keys, jackknife]
+            self._fits[asked] = self._fit(keys, self.training, jackknife, loose)
+        return self._fits[asked]
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
         cols = self.columns(keys)
@@ -545,9 +555,10 @@ def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
 
 def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
     """Whitened y (n,) and x (n, K) of one channel from sample `start` on (one at a time: all would be large)."""
-    y = lfilter(taps, [1.0], rows.y[:, channel])
-    x = lfilter(taps, [1.0], rows.x[:, channel], axis=0)
-    return y[start:], x[start:]
+    x = np.zeros_like(rows.x[:, channel])
+    used = np.flatnonzero(rows.x[:, channel].any(axis=0))
+    x[:, used] = causal(taps, rows.x[:, channel, used])
+    return causal(taps, rows.y[:, channel])[start:], x[start:]
 
 
 def full_fit_residuals(
@@ -567,7 +578,7 @@ def full_fit_residuals(
         gram, cross = np.zeros((size, size)), np.zeros(size)
         for c in channels:
             taps = colours.get(c, np.ones(1))
-            weight = 1.0 / (np.concatenate([lfilter(taps, [1.0], part[:, c]) for part in left]).std() + 1e-12)
+            weight = 1.0 / (np.concatenate([causal(taps, part[:, c]) for part in left]).std() + 1e-12)
             for r in rows:
                 y, x = whiten(r, c, taps, 0) if c in colours else (r.y[:, c], r.x[:, c])
                 x = x * weight

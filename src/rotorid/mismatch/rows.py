@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 from scipy.signal import upfirdn
 
 from rotorid.effects.contract import Contribution, Form, Motion
@@ -219,7 +218,7 @@ def value_columns(
         # Body rates stay bounded: a lasting predicted acceleration is the mark of something left out.
         # (Neither a mean over a window, which makes a fifth too much of what turns a little faster than it lasts, nor
         # ends that are held: one wild instant would then last.)
-        predicted = predicted - gaussian_filter1d(predicted, SUSTAINED_S * segment.rate_hz, axis=0, mode="reflect")
+        predicted = predicted - kernels.gaussian(predicted, SUSTAINED_S * segment.rate_hz)
         part = np.zeros((3, 3))
         part[axis, axis] = inertia[axis, axis]
         out = {"moment": -(predicted @ part + np.cross(rate, rate @ part))}

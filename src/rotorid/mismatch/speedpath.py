@@ -13,7 +13,6 @@ from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from rotorid.effects.catalogue import catalogue
@@ -22,6 +21,7 @@ from rotorid.effects.delay import shifted
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
 from rotorid.signal import kernels
+from rotorid.signal.kernels import causal
 
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0
@@ -112,9 +112,10 @@ def nothing_between(result: SpeedResult, why: str = "the differences between the
 
 
 def taken_back(result: SpeedResult, why: str) -> list[SpeedResult]:
-    """The result with one id less, the least sure first, and at last with nothing between command and speed."""
+    """The result without its shift in time, with one id less, the least sure first, and at last with nothing between
+    command and speed."""
     ids = sorted((k for k, _ in result.fit.chain), key=lambda k: -result.p_values[k])
-    fewer = []
+    fewer = [replace(result, fit=replace(result.fit, shift_s=0.0))] if result.fit.shift_s else []
     for gone in ids if len(ids) > 1 else []:
         p_values, alternatives, sizes = (
             {k: v for k, v in of.items() if k != gone} for of in (result.p_values, result.alternatives, result.sizes)
@@ -151,7 +152,7 @@ class SpeedProblem:
                 out.append(part / self.scale)
                 continue
             longest = max(len(f) for f in self.filters) - 1
-            white = np.stack([lfilter(f, [1.0], part[:, j]) for j, f in enumerate(self.filters)], axis=1)
+            white = np.stack([causal(f, part[:, j]) for j, f in enumerate(self.filters)], axis=1)
             out.append(white[longest:])
         return out
 
@@ -279,7 +280,7 @@ class WrenchOnly(SpeedProblem):
                     out.append(part / self.scale[:, None])
                     continue
                 longest = max(len(f) for f in self.filters) - 1
-                white = np.stack([lfilter(f, [1.0], part[:, j], axis=0) for j, f in enumerate(self.filters)], axis=1)
+                white = np.stack([causal(f, part[:, j]) for j, f in enumerate(self.filters)], axis=1)
                 out.append(white[longest:])
             self._cached, self._cached_key = out, key
         return self._cached

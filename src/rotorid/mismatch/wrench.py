@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
@@ -37,6 +36,7 @@ from rotorid.mismatch.speedpath import (
 from rotorid.mismatch.two_sensors import refute
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
+from rotorid.signal.kernels import causal
 
 LONGEST_BLOCKS = 400
 MOST_NOISE = 0.3
@@ -299,7 +299,7 @@ def noise_of_columns(rows, noisy, channel: int, columns: np.ndarray, taps: np.nd
         x = a.x[:, channel][:, columns]
         added = b.x[:, channel][:, columns] - x
         if taps is not None:
-            x, added = lfilter(taps, [1.0], x, axis=0), lfilter(taps, [1.0], added, axis=0)
+            x, added = causal(taps, x), causal(taps, added)
         energy += (x**2).sum(axis=0)
         noise += (added**2).sum(axis=0)
     return noise / np.maximum(energy, 1e-300)
@@ -504,8 +504,8 @@ def profile_cost(model: WrenchModel, terms: list[Term], rows: list[Rows], fixed_
     gram, cross, square = np.zeros((size, size)), np.zeros(size), 0.0
     for r in rows:
         for c, taps in model_filters(model).items():
-            y = lfilter(taps, [1.0], r.y[:, c])[12:]
-            x = lfilter(taps, [1.0], r.x[:, c], axis=0)[12:]
+            y = causal(taps, r.y[:, c])[12:]
+            x = causal(taps, r.x[:, c])[12:]
             if fixed_gain:
                 y = y - x[:, -1]
                 x = x[:, :-1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import fftconvolve
+from scipy.signal import fftconvolve, oaconvolve, upfirdn
 from scipy.signal.windows import kaiser
 
 ATTENUATION_BETA = 5.0
@@ -51,3 +51,19 @@ def apply(kernel: np.ndarray, signal: np.ndarray) -> np.ndarray:
     """Convolve along axis 0 and keep only samples that the kernel fully covers."""
     shape = (len(kernel),) + (1,) * (signal.ndim - 1)
     return fftconvolve(signal, kernel.reshape(shape), mode="valid", axes=0)
+
+
+def causal(taps: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """`scipy.signal.lfilter(taps, [1], signal, axis=0)`, without its loop in Python over the columns."""
+    if signal.ndim == 1:
+        return np.convolve(signal, taps)[: len(signal)]
+    return upfirdn(taps, signal, axis=0)[: len(signal)]
+
+
+def gaussian(signal: np.ndarray, sigma_samples: float) -> np.ndarray:
+    """`scipy.ndimage.gaussian_filter1d(signal, sigma_samples, axis=0)` at a cost that hardly grows with its width."""
+    half = int(4.0 * sigma_samples + 0.5)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / sigma_samples) ** 2)
+    padded = np.pad(signal, [(half, half)] + [(0, 0)] * (signal.ndim - 1), mode="symmetric")
+    shape = (-1,) + (1,) * (signal.ndim - 1)
+    return oaconvolve(padded, (kernel / kernel.sum()).reshape(shape), mode="valid", axes=0)

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rotorid.mismatch.analyse import run_scale_notes
 from rotorid.mismatch.between_runs import apart, compared
+from rotorid.mismatch.fitted import refined_model, turning
+from rotorid.mismatch.prepare import prepare
 
+from .flights import COLUMNS, recorded
 from .synthetic import coloured
 
 RATE_HZ = 40.0
@@ -63,3 +70,15 @@ def test_a_change_in_the_middle_of_a_run_is_seen_in_the_runs_after():
     parts[1][600:] += 2.0
     found = apart(("a", "b", "c", "d"), parts, RATE_HZ, 1.0)
     assert found is not None and found.means["b"] == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_thrust_that_differs_between_runs_is_told_by_what_the_flights_show():
+    """Rotors read 2 % fast in one of three runs: thrust per mass 1/1.02² as large there."""
+    flown = recorded(1, 2, 3)
+    table = flown.runs[1].table.copy()
+    table[list(COLUMNS["rotors"])] *= 1.02
+    runs = (flown.runs[0], replace(flown.runs[1], table=table), flown.runs[2])
+    prepared = prepare(replace(flown, runs=runs, held_out=("run02",)))
+    (note,) = run_scale_notes(refined_model(prepared, *turning(prepared)))
+    told = {word[:5]: float(share) for word, share in re.findall(r"(run\d\d) ([+-]\d\.\d) %", note)}
+    assert told == pytest.approx({"run00": 0.0, "run01": -3.9, "run02": 0.0}, abs=0.15)

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import catalogue
@@ -25,6 +24,7 @@ from rotorid.mismatch.instrument.predict import full_voltage_of
 from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces_of, with_speed
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
+from rotorid.signal.kernels import causal
 
 IDS = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation", "delay")
 ENTER_P = 1e-5
@@ -262,7 +262,7 @@ class Problem:
         """Whitened residuals of all stretches in a row."""
         parts = self.free(self.raw(chain, theta, loadings))
         return np.concatenate(
-            [np.stack([lfilter(t, [1.0], p[:, c]) for c, t in enumerate(self.taps)], axis=1).ravel() for p in parts]
+            [np.stack([causal(t, p[:, c]) for c, t in enumerate(self.taps)], axis=1).ravel() for p in parts]
         )
 
     def other_supply(self) -> bool:

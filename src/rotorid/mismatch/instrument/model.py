@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
@@ -40,6 +39,7 @@ from rotorid.mismatch.select import (
     Selection,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.signal.kernels import causal
 
 SHORT = 60
 """Stretches of fewer rows are too short to learn the colour of their noise from: they are taken as blocks."""
@@ -468,7 +468,7 @@ def whitened(model: ReadingModel, values: list[np.ndarray]) -> list[np.ndarray]:
     """Columns (n, 6) of every stretch's rows through the whitening filters, flattened over channels."""
     taps = model.regression.filters
     longest = max(len(t) for t in taps.values()) - 1
-    return [np.stack([lfilter(taps[c], [1.0], v[:, c])[longest:] for c in taps], axis=1).ravel() for v in values]
+    return [np.stack([causal(taps[c], v[:, c])[longest:] for c in taps], axis=1).ravel() for v in values]
 
 
 def refined(model: ReadingModel) -> list[Term]:
