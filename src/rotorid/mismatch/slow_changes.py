@@ -15,6 +15,9 @@ SLOW_EXCESS = 16.0
 """Times more power than the sensors' noise, relative to the fast band, that slow changes must have to be noise no
 more: coloured noise of the sensors stays below four, see benchmarks/mismatch.md."""
 WELCH_S = 8.0
+ACROSS = (0, 1)
+"""Channels of the force across the rotors' axis: what rotors make of their commands is not known well enough for the
+others."""
 
 
 def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tuple[float, float]]:
@@ -24,13 +27,13 @@ def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tu
     the sensors' own noise does to each channel (`noisy` are the same segments with that noise added once more).
     `contributions` (n, 12) of each stretch are the whole model's.
     """
-    if not noisy or not all(s.measured_speed for s in segments):
-        return {}  # what rotors make of their commands is not known well enough
+    if not noisy:
+        return {}
     rate = prepared.thinner.rate_hz
     fast = tuple(share * prepared.thinner.cutoff_hz for share in FAST_BAND)
     noise = added_noise(prepared, segments, noisy)
     out = {}
-    for c in range(6):
+    for c in range(6) if all(s.measured_speed for s in segments) else ACROSS:
         if not np.isfinite(model.noise[c]):
             continue
         left = left_by(model.rows, c, contributions)
