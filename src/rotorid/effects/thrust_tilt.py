@@ -27,14 +27,9 @@ def at_the_hubs(motion, vehicle, values):
     return _tilted(motion, vehicle, values[0], values[1], np.ones(vehicle.rotor_count))
 
 
-def _upright(motion, vehicle, tilt_x, tilt_y, weight):
-    """As `_tilted`, but the reaction torques stay upright: what flows off the rotor leans, not the motor."""
-    return at_hubs(_forces(motion, vehicle, tilt_x, tilt_y) * weight[None, :, None], vehicle.rotor_positions_m())
-
-
 def thrust_alone(motion, vehicle, values):
-    """F_i += T_i (ε_x, ε_y, 0) at each hub, reaction torques upright; all rotors alike."""
-    return _upright(motion, vehicle, values[0], values[1], np.ones(vehicle.rotor_count))
+    """F_i += T_i (ε_x, ε_y, 0) at each hub, reaction torques upright: what flows off the rotor leans, not the motor."""
+    return at_hubs(_forces(motion, vehicle, values[0], values[1]), vehicle.rotor_positions_m())
 
 
 def force_only(motion, vehicle, values):
@@ -42,9 +37,9 @@ def force_only(motion, vehicle, values):
     return Contribution(force=_forces(motion, vehicle, values[0], values[1]).sum(axis=1))
 
 
-def _single(k, wrench=_tilted):
+def _single(k):
     def one(motion, vehicle, values):
-        return wrench(motion, vehicle, values[0], values[1], np.eye(vehicle.rotor_count)[k])
+        return _tilted(motion, vehicle, values[0], values[1], np.eye(vehicle.rotor_count)[k])
 
     return one
 
@@ -54,18 +49,6 @@ def forms(vehicle):
     needs = ("rotor_speed",)
     singles = [
         Form(f"rotor {k + 1}", f"F_{k + 1} = T_{k + 1} (ε_x, ε_y, −1)", tilt, _single(k), needs, (), 2)
-        for k in range(vehicle.rotor_count)
-    ]
-    singles += [
-        Form(
-            f"rotor {k + 1}, thrust alone",
-            f"F_{k + 1} = T_{k + 1} (ε_x, ε_y, −1), torque upright",
-            tilt,
-            _single(k, _upright),
-            needs,
-            (),
-            2,
-        )
         for k in range(vehicle.rotor_count)
     ]
     return (
