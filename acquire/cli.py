@@ -471,8 +471,7 @@ def _prompt(recorder: Recorder, place_s: float | None) -> procedures.Prompt:
     def prompt(text: str) -> Callable[[], bool]:
         if place_s is not None:
             recorder.say(f"{text}: {place_s:g} s")
-            goal = recorder.progress + place_s * 1e6 / recorder.instrument.interval_us
-            return lambda: recorder.progress >= goal
+            return procedures.countdown(round(place_s * 1e6 / recorder.instrument.interval_us))
         recorder.say(f"{text}, then press Enter")
 
         def pressed() -> bool:

@@ -16,7 +16,7 @@ SETTLING_SAMPLES = 10  # fig. 2.35: voltage spikes dissipate
 TARE_SAMPLES = 25
 
 Prompt = Callable[[str], Callable[[], bool]]
-"""Asks a person for something and returns a function that says whether it is done."""
+"""Asks a person for something and returns a function that says whether it is done, asked once per sample."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,19 @@ class SteadyRule:
 
 
 STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)  # in N: the reference sensor is noisy
+
+
+def countdown(samples: int) -> Callable[[], bool]:
+    """Done after so many samples *handed over*, not received: a busy host receives seconds of them at once, and
+    would count a weight as put down while the procedure still looks at samples from before."""
+    left = samples
+
+    def done() -> bool:
+        nonlocal left
+        left -= 1
+        return left <= 0
+
+    return done
 
 
 def stream(recorder: Recorder, samples: int | None, interval_s: float = 0.0) -> None:

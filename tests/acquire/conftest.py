@@ -50,7 +50,13 @@ def recorder_on(tmp_path: Path) -> Callable[..., Recorder]:
 def loopback(tmp_path: Path) -> Callable[..., tuple]:
     """A world, and recorders on it, on a virtual clock."""
 
-    def make(what: str, faults: Faults | None = None, truth: Truth | None = None, **options) -> tuple:
+    def make(
+        what: str,
+        faults: Faults | None = None,
+        truth: Truth | None = None,
+        timings: Timings = Timings(),  # noqa: B008
+        **options,
+    ) -> tuple:
         world = build(what, truth or Truth(), faults=faults, **options)
         clock = VirtualClock(datetime(2024, 3, 4, 15, tzinfo=UTC))
         clock.follow(world.run_until)
@@ -61,6 +67,7 @@ def loopback(tmp_path: Path) -> Callable[..., tuple]:
                 clock,
                 tmp_path,
                 f"run-{line.device.instrument.name}",
+                timings=timings,
                 durable=False,
             )
             for line in world.lines

@@ -7,7 +7,7 @@ import pytest
 
 from acquire import procedures
 from acquire.clock import SystemClock
-from acquire.recorder import Recorder
+from acquire.recorder import Recorder, Timings
 from acquire.transport import ReplayTransport
 from rotorid.io.frames import COMMAND, decode
 from rotorid.io.logs import read_log
@@ -47,6 +47,15 @@ def test_bench(loopback):
     with recorder:
         procedures.stream(recorder, 10, 0.001)
     assert said(recorder.log_path) == ["?", "G e8030000", "X"]
+
+
+@pytest.mark.parametrize("burst_s", [0.02, 6.0])
+def test_a_weight_has_its_time_on_a_host_that_receives_in_bursts(loopback, burst_s):
+    _, recorder = loopback("bench", timings=Timings(poll_s=burst_s))
+    with recorder:
+        procedures.static_test(recorder, lambda text: procedures.countdown(200))
+    marks = recorder.session.marks
+    assert marks["load"] - marks["tare_stop"] == 200
 
 
 def test_rotor(loopback):
