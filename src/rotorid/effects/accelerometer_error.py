@@ -40,7 +40,7 @@ def forms(vehicle):
 
     # Data sheets allow 1 m/s2 and 3 %; far beyond it is another unit or axis (mistakes), or a sensor taken for another.
     b = each("b", "m/s2", -4.0, 4.0, "bias along", 0.01)
-    s = each("s", "1", -0.5, 0.5, "scale error along", 0.003)
+    s = each("s", "1", -0.2, 0.2, "scale error along", 0.003)
     t = each("theta", "rad", -0.5, 0.5, "turn of the sensor about", 0.001)
     bias_too = ("always",)
     return (

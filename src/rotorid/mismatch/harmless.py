@@ -258,6 +258,16 @@ def without_unsure(model: WrenchModel, values: Values, values_of: ValuesOf) -> t
         values = values_of(model, ())
 
 
+def within_bounds(model: WrenchModel) -> bool:
+    """Whether every effect's coefficients are possible for what it says of itself."""
+    search = model.search
+    for key in model.selection.active:
+        beta, covariance = coefficients(model.regression, model.selection.fit, key)
+        if not search.within_bounds(search.terms[key], beta, np.sqrt(np.diag(covariance))):
+            return False
+    return True
+
+
 def without_useless(
     prepared: Prepared, model: WrenchModel, values: Values, values_of: ValuesOf
 ) -> tuple[WrenchModel, Values]:
@@ -265,7 +275,9 @@ def without_useless(
 
     An error counts as it is or about its mean in each run: what differs between flights is told by itself, and must
     not decide about an effect that is right about everything else. Beyond HARM_RATIO it does: what is delivered would
-    be worse with the effect than without. The least useful goes first, and the others are looked at again without it.
+    be worse with the effect than without. An effect without which another would be beyond its bounds is of use: an
+    accelerometer that seems to read twice what is there hides the drag. The least useful goes first, and the others are
+    looked at again without it.
     Where too little is held out to say anything, or an effect hardly acts (no landing, no turn), nothing goes.
     """
     held = held_out_masks(prepared, model, model.segments)
@@ -290,6 +302,8 @@ def without_useless(
             use = max(helps(*growth(*pair, held, per), wrench) for pair in pairs)
             if harmed(*growth(left, with_it, held, per))[wrench].any():
                 use = -np.inf
+            elif not within_bounds(fewer):
+                use = np.inf
             options.append((use, key, fewer))
         least = min(options, key=lambda o: o[0], default=None)
         if least is None or least[0] >= HELP_Z:

@@ -117,7 +117,7 @@ class Search:
         self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
-    def physical(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
+    def within_bounds(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
         """Whether coefficients are inside their bounds, or outside by less than their own uncertainty."""
         if not term.form.linear:
             return bool(0.2 < beta[0] < 5.0)
@@ -125,6 +125,13 @@ class Search:
             parameter = term.form.parameters[index]
             if value < parameter.low - 1.5 * sd or value > parameter.high + 1.5 * sd:
                 return False
+        return True
+
+    def physical(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
+        """Whether coefficients are within their bounds, and large enough for what the form says."""
+        if not term.form.linear or not self.within_bounds(term, beta, error):
+            return self.within_bounds(term, beta, error)
+        for index, value, sd in zip(term.form.linear, beta, error, strict=True):
             if index in term.form.must_show and abs(value) < 2.0 * sd:
                 return False
         limits = [term.form.parameters[i].negligible for i in term.form.linear]

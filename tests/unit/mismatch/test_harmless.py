@@ -7,16 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotorid.mismatch import harmless
 from rotorid.mismatch.fitted import refined_model, turning, values_called_wrong
 from rotorid.mismatch.harmless import (
     HELP_Z,
     about_means,
     excited,
+    fitted_anew,
     growth,
     harmed,
     helps,
     nuisances_in,
+    within_bounds,
     without_harm,
+    without_useless,
 )
 from rotorid.mismatch.prepare import prepare
 
@@ -114,3 +118,25 @@ def test_an_offset_in_time_that_the_runs_held_out_contradict_is_taken_back(held_
     model, values, _, harm = without_harm(prepared, model, values_called_wrong, False)
     assert (OFFSET in nuisances_in(model, values)) is kept
     assert not harm and not model.selection.active and not values
+
+
+def test_an_effect_is_of_use_where_another_is_beyond_its_bounds_without_it(monkeypatch):
+    """Rotors that are alike: their difference is useless, unless drag would be beyond what is possible without it."""
+    prepared = prepare(recorded(1, 2, flight={"drag": 0.5, "duration_s": 15.0}))
+    drag, spare = "rotor_drag/at the centre of mass", "unequal_rotors/thrust"
+    model = fitted_anew(refined_model(prepared, *turning(prepared)), [drag, spare])
+    assert within_bounds(model)
+    kept, _ = without_useless(prepared, model, {}, lambda *_: {})
+    assert kept.selection.active == [drag]
+
+    def only_with_the_spare(model):
+        column = model.regression.columns([drag])[0]
+        beta = model.selection.fit.beta.copy()
+        if spare not in model.selection.active:
+            beta[model.selection.fit.columns == column] = -1.0  # a drag that pushes
+        fit = replace(model.selection.fit, beta=beta)
+        return within_bounds(replace(model, selection=replace(model.selection, fit=fit)))
+
+    monkeypatch.setattr(harmless, "within_bounds", only_with_the_spare)
+    kept, _ = without_useless(prepared, model, {}, lambda *_: {})
+    assert kept.selection.active == [drag, spare]
