@@ -30,6 +30,10 @@ COST_OF_UNKNOWN = 40.0
 SHARE_OF_UNKNOWN = 0.1
 ALTERNATIVE_P = 0.01
 """A term that beside an alternative is less significant than this could be that alternative instead."""
+INSTEAD_P = 1e-3
+"""It must itself be as significant as this in the other's place."""
+SAME_DIRECTION = 0.05
+"""Share of the strongest combination of a term's parameters below which another is not told from it."""
 MOST_EXTRA_PARAMETERS = 3
 """An alternative with more further parameters than this explains by its freedom, not by its cause."""
 SHARE_OF_LARGEST_BURST = 0.15
@@ -99,6 +103,7 @@ class Search:
         harms=None,
         joint_sizes=None,
         contradicted=None,
+        confusers: Mapping[str, tuple[str, ...]] | None = None,
     ):
         """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
 
@@ -106,6 +111,7 @@ class Search:
         `harms(key, with_it, without)` says whether a term makes one of its channels worse on the held-out rows.
         `joint_sizes(columns, beta)` gives the size of a contribution as it is, of one term or several together, (12,).
         `contradicted(key, fit)` says whether a second sensor shows that an error of the first is none.
+        `confusers` are, to an id, those that physics confuses with it.
         """
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
@@ -114,6 +120,7 @@ class Search:
         self.harms = harms
         self.joint_sizes = joint_sizes
         self.contradicted = contradicted
+        self.confusers = confusers or {}
         self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
         self.blocks = int(regression.training.sum())
 
@@ -533,27 +540,67 @@ class Search:
     def alternatives(self, key: str, active: list[str]) -> list[str]:
         """Ids that could stand in for a term: with one of them in its place the term is no longer needed.
 
-        Nor is it where beside another of fewer parameters it would explain no more than what any form is wrong by.
+        Nor is it where beside another of fewer parameters it would explain no more than what any form is wrong by, or
+        where another and a simpler form of the term's own id, of as many parameters together, explain as much.
         """
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
-        own = self.judge(key, rest, self.without(key, active))
+        base = self.without(key, active)
+        own = self.judge(key, rest, base)
         found = []
         for term in self.terms.values():
             if term.kind != "effect" or term.effect in taken or term.effect == self.terms[key].effect:
                 continue
             if term.effect in found or term.effect in UNKNOWNS:
                 continue
-            other = self.judge(term.key, rest, self.without(key, active))
-            if not other.physical or other.p_value > 1e-3 or other.gain < 0.5 * own.gain:
-                continue
-            if len(other.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
-                continue
-            beside = self.regression.fit(self.always + rest + [term.key])
-            if self.contradicted is not None and self.contradicted(term.key, beside):
-                continue
-            both = self.judge(key, [*rest, term.key], beside)
-            alike = len(other.beta) < len(own.beta) and both.gain < SHARE_OF_LARGEST**2 * own.gain
-            if both.p_value > ALTERNATIVE_P or alike:
+            if self._stands_in(term.key, own, rest, base) or self._shares(term.key, key, rest):
                 found.append(term.effect)
         return found
+
+    def _stands_in(self, other: str, own: Candidate, rest: list[str], base: Fit) -> bool:
+        """Whether beside another term alone one of the model is no longer needed."""
+        instead = self.judge(other, rest, base)
+        if not instead.physical or instead.p_value > INSTEAD_P or instead.gain < 0.5 * own.gain:
+            return False
+        if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
+            return False
+        beside = self.regression.fit(self.always + rest + [other])
+        if self.contradicted is not None and self.contradicted(other, beside):
+            return False
+        both = self.judge(own.key, [*rest, other], beside)
+        alike = len(instead.beta) < len(own.beta) and both.gain < SHARE_OF_LARGEST**2 * own.gain
+        return both.p_value > ALTERNATIVE_P or alike
+
+    def directions(self, term: Term) -> int:
+        """How many parameters of a term these recordings tell from each other, by the size of what they do.
+
+        Torques of rotors that all turn alike are one moment, however many they are.
+        """
+        cols = self.regression.columns([term.key])
+        gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
+        sizes = np.linalg.eigvalsh(gram)
+        return int((sizes > SAME_DIRECTION * sizes[-1]).sum())
+
+    def _shares(self, other: str, key: str, rest: list[str]) -> bool:
+        """Whether a term is no longer needed beside another and a simpler form of its own id.
+
+        Three differences between four rotors may be an offset of the centre of mass and torques that differ. Two causes
+        can imitate almost anything, so this is asked of those alone that physics confuses with it.
+        """
+        if self.terms[other].effect not in self.confusers.get(self.terms[key].effect, ()):
+            return False
+        own = self.terms[key]
+        room = own.size - self.terms[other].size
+        for simpler in self.terms.values():
+            if simpler.effect != own.effect or simpler.key == key or simpler.run or self.directions(simpler) > room:
+                continue
+            pair = [*rest, simpler.key, other]
+            instead = self.judge(other, pair, self.without(other, pair))
+            if not instead.physical or instead.p_value > INSTEAD_P:
+                continue
+            beside = self.regression.fit(self.always + pair)
+            if self.contradicted is not None and self.contradicted(other, beside):
+                continue
+            if self.judge(key, pair, beside).p_value > ALTERNATIVE_P:
+                return True
+        return False

@@ -216,11 +216,12 @@ def searched(
         return key in errors and refute(fitted_rows, fit, regression.columns([key]), noise)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
-    search = Search(regression.without_winds(), sizes_of, known_sizes, harms, seconds.sizes, contradicted)
+    rest = (sizes_of, known_sizes, harms, seconds.sizes, contradicted, {i: e.confusers for i, e in catalogue().items()})
+    search = Search(regression.without_winds(), *rest)
     selection = search.run(start)
     if (wide := search.values_alone(selection)) is not None:
         regression = regression.with_room(VALUE_LIMITS[1])
-        search = Search(wide, sizes_of, known_sizes, harms, seconds.sizes, contradicted)
+        search = Search(wide, *rest)
         selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 

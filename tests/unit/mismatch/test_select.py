@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from rotorid.effects.contract import Form, Parameter
 from rotorid.mismatch.regression import autoregression, build
@@ -15,16 +16,18 @@ from .synthetic import coloured
 from .test_regression import RATE_HZ, rows_of
 
 
-def form(name: str, low: float = -100.0, high: float = 100.0) -> Form:
-    """A form of one parameter; its contribution is never asked for, the rows hold it."""
-    return Form(name, "y = k x", (Parameter("k", "1", low, high),), lambda *_: None)
+def form(name: str, low: float = -100.0, high: float = 100.0, size: int = 1) -> Form:
+    """A form of `size` parameters; its contribution is never asked for, the rows hold it."""
+    return Form(name, "y = k x", tuple(Parameter(f"k_{i}", "1", low, high) for i in range(size)), lambda *_: None)
 
 
-def term(effect: str, name: str = "form", low: float = -100.0, high: float = 100.0) -> Term:
-    return Term(f"{effect}/{name}", "effect", effect, form(name, low, high), (0.0,))
+def term(effect: str, name: str = "form", low: float = -100.0, high: float = 100.0, size: int = 1) -> Term:
+    return Term(f"{effect}/{name}", "effect", effect, form(name, low, high, size), (0.0,) * size, size)
 
 
-def search_of(terms: list[Term], y: list[np.ndarray], x: list[list[np.ndarray]], noise: float = 1.0) -> Search:
+def search_of(
+    terms: list[Term], y: list[np.ndarray], x: list[list[np.ndarray]], noise: float = 1.0, confusers=None
+) -> Search:
     """A search over runs `a`, `b`, … of which the last is held out; sizes are rms over the noise."""
     rows = [rows_of(target, *columns, run="abcdef"[k]) for k, (target, columns) in enumerate(zip(y, x, strict=True))]
     left = [r.y[:, 0] - r.x[:, 0] @ np.linalg.lstsq(r.x[:, 0], r.y[:, 0], rcond=None)[0] for r in rows]
@@ -35,7 +38,8 @@ def search_of(terms: list[Term], y: list[np.ndarray], x: list[list[np.ndarray]],
         strength = np.sqrt(np.mean(np.concatenate([r.x[:, 0][:, own] @ beta for r in rows]) ** 2))
         return np.array([strength / noise, *[0.0] * 11])
 
-    return Search(regression, lambda key, beta: joint(regression.columns([key]), beta), joint_sizes=joint)
+    sizes = lambda key, beta: joint(regression.columns([key]), beta)  # noqa: E731
+    return Search(regression, sizes, joint_sizes=joint, confusers=confusers)
 
 
 def case(rng, columns: int, runs: int = 3, size: int = 1200):
@@ -106,6 +110,22 @@ def test_what_differs_from_run_to_run_is_no_constant_of_the_vehicle():
     selection = search_of([term("odd")], y, x).run()
     assert selection.active == []
     assert "odd" in selection.not_established
+
+
+@pytest.mark.parametrize("differs", [0.0, 1.0])
+def test_another_cause_and_a_simpler_form_of_the_same_id_may_be_what_three_parameters_are(differs):
+    """Trims about three axes, of which an offset explains two; only where rotors do more than that are they named."""
+    rng = np.random.default_rng(8)
+    noise, parts = case(rng, 4)
+    rotors = [[p[0] + differs * p[3], p[1], p[2]] for p in parts]
+    x = [[*own, p[0], p[1], p[2]] for own, p in zip(rotors, parts, strict=True)]
+    y = [n + c[0] + c[1] + c[2] for n, c in zip(noise, x, strict=True)]
+    terms = [term("rotors", "three", size=3), term("offset", size=2), term("rotors", "one")]
+    alternatives = {}
+    for confusers in ({"rotors": ("offset",)}, {}):
+        search = search_of(terms, y, x, confusers=confusers)
+        alternatives[bool(confusers)] = search.alternatives("rotors/three", ["rotors/three"])
+    assert alternatives == {True: [] if differs else ["offset"], False: []}
 
 
 def test_copies_of_a_column_are_alternatives_and_others_are_not():
