@@ -591,6 +591,8 @@ class Search:
             return False
         own = self.terms[key]
         room = own.size - self.terms[other].size
+        if room < 1:
+            return False
         for simpler in self.terms.values():
             if simpler.effect != own.effect or simpler.key == key or simpler.run or self.directions(simpler) > room:
                 continue
