@@ -582,10 +582,11 @@ class Search:
         return int((sizes > SAME_DIRECTION * sizes[-1]).sum())
 
     def _shares(self, other: str, key: str, rest: list[str]) -> bool:
-        """Whether a term is no longer needed beside another and a simpler form of its own id.
+        """Whether a term is no longer needed beside another and a simpler form of its own id that acts elsewhere.
 
-        Three differences between four rotors may be an offset of the centre of mass and torques that differ. Two causes
-        can imitate almost anything, so this is asked of those alone that physics confuses with it.
+        Three differences between four rotors may be an offset of the centre of mass, in roll and pitch, and torques
+        that differ, in yaw. Where both act alike the id is there in any case (drag of rotors, and of the airframe beside
+        it). Two causes can imitate almost anything, so this is asked of those alone that physics confuses with it.
         """
         if self.terms[other].effect not in self.confusers.get(self.terms[key].effect, ()):
             return False
@@ -603,6 +604,8 @@ class Search:
             beside = self.regression.fit(self.always + pair)
             if self.contradicted is not None and self.contradicted(other, beside):
                 continue
-            if self.judge(key, pair, beside).p_value > ALTERNATIVE_P:
+            both = (beside.beta[beside.places(self.regression.columns([k]))] for k in (simpler.key, other))
+            seen = [self.sizes_of(k, beta) > SMALLEST_SIZE for k, beta in zip((simpler.key, other), both, strict=True)]
+            if not (seen[0] & seen[1]).any() and self.judge(key, pair, beside).p_value > ALTERNATIVE_P:
                 return True
         return False
