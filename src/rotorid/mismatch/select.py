@@ -585,7 +585,7 @@ class Search:
         """Whether a term is no longer needed beside another and a simpler form of its own id that acts elsewhere.
 
         Three differences between four rotors may be an offset of the centre of mass, in roll and pitch, and torques
-        that differ, in yaw. Where both act alike the id is there in any case (drag of rotors, and of the airframe beside
+        that differ, in yaw. Where both act alike the id is there in any case (rotor drag, and the airframe's beside
         it). Two causes can imitate almost anything, so this is asked of those alone that physics confuses with it.
         """
         if self.terms[other].effect not in self.confusers.get(self.terms[key].effect, ()):
