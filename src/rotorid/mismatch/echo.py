@@ -8,10 +8,13 @@ a closed loop (Ljung, System Identification, 2nd ed., ch. 13.4). A hover that do
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import csd, welch
 
 from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.rows import baseline_wrench
 from rotorid.recordings import Vehicle
 
 WINDOW_S = 2.0
@@ -23,16 +26,15 @@ def echo_s(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, cuto
 
     `noisy` are the same segments with the sensors' noise added once more. Zero without commands or body rates.
     """
-    x_m, y_m, _ = vehicle.rotor_positions_m().T
     inertia = np.diag(vehicle.inertia_kg_m2.matrix())
     late = [0.0]
-    for axis, arms_m in enumerate((-y_m, x_m)):
+    for axis in (0, 1):
         echoed = commanded = 0.0
         for plain, again in zip(segments, noisy, strict=True):
             rate = plain.motion.angular_velocity
             if plain.command is None or rate is None or again.motion.angular_velocity is None:
                 continue
-            moment = plain.command**2 * vehicle.thrust_coefficients_n_s2() @ arms_m
+            moment = baseline_wrench(replace(plain.motion, rotor_speed=plain.command), vehicle)[1][:, axis]
             noise = again.motion.angular_velocity[:, axis] - rate[:, axis]
             how = {"fs": plain.rate_hz, "nperseg": min(len(moment), int(WINDOW_S * plain.rate_hz))}
             f_hz, s_rate = welch(rate[:, axis], **how)

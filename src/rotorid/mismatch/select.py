@@ -136,8 +136,10 @@ class Search:
 
     def physical(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
         """Whether coefficients are within their bounds, and large enough for what the form says."""
-        if not term.form.linear or not self.within_bounds(term, beta, error):
-            return self.within_bounds(term, beta, error)
+        if not self.within_bounds(term, beta, error):
+            return False
+        if not term.form.linear:
+            return True
         for index, value, sd in zip(term.form.linear, beta, error, strict=True):
             if index in term.form.must_show and abs(value) < 2.0 * sd:
                 return False
