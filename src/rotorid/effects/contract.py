@@ -54,6 +54,8 @@ class Motion:
     """Height of the centre of mass above ground, (n,), m."""
     voltage: np.ndarray | None = None
     """Battery voltage, (n,), V."""
+    carried: np.ndarray | None = None
+    """Share of a payload that is on board, (n,), 0 or 1; None where it is carried all the time."""
     tilt_gravity: np.ndarray | None = None
     """Gravity on a stand, (n, 3), m/s2, sensor axes (kind `stand` only)."""
 
@@ -150,6 +152,8 @@ class Form:
     minimum_rotors: int = 1
     must_show: tuple[int, ...] = ()
     """Parameters without which the form is another effect: each must differ from zero by two standard errors."""
+    compound: bool = False
+    """Whether it is a force and a moment that could be of two effects: it enters where nothing plainer is left to."""
     memory: bool = False
     """Whether it needs the past (a pendulum of its own): one instant does not give its wrench."""
     excited_by: tuple[str, ...] = ()

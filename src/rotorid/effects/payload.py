@@ -27,6 +27,7 @@ def _pull(motion, vehicle, values, hanging):
     direction, rate_square = swing(hanging, motion.time_s, length_m, damping_ratio, vehicle.gravity_m_s2)
     tension = np.maximum(np.einsum("ni,ni->n", hanging, direction) + length_m * rate_square, 0.0)
     pull = np.einsum("nji,nj->ni", motion.rotation, tension[:, None] * direction)
+    pull = aboard(motion) * pull
     return Contribution(force=mass_kg * pull, moment=hook_kg_m * np.cross([0.0, 0.0, 1.0], pull))
 
 
@@ -58,11 +59,17 @@ def slung_starts(parts, vehicle):
     return tuple((length, DAMPING_RATIO) for length in found)
 
 
+def aboard(motion):
+    """Share of the payload that is on board, (n, 1), or 1 throughout."""
+    return 1.0 if motion.carried is None else motion.carried[:, None]
+
+
 def rigid(motion, vehicle, values):
     """F = -m_p a, M = -(m_p r) × a: added mass m_p at (x, y) carried along; a the specific force."""
     mass_kg, moment_x, moment_y = values
     lever = np.array([moment_x, moment_y, 0.0])
-    return Contribution(force=-mass_kg * motion.specific_force, moment=-np.cross(lever, motion.specific_force))
+    moved = aboard(motion) * motion.specific_force
+    return Contribution(force=-mass_kg * moved, moment=-np.cross(lever, moved))
 
 
 def rigid_with_inertia(motion, vehicle, values):
@@ -71,7 +78,7 @@ def rigid_with_inertia(motion, vehicle, values):
     extra[0, 1], extra[0, 2], extra[1, 2] = values[3:]
     extra += extra.T
     rate = motion.angular_velocity
-    turning = motion.angular_acceleration @ extra + np.cross(rate, rate @ extra)
+    turning = aboard(motion) * (motion.angular_acceleration @ extra + np.cross(rate, rate @ extra))
     carried = rigid(motion, vehicle, values[:3])
     return Contribution(force=carried.force, moment=carried.moment - turning)
 

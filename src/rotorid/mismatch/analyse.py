@@ -12,21 +12,22 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch import within_trust
-from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings, wrong_values
+from rotorid.mismatch.carried import Windows, windows_of
+from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
+from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
-from rotorid.mismatch.fitted import Chain, Fitted, fitted, size_of_value
+from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
-from rotorid.mismatch.harmless import Values, believed_residuals, held_out_masks, residuals_of
+from rotorid.mismatch.held_out import held_out_masks
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import Prepared, prepare
+from rotorid.mismatch.refitted import refitted
 from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
-from rotorid.mismatch.select import Selection
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import (
@@ -41,7 +42,7 @@ from rotorid.mismatch.values import (
 )
 from rotorid.mismatch.within_trust import beyond_trust, settled
 from rotorid.mismatch.wrench import WrenchModel, chosen, nonlinear_intervals
-from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.recordings import RecordingSet
 
 ABSORBED_P = 1e-6
 CLAIMED = ("established", "ambiguous")
@@ -68,7 +69,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
     for _, full, _, _ in scale.values():
         improved = improved.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
-    refitted, plain_fit = same_physics(prepared, model)
+    plain_fit, plain_values = refitted(prepared, model)
 
     findings = [*mistakes, *findings_of(found, prepared)]
     findings = rectified(payload_or_offset(findings, {**moved, **values}))
@@ -89,7 +90,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         recordings=recordings,
         split=prepared.split,
         believed=prepared.vehicle,
-        refitted=refitted,
+        refitted=changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()}),
         improved=improved,
         findings=tuple(findings),
         values={**contract_values(prepared.vehicle, told), **scale},
@@ -112,16 +113,6 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     )
 
 
-def same_physics(prepared: Prepared, model: WrenchModel) -> tuple[Vehicle, Fit]:
-    """The believed vehicle with values fitted anew and nothing else, and the fit it is from."""
-    values = {}
-    if model.wind is None:
-        nothing = Selection([], model.selection.fit)
-        values = wrong_values(model.search.regression, model.search, nothing, None, size_of_value(model))
-    fit, moved = settled(prepared, model, values, ())
-    return changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **values}.items()}), fit
-
-
 def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
     """A finding for everything that was fitted: winds, the chain from command to speed, forces and moments."""
     model = found.model
@@ -140,7 +131,16 @@ def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
         nonlinear_intervals(prepared, model, model.segments),
         found.values,
     )
+    aboard = windows_of(model.segments)
+    if aboard:
+        findings = [carried_for_a_time(f, aboard) if f.id == "payload" else f for f in findings]
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
+
+
+def carried_for_a_time(finding: Finding, windows: Windows) -> Finding:
+    """A payload with when it is on board."""
+    when = ", ".join(f"in {run} from {start:.1f} to {stop:.1f} s" for run, start, stop in windows)
+    return replace(finding, windows=windows, sentence=f"{finding.sentence}: {when}")
 
 
 def not_testable(prepared: Prepared, chain: Chain | None, findings: list[Finding]) -> dict[str, str]:

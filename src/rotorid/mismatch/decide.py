@@ -267,10 +267,10 @@ def wrong_values(
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
             fails = fails_held_out(regression, always, named, key, loose)
-            if not fails and search.harms is not None:
+            if not fails and search.ask.harms is not None:
                 # A thrust that mends the moment and spoils the force is none: something else is missing there.
                 without = regression.fit(always + [k for k in named if k != key], loose=loose)
-                fails = search.harms(key, fit, without)
+                fails = search.ask.harms(key, fit, without)
             if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:

@@ -8,17 +8,20 @@ back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.effects.contract import Form
+from rotorid.mismatch.carried import Windows, carried_windows, changes, laden
 from rotorid.mismatch.decide import wrong_values
+from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.gusts import with_gusts
 from rotorid.mismatch.harmless import REASON as HARM
-from rotorid.mismatch.harmless import Values, without_harm, without_unsure, without_useless
+from rotorid.mismatch.harmless import ValuesOf, without_harm, without_unsure, without_useless
 from rotorid.mismatch.prepare import Prepared
+from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.speedpath import SpeedResult, nothing_between, taken_back
@@ -67,14 +70,26 @@ def fitted(prepared: Prepared) -> Fitted:
     measured = all(s.measured_speed for s in prepared.segments)
     chain = speed_path(prepared)
     if chain is None or measured:
-        model, values, values_of, _ = without_harm(
-            prepared, refined_model(prepared, *turning(prepared)), values_called_wrong, False
-        )
+        model = refined_model(prepared, *turning(prepared))
+        model, values, values_of, _ = without_harm(prepared, model, values_called_wrong, False)
     else:
         chain, model = with_chain(prepared, chain)
         chain, model, values, values_of = harmless_chain(prepared, chain, model)
-    model, values = without_unsure(*without_useless(prepared, model, values, values_of), values_of)
+    model, values = borne_out(prepared, model, values, values_of, commanded=chain is not None and not measured)
     return Fitted(model, values, chain, measured)
+
+
+def borne_out(prepared: Prepared, model: WrenchModel, values: Values, values_of: ValuesOf, commanded: bool):
+    """The model, and its wrong values, less what the runs held out do not bear out.
+
+    What is right only beside an effect of no use (a thrust curve beside a mass that it called for) does harm without.
+    """
+    while True:
+        model, values = without_useless(prepared, model, values, values_of)
+        useful = model.selection.active
+        model, values, values_of, _ = without_harm(prepared, model, values_of, commanded)
+        if model.selection.active == useful:
+            return without_unsure(model, values, values_of)
 
 
 def turning(prepared: Prepared, chain: Chain | None = None):
@@ -120,11 +135,10 @@ def harmless_chain(prepared: Prepared, chain: Chain, model: WrenchModel):
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
-    model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
-    terms = list(prepared.terms)
-    if thrust_differs(model):
-        terms = with_run_scales(terms, prepared)
-        model = wrench_model(prepared, terms, segments=segments, noisy_segments=noisy)
+    model = with_own_scales(prepared, segments, noisy)
+    if windows := carried_windows(model):
+        segments, noisy, model = with_payload(prepared, model, windows)
+    terms = list(model.terms)
     for _ in range(2 if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
@@ -137,6 +151,28 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     if model.wind is not None:
         terms = list(model.terms)
     return with_gusts(prepared, model, terms)
+
+
+def with_own_scales(prepared: Prepared, segments, noisy) -> WrenchModel:
+    """The search over all terms, where thrust differs between runs with a scale for each."""
+    model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
+    if not thrust_differs(model):
+        return model
+    return wrench_model(prepared, with_run_scales(prepared.terms, prepared), segments=segments, noisy_segments=noisy)
+
+
+def with_payload(prepared: Prepared, model: WrenchModel, windows: Windows):
+    """Segments, their noisy copies and the model with a payload on board in some windows, where that explains more.
+
+    Each taking up and dropping costs as much as an effect; without a payload in the model everything is as it was.
+    """
+    both = tuple(laden(segments, windows) for segments in (model.segments, model.noisy_segments))
+    with_it = with_own_scales(prepared, *both)
+    carries = any(k.startswith("payload/rigid") for k in with_it.selection.active)
+    filters, price = model.regression.filters, COST_PER_EFFECT * changes(windows, model.segments)
+    if carries and cost_of(with_it, filters) + price < cost_of(model, filters):
+        return *both, with_it
+    return model.segments, model.noisy_segments, model
 
 
 def changes_its_columns(form: Form) -> bool:
@@ -166,15 +202,6 @@ def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
     reverse, search = reverse_regression(model.prepared, model, model.segments), model.search
     size = size_of_value(model)
     return wrong_values(search.regression, search, model.selection, reverse, size, refused=refused)
-
-
-def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:
-    """Function of a value and its relative change that gives the change's size in units of the noise."""
-
-    def size(key: str, change: float) -> float:
-        return float(model.search.sizes_of(key, np.array([change])).max())
-
-    return size
 
 
 def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:

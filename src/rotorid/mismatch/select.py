@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -89,39 +89,35 @@ class Selection:
     not_established: dict[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Questions:
+    """What a search asks of the recordings that its regression does not hold."""
+
+    sizes_of: Callable[[str, np.ndarray], np.ndarray]
+    """Size of a term (key, coefficients) per channel in units of its noise, (12,), less what values would absorb."""
+    joint_sizes: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
+    known_sizes: np.ndarray = field(default_factory=lambda: np.zeros(12))
+    """The same of effects that are in the model already (between command and rotor speed), (12,)."""
+    harms: Callable[[str, Fit, Fit], bool] | None = None
+    """Whether a term makes one of its channels worse on the held-out rows (key, fit with it, fit without)."""
+    contradicted: Callable[[str, Fit], bool] | None = None
+    """Whether a second sensor shows that an error of the first is none."""
+    confusers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """To an id, those that physics confuses with it."""
+
+
 class Search:
     """Forward search with replacement of forms, backward checks and pair moves."""
 
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
 
-    def __init__(
-        self,
-        regression: Regression,
-        sizes_of,
-        known_sizes: np.ndarray | None = None,
-        harms=None,
-        joint_sizes=None,
-        contradicted=None,
-        confusers: Mapping[str, tuple[str, ...]] | None = None,
-    ):
-        """`sizes_of(key, beta)` gives the size of a term per channel in units of its noise, (12,).
-
-        `known_sizes`, same shape, are of effects that are in the model already (between command and rotor speed).
-        `harms(key, with_it, without)` says whether a term makes one of its channels worse on the held-out rows.
-        `joint_sizes(columns, beta)` gives the size of a contribution as it is, of one term or several together, (12,).
-        `contradicted(key, fit)` says whether a second sensor shows that an error of the first is none.
-        `confusers` are, to an id, those that physics confuses with it.
-        """
+    def __init__(self, regression: Regression, ask: Questions):
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
-        self.sizes_of = sizes_of
-        self.harms = harms
-        self.joint_sizes = joint_sizes
-        self.contradicted = contradicted
-        self.confusers = confusers or {}
-        self.known_sizes = np.zeros(12) if known_sizes is None else known_sizes
+        self.ask = ask
         self.blocks = int(regression.training.sum())
 
     def within_bounds(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
@@ -179,15 +175,15 @@ class Search:
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
-        own = self.sizes_of(key, beta)
-        largest = self.known_sizes.copy()
+        own = self.ask.sizes_of(key, beta)
+        largest = self.ask.known_sizes.copy()
         others = [k for k in active if k != key]
         if others:
             fit = self.regression.fit(self.always + others)
             for k in others:
                 cols = self.regression.columns([k])
                 where = fit.places(cols)
-                largest = np.maximum(largest, self.sizes_of(k, fit.beta[where]))
+                largest = np.maximum(largest, self.ask.sizes_of(k, fit.beta[where]))
         if self.terms[key].run:
             # A burst is easily imitated by what the form of a strong effect leaves over.
             return float(np.where(own >= SHARE_OF_LARGEST_BURST * largest, own, 0.0).max()) / BURST_SIZE
@@ -375,8 +371,7 @@ class Search:
         """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
         if len(active) >= MOST_EFFECTS:
             return None
-        # A cause without a name is looked at only where none with a name is left to enter.
-        for candidate in sorted(self.candidates(active), key=lambda c: not c.named):
+        for candidate in sorted(self.candidates(active), key=self._turn):
             effect = self.terms[candidate.key].once
             if candidate.score <= 0:
                 continue
@@ -388,11 +383,16 @@ class Search:
             dropped.setdefault(effect, f"its size is {size:.2g} of the noise")
         return None
 
+    def _turn(self, candidate: Candidate) -> int:
+        """When a candidate is looked at: one that could be two effects, or has no name, where nothing else enters."""
+        form = self.terms[candidate.key].form
+        return 2 if not candidate.named else int(form is not None and form.compound)
+
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
         """A term that another sensor, the held-out runs or the runs among themselves speak against, with the reason."""
-        if self.contradicted is not None:
+        if self.ask.contradicted is not None:
             fit = self.regression.fit(self.always + active)
-            if (none := next((k for k in active if self.contradicted(k, fit)), None)) is not None:
+            if (none := next((k for k in active if self.ask.contradicted(k, fit)), None)) is not None:
                 return none, "the comparison of two sensors shows nothing of it"
         if (failed := self.failed_held_out(active)) is not None:
             return failed, "it did not help on the held-out runs"
@@ -410,14 +410,14 @@ class Search:
         Something the catalogue lacks is in a channel where noise is low: a tilt of ten degrees is bought there, and
         an accelerometer that is turned by ten degrees hides it in the force.
         """
-        if self.joint_sizes is None or len(active) < 2:
+        if self.ask.joint_sizes is None or len(active) < 2:
             return None
         fit = self.regression.fit(self.always + active)
         named = [k for k in active if self.terms[k].effect not in UNKNOWNS and not self.terms[k].run]
 
         def sizes(keys: list[str]) -> np.ndarray:
             cols = self.regression.columns(keys)
-            return self.joint_sizes(cols, fit.beta[fit.places(cols)])
+            return self.ask.joint_sizes(cols, fit.beta[fit.places(cols)])
 
         alone, found = {k: sizes([k]) for k in named}, set()
         for pair in combinations(named, 2):
@@ -460,7 +460,7 @@ class Search:
             gain = self.regression.held_out_gain(with_it, without)
             if expected <= EXPECTED_HELD_OUT:
                 continue
-            if gain >= 0 and self.harms is not None and self.harms(key, with_it, without):
+            if gain >= 0 and self.ask.harms is not None and self.ask.harms(key, with_it, without):
                 gain = -1e-9
             if gain < worst:
                 worst, found = gain, key
@@ -484,10 +484,10 @@ class Search:
                 continue
             own = self.regression.columns([key])
             gain = self.regression.gain_at(fit, own, left_out)
-            if gain >= 0 and self.harms is not None:
+            if gain >= 0 and self.ask.harms is not None:
                 alone = replace(fit, beta=np.where(np.isin(fit.columns, left_out), 0.0, fit.beta))
                 without = replace(alone, beta=np.where(np.isin(fit.columns, own), 0.0, alone.beta))
-                gain = -1e-9 if self.harms(key, alone, without) else gain
+                gain = -1e-9 if self.ask.harms(key, alone, without) else gain
             if gain < worst:
                 worst, found = gain, key
         return found
@@ -515,6 +515,8 @@ class Search:
         base = self.regression.explained(self.always + active)
         best: dict[str, tuple[float, Term]] = {}
         for gain, term in self.gains(active):
+            if term.form is not None and term.form.compound:
+                continue
             if term.once not in dropped and (term.once not in best or gain > best[term.once][0]):
                 best[term.once] = (gain, term)
         pool = sorted(best.values(), key=lambda c: -c[0])[:most]
@@ -567,7 +569,7 @@ class Search:
         if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
             return False
         beside = self.regression.fit(self.always + rest + [other])
-        if self.contradicted is not None and self.contradicted(other, beside):
+        if self.ask.contradicted is not None and self.ask.contradicted(other, beside):
             return False
         both = self.judge(own.key, [*rest, other], beside)
         alike = len(instead.beta) < len(own.beta) and both.gain < SHARE_OF_LARGEST**2 * own.gain
@@ -590,7 +592,7 @@ class Search:
         that differ, in yaw. Where both act alike the id is there in any case (rotor drag, and the airframe's beside
         it). Two causes can imitate almost anything, so this is asked of those alone that physics confuses with it.
         """
-        if self.terms[other].effect not in self.confusers.get(self.terms[key].effect, ()):
+        if self.terms[other].effect not in self.ask.confusers.get(self.terms[key].effect, ()):
             return False
         own = self.terms[key]
         room = own.size - self.terms[other].size
@@ -604,10 +606,12 @@ class Search:
             if not instead.physical or instead.p_value > INSTEAD_P:
                 continue
             beside = self.regression.fit(self.always + pair)
-            if self.contradicted is not None and self.contradicted(other, beside):
+            if self.ask.contradicted is not None and self.ask.contradicted(other, beside):
                 continue
             both = (beside.beta[beside.places(self.regression.columns([k]))] for k in (simpler.key, other))
-            seen = [self.sizes_of(k, beta) > SMALLEST_SIZE for k, beta in zip((simpler.key, other), both, strict=True)]
+            seen = [
+                self.ask.sizes_of(k, beta) > SMALLEST_SIZE for k, beta in zip((simpler.key, other), both, strict=True)
+            ]
             if not (seen[0] & seen[1]).any() and self.judge(key, pair, beside).p_value > ALTERNATIVE_P:
                 return True
         return False

@@ -9,8 +9,8 @@ import numpy as np
 
 from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z
+from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.findings import Estimate, Finding
-from rotorid.mismatch.harmless import Values
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.wrench import WrenchModel
 from rotorid.recordings import RecordingSet, Vehicle, columns

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rotorid.mismatch.decide import coefficients, relative_change
-from rotorid.mismatch.harmless import Values, delivered_fit, growth, held_out_masks, residuals_of, with_sure_nuisances
+from rotorid.mismatch.delivered import Values, delivered_fit, residuals_of, with_sure_nuisances
+from rotorid.mismatch.held_out import growth, held_out_masks
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import PARAMETER_NAMES

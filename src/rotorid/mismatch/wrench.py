@@ -24,7 +24,7 @@ from rotorid.mismatch.regression import (
     full_fit_residuals,
 )
 from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, winds_last
-from rotorid.mismatch.select import FINAL_P, Search, Selection
+from rotorid.mismatch.select import FINAL_P, Questions, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
     SpeedResult,
@@ -217,12 +217,14 @@ def searched(
         return key in errors and refute(fitted_rows, fit, regression.columns([key]), noise)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
-    rest = (sizes_of, known_sizes, harms, seconds.sizes, contradicted, {i: e.confusers for i, e in catalogue().items()})
-    search = Search(regression.without_winds(), *rest)
+    confusers = {i: e.confusers for i, e in catalogue().items()}
+    known = np.zeros(12) if known_sizes is None else known_sizes
+    ask = Questions(sizes_of, seconds.sizes, known, harms, contradicted, confusers)
+    search = Search(regression.without_winds(), ask)
     selection = search.run(start)
     if (wide := search.values_alone(selection)) is not None:
         regression = regression.with_room(VALUE_LIMITS[1])
-        search = Search(wide, *rest)
+        search = Search(wide, ask)
         selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 

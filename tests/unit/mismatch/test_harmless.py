@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rotorid.mismatch import harmless
+from rotorid.mismatch import fitted, harmless
+from rotorid.mismatch.delivered import nuisances_in
 from rotorid.mismatch.fitted import refined_model, turning, values_called_wrong
-from rotorid.mismatch.harmless import (
-    HELP_Z,
-    about_means,
-    excited,
-    fitted_anew,
-    growth,
-    harmed,
-    helps,
-    nuisances_in,
-    within_bounds,
-    without_harm,
-    without_useless,
-)
+from rotorid.mismatch.harmless import HELP_Z, costs_more, fitted_anew, within_bounds, without_harm, without_useless
+from rotorid.mismatch.held_out import about_means, excited, growth, harmed, helps, smaller
 from rotorid.mismatch.prepare import prepare
 
 from .flights import recorded
@@ -69,6 +60,15 @@ def test_too_short_a_held_out_part_says_nothing():
     assert np.all(ratio == 1.0) and not harmed(ratio, z).any()
 
 
+def test_of_two_residuals_each_channel_has_the_one_that_is_smaller_where_it_is_held_out():
+    one, other = parts(2.0), parts(1.0, seed=1)
+    other[:, 2] *= 3.0
+    held = np.arange(len(one)) >= 10 * PER
+    other[~held, 1] *= 9.0  # large where it was fitted, which must not count
+    least = smaller([one], [other], [held])[0]
+    assert np.array_equal(least[:, 1], other[:, 1]) and np.array_equal(least[:, 2], one[:, 2])
+
+
 def surely(effect: float, fitted: float, channels: list[int]) -> float:
     """How surely the second channel grows where an effect of `effect` is in it and `fitted` of it is modelled."""
     rng = np.random.default_rng(3)
@@ -110,14 +110,26 @@ def test_what_hardly_acts_on_the_held_out_part_cannot_be_judged_there():
 @pytest.mark.parametrize("held_late_s, kept", [(0.008, True), (0.0, False)])
 def test_an_offset_in_time_that_the_runs_held_out_contradict_is_taken_back(held_late_s, kept):
     """Rotor speeds stamped 8 ms late in both runs fitted, and in the third run or not."""
-    fitted = recorded(1, 2, late_s={"rotors": 0.008}).runs
+    late = recorded(1, 2, late_s={"rotors": 0.008}).runs
     third = replace(recorded(3, late_s={"rotors": held_late_s}).runs[0], name="run02")
-    recordings = replace(recorded(1), runs=(*fitted, third), held_out=("run02",))
+    recordings = replace(recorded(1), runs=(*late, third), held_out=("run02",))
     prepared = prepare(recordings)
     model = refined_model(prepared, *turning(prepared))
     model, values, _, harm = without_harm(prepared, model, values_called_wrong, False)
     assert (OFFSET in nuisances_in(model, values)) is kept
     assert not harm and not model.selection.active and not values
+
+
+@pytest.mark.parametrize(
+    "own, other, costs",
+    [(1.5, 1.0, False), (1.3, 0.25, True), (1.3, 0.85, False), (0.8, 1.0, True), (6.0, 0.25, False)],
+)
+def test_an_effect_that_costs_another_channel_more_than_it_brings_its_own_is_of_no_use(own, other, costs):
+    """Errors of its own channel (5) and another (0) where it is left out, beside those with it."""
+    with_it = parts(1.0)
+    left = with_it * np.array([other, 1.0, 1.0, 1.0, 1.0, own, *[1.0] * 6])
+    held = [np.ones(len(left), bool)]
+    assert costs_more(growth([with_it], [left], held, PER), growth([left], [with_it], held, PER), [5]) is costs
 
 
 def test_an_effect_is_of_use_where_another_is_beyond_its_bounds_without_it(monkeypatch):
@@ -140,3 +152,25 @@ def test_an_effect_is_of_use_where_another_is_beyond_its_bounds_without_it(monke
     monkeypatch.setattr(harmless, "within_bounds", only_with_the_spare)
     kept, _ = without_useless(prepared, model, {}, lambda *_: {})
     assert kept.selection.active == [drag, spare]
+
+
+def test_what_was_right_only_beside_a_useless_effect_is_looked_at_again(monkeypatch):
+    """A spare effect bears a leaning one: harm is asked for once more without the spare, use without the leaning."""
+
+    def model_with(active):
+        return SimpleNamespace(selection=SimpleNamespace(active=active))
+
+    def useless(prepared, model, values, values_of):
+        active = [k for k in model.selection.active if k != "spare"]
+        return model_with(active if "leaning" in active else [k for k in active if k != "with it"]), values
+
+    def harm(prepared, model, values_of, commanded):
+        active = model.selection.active
+        kept = active if "spare" in active else [k for k in active if k != "leaning"]
+        return model_with(kept), {}, values_of, False
+
+    monkeypatch.setattr(fitted, "without_useless", useless)
+    monkeypatch.setattr(fitted, "without_harm", harm)
+    monkeypatch.setattr(fitted, "without_unsure", lambda model, values, values_of: (model, values))
+    model, _ = fitted.borne_out(None, model_with(["drag", "spare", "leaning", "with it"]), {}, None, True)
+    assert model.selection.active == ["drag"]

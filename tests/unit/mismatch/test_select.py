@@ -10,7 +10,7 @@ import pytest
 from rotorid.effects.contract import Form, Parameter
 from rotorid.mismatch.regression import autoregression, build
 from rotorid.mismatch.rows import Term
-from rotorid.mismatch.select import Search
+from rotorid.mismatch.select import Questions, Search
 
 from .synthetic import coloured
 from .test_regression import RATE_HZ, rows_of
@@ -39,7 +39,7 @@ def search_of(
         return np.array([strength / noise, *[0.0] * 11])
 
     sizes = lambda key, beta: joint(regression.columns([key]), beta)  # noqa: E731
-    return Search(regression, sizes, joint_sizes=joint, confusers=confusers)
+    return Search(regression, Questions(sizes, joint, confusers=confusers or {}))
 
 
 def case(rng, columns: int, runs: int = 3, size: int = 1200):
@@ -125,8 +125,9 @@ def test_another_cause_and_a_simpler_form_of_the_same_id_may_be_what_three_param
     alternatives = {}
     for confusers in ({"rotors": ("offset",)}, {}):
         search = search_of(terms, y, x, confusers=confusers)
-        shown = search.sizes_of
-        search.sizes_of = lambda k, b: np.roll(shown(k, b), elsewhere and k == "rotors/one")  # noqa: B023
+        shown = search.ask.sizes_of
+        moved = lambda k, b: np.roll(shown(k, b), elsewhere and k == "rotors/one")  # noqa: B023, E731
+        search.ask = replace(search.ask, sizes_of=moved)
         alternatives[bool(confusers)] = search.alternatives("rotors/three", ["rotors/three"])
     assert alternatives == {True: ["offset"] if doubted else [], False: []}
 
@@ -176,8 +177,9 @@ def test_what_displaces_another_must_hold_by_itself():
     y = [n + 0.8 * columns[1] for n, columns in zip(noise, x, strict=True)]
     search = search_of([term("there"), term("copy")], y, x)
     assert search.swapped(["there/form"], {}) == ["copy/form"]
-    sizes = search.sizes_of
-    search.sizes_of = lambda key, beta: sizes(key, beta) * (0.01 if key == "copy/form" else 1.0)
+    sizes = search.ask.sizes_of
+    small = lambda key, beta: sizes(key, beta) * (0.01 if key == "copy/form" else 1.0)  # noqa: E731
+    search.ask = replace(search.ask, sizes_of=small)
     assert search.swapped(["there/form"], {}) is None
 
 
@@ -187,7 +189,7 @@ def test_what_spoils_a_channel_of_the_held_out_runs_is_refuted():
     y = [n + 0.8 * columns[0] for n, columns in zip(noise, x, strict=True)]
     search = search_of([term("e")], y, x)
     assert search.failed_held_out(["e/form"]) is None
-    search.harms = lambda key, with_it, without: True
+    search.ask = replace(search.ask, harms=lambda key, with_it, without: True)
     assert search.failed_held_out(["e/form"]) == "e/form"
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.scale import rotor_inertia
-from rotorid.mismatch.harmless import surely_there
+from rotorid.mismatch.delivered import surely_there
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.chain import find_chain
 from rotorid.mismatch.instrument.columns import OFFSET

@@ -18,7 +18,7 @@ from rotorid.mismatch.decide import (
 )
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.select import Questions, Search, Selection
 
 from .synthetic import coloured
 from .test_regression import RATE_HZ
@@ -59,7 +59,7 @@ def judged(
         column = x[:, :, list(TRUST).index(key)]
         return float(np.sqrt((column**2).mean(axis=0)).max() * abs(change) / NOISE)
 
-    search = Search(made, lambda key, b: np.full(12, size_of(key, b[0])), harms=harms)
+    search = Search(made, Questions(lambda key, b: np.full(12, size_of(key, b[0])), harms=harms))
     return wrong_values(made, search, Selection([], made.fit(list(TRUST))), back, size_of, refused=refused)
 
 
@@ -160,7 +160,7 @@ def test_a_value_that_only_the_fitted_runs_need_is_not_called_wrong():
         rows.append(Rows(name, np.arange(4000) / RATE_HZ, y, x))
     terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
     made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: run == "a", 1.0, RATE_HZ)
-    search = Search(made, lambda key, b: np.ones(12))
+    search = Search(made, Questions(lambda key, b: np.ones(12)))
     assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
 
 
@@ -187,7 +187,7 @@ def test_a_value_in_doubt_makes_room_for_the_one_that_is_plainly_wrong():
         )
         for part in (x, seen)
     )
-    search = Search(made, lambda key, b: np.ones(12))
+    search = Search(made, Questions(lambda key, b: np.ones(12)))
     nothing = Selection([], made.fit(list(TRUST)))
     assert list(wrong_values(made, search, nothing, None, lambda key, change: 1.0)) == ["inertia_zz"]
     found = wrong_values(made, search, nothing, back, lambda key, change: 1.0)

@@ -10,7 +10,7 @@ from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import wrench_findings
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import Search, Selection
+from rotorid.mismatch.select import Questions, Search, Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 from .flights import quad
@@ -39,7 +39,7 @@ def told(key: str):
     values = tuple(1.0 if p.nonlinear else 0.0 for p in form.parameters)
     terms = [Term(key, "effect", effect_id, form, values, columns)]
     regression = build(rows, terms, {0: np.array([1.0])}, lambda run, t: run == "a", 1.0, RATE_HZ)
-    search = Search(regression, lambda *_: np.ones(12), joint_sizes=lambda *_: np.ones(12))
+    search = Search(regression, Questions(lambda *_: np.ones(12), lambda *_: np.ones(12)))
     fit = regression.fit([key], jackknife=True)
     selection = Selection([key], fit, {key: 1e-9})
     held = [np.zeros(size, bool), np.ones(size, bool)]

@@ -180,7 +180,7 @@ def speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> f
 
 def sizes_of_values(model: ReadingModel) -> Callable[[str, float], float]:
     """Size of a relative change of a believed value in units of the noise."""
-    return lambda key, change: float(model.search.sizes_of(key, np.array([change])).max())
+    return lambda key, change: float(model.search.ask.sizes_of(key, np.array([change])).max())
 
 
 def with_full_speed(vehicle: Vehicle, setup: Setup, chain: ChainResult | None) -> Vehicle:

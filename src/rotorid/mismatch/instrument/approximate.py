@@ -145,7 +145,7 @@ def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regr
 def sizes(model: ReadingModel, active: list[str]) -> dict[str, np.ndarray]:
     """Size of every term at work by channel, in units of the noise, (6,) each."""
     fit, regression = model.regression.fit(model.search.always + active), model.regression
-    return {k: model.search.sizes_of(k, coefficients(regression, fit, k)[0]) for k in active}
+    return {k: model.search.ask.sizes_of(k, coefficients(regression, fit, k)[0]) for k in active}
 
 
 def left_of(model: ReadingModel, weak: str, strong: str, active: list[str], channels: list[int]) -> float:
@@ -174,7 +174,7 @@ def stronger_ones(model: ReadingModel, key: str, active: list[str]) -> list[tupl
     own = size.get(key)
     if own is None:
         fit = regression.fit([*search.always, *active], loose={key: WIDEST_TRUST})
-        own = search.sizes_of(key, coefficients(regression, fit, key)[0])
+        own = search.ask.sizes_of(key, coefficients(regression, fit, key)[0])
     out = []
     for other in active:
         effect = search.terms[other].effect

@@ -33,7 +33,7 @@ def main_channels(model: ReadingModel, key: str) -> list[int]:
     fit, regression = model.selection.fit, model.regression
     cols = regression.columns([key])
     beta = fit.beta[fit.places(cols)]
-    size = model.search.sizes_of(key, beta)
+    size = model.search.ask.sizes_of(key, beta)
     order = np.argsort(-size)
     return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]
 

@@ -35,6 +35,7 @@ from rotorid.mismatch.select import (
     SMALLEST_SIZE,
     UNSTEADY_P,
     UNSTEADY_SHARE,
+    Questions,
     Search,
     Selection,
 )
@@ -81,8 +82,8 @@ class ReadingSearch(Search):
 
     rich = False
 
-    def __init__(self, regression: Regression, sizes_of, joint_sizes=None, refused: Mapping[str, str] | None = None):
-        super().__init__(regression, sizes_of, np.zeros(6), joint_sizes=joint_sizes)
+    def __init__(self, regression: Regression, ask: Questions, refused: Mapping[str, str] | None = None):
+        super().__init__(regression, ask)
         self.refused = refused or {}
         self.total_gram = regression.gram[regression.training].sum(axis=0)
         self.total_cross = regression.cross[regression.training].sum(axis=0)
@@ -414,7 +415,7 @@ def reading_model(
     restrain(regression, setup)
     joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1, resolution(setup))
     sizes = size_function(regression, joint_sizes)
-    search = ReadingSearch(regression, sizes, joint_sizes, refused)
+    search = ReadingSearch(regression, Questions(sizes, joint_sizes, np.zeros(6)), refused)
     selection = search.run(active)
     always = kept_values(search, selection.active)
     if always != search.always:

@@ -1,0 +1,186 @@
+"""When a payload is on board, where it is taken up or dropped in flight.
+
+Added mass is seen in every half second by itself: by it the thrust exceeds what the accelerometer accounts for, and
+beside the centre it turns the vehicle. Where these loads are two plateaus with a sudden change between them in the
+midst of a run, the higher one is a payload that is carried for so long. What drifts is none (a battery, ice), and what
+differs between whole runs alone may be anything (other propellers, denser air). As for a gust, the instants are found
+in held-out runs too; what is carried is learnt from the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import median_filter, uniform_filter1d
+
+from rotorid.mismatch.motion import Segment, stretches
+from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.wrench import WrenchModel
+
+TERM = "payload/rigid"
+SEEN_IN = ((2, 0), (4, 1), (3, 2))
+"""Channel and parameter of TERM: its mass in the vertical force, its places in the moments of pitch and roll."""
+BLOCK_S = 0.5
+SMOOTHED_BLOCKS = 9
+SWITCH_COST = 30.0
+"""Squares, in units of the blocks' own scatter, that taking up or dropping must explain."""
+LEAST_BLOCKS = 8
+"""Blocks of either state, of all runs together."""
+LEAST_STEP = 3.0
+"""Distance of the two plateaus in units of the scatter of a block."""
+MOST_DRIFT = 0.2
+"""Share of the slow variation of the loads that the two plateaus may leave."""
+EDGE_S = 1.5
+"""Distance from the border of two blocks within which the instant is looked for."""
+
+Windows = tuple[tuple[str, float, float], ...]
+"""(run, start_s, stop_s) of what is carried."""
+
+
+def carried_windows(model: WrenchModel) -> Windows:
+    """When a payload seems to be on board, empty where none is taken up or dropped in the midst of a run."""
+    if TERM not in model.search.terms or model.segments[0].motion.carried is not None:
+        return ()
+    left, columns = unexplained_loads(model)
+    per = max(2, int(BLOCK_S * model.prepared.thinner.rate_hz))
+    loads = [block_loads(y, x, per) for y, x in zip(left, columns, strict=True)]
+    if loads[0].shape[1] == 0:
+        return ()
+    aboard = two_plateaus(loads)
+    if aboard is None:
+        return ()
+    found = []
+    for r, y, x, states in zip(model.rows, left, columns, aboard, strict=True):
+        edges = change_rows(states, y[:, 0], x[:, 0], per)
+        time_s = [*(float(r.time_s[i]) for i in edges), np.inf]
+        state, start = bool(states[0]) if len(states) else False, -np.inf
+        for stop in time_s:
+            if state:
+                found.append((r.run, max(start, float(r.time_s[0]) - 1.0), min(stop, float(r.time_s[-1]) + 1.0)))
+            state, start = not state, stop
+    return tuple(found)
+
+
+def unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What the named effects but a payload leave in the channels of SEEN_IN that there are, and a payload's columns
+    there, each (n, channels) of every stretch."""
+    regression, fit = model.regression, model.selection.fit
+    terms = model.search.terms
+    others = [k for k in model.selection.active if terms[k].effect not in {"payload", *UNKNOWNS} and not terms[k].run]
+    cols = regression.columns(others)
+    beta = fit.beta[fit.places(cols)]
+    own = regression.columns([TERM])
+    present = [(c, p) for c, p in SEEN_IN if np.isfinite(model.rows[0].y[:, c]).all()]
+    if present and present[0][0] != SEEN_IN[0][0]:
+        present = []
+    left = [
+        np.stack([r.y[:, c] - r.x[:, c][:, cols] @ beta for c, _ in present], axis=1) for r in model.rows if present
+    ]
+    columns = [np.stack([r.x[:, c, own[p]] for c, p in present], axis=1) for r in model.rows if present]
+    empty = [np.zeros((len(r.y), 0)) for r in model.rows]
+    return (left, columns) if present else (empty, empty)
+
+
+def block_loads(left: np.ndarray, columns: np.ndarray, per: int) -> np.ndarray:
+    """Mass, and mass times place, (blocks, channels) of `per` rows each, from residual and columns (n, channels)."""
+    count = len(left) // per
+    y, x = (part[: count * per].reshape(count, per, part.shape[1]) for part in (left, columns))
+    return (x * y).sum(axis=1) / np.maximum((x**2).sum(axis=1), 1e-12)
+
+
+def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
+    """Whether a payload is on board by blocks of every stretch; None where loads (blocks, k) are not two plateaus."""
+    steps = np.concatenate([np.diff(part, axis=0) for part in loads])
+    if len(steps) < 4 * LEAST_BLOCKS:
+        return None
+    scatter = 1.4826 * np.median(np.abs(steps), axis=0) / np.sqrt(2)
+    if not (scatter > 0).all():
+        return None
+    scaled = [part / scatter for part in loads]
+    smooth = [median_filter(part, (SMOOTHED_BLOCKS, 1), mode="nearest") for part in scaled]
+    low, high = np.quantile(np.concatenate(smooth)[:, 0], (0.05, 0.95))
+    states = [part[:, 0] > (low + high) / 2 for part in smooth]
+    for _ in range(20):
+        everything, inside = np.concatenate(scaled), np.concatenate(states)
+        if min(inside.sum(), (~inside).sum()) < LEAST_BLOCKS:
+            return None
+        plateaus = np.stack([everything[~inside].mean(axis=0), everything[inside].mean(axis=0)])
+        again = [cheapest_states(part, plateaus) for part in scaled]
+        same = all(np.array_equal(a, b) for a, b in zip(again, states, strict=True))
+        states = again
+        if same:
+            break
+    step = plateaus[1] - plateaus[0]
+    changes = sum(int(np.abs(np.diff(s.astype(int))).sum()) for s in states)
+    if changes == 0 or step[0] < LEAST_STEP:
+        return None
+    rest = [part - plateaus[s.astype(int)] for part, s in zip(scaled, states, strict=True)]
+    return states if slow_variance(rest) < MOST_DRIFT * slow_variance(scaled) else None
+
+
+def slow_variance(parts: Sequence[np.ndarray]) -> float:
+    """Variance of what is slower than SMOOTHED_BLOCKS in stretches (blocks, k), all k together."""
+    smooth = np.concatenate([uniform_filter1d(p, SMOOTHED_BLOCKS, axis=0, mode="nearest") for p in parts if len(p)])
+    return float(smooth.var(axis=0).sum())
+
+
+def cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
+    """States (blocks,) of least squares beside two plateaus (2, k), each change at SWITCH_COST (Viterbi)."""
+    costs = ((loads[:, None, :] - plateaus[None]) ** 2).sum(axis=2)
+    total, came = np.zeros(2), np.zeros((len(costs), 2), int)
+    for i, cost in enumerate(costs):
+        moved = total[::-1] + SWITCH_COST
+        came[i] = np.where(moved < total, [1, 0], [0, 1])
+        total = np.minimum(total, moved) + cost
+    state, out = int(np.argmin(total)), np.zeros(len(costs), bool)
+    for i in range(len(costs) - 1, -1, -1):
+        out[i] = bool(state)
+        state = came[i, state]
+    return out
+
+
+def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: int) -> list[int]:
+    """Rows at which the vertical force (n,) changes from one plateau to the other, near where the blocks do."""
+    state_of = np.repeat(states, per)
+    rows = slice(0, len(state_of))
+    y, x = left[rows], column[rows]
+    mass = [float((x * y)[state_of == s].sum() / max((x**2)[state_of == s].sum(), 1e-12)) for s in (False, True)]
+    errors = np.stack([(y - m * x) ** 2 for m in mass])
+    edges = []
+    for block in np.flatnonzero(np.diff(states.astype(int))) + 1:
+        middle, reach = block * per, int(EDGE_S / BLOCK_S * per)
+        start, stop = max(0, middle - reach), min(len(y), middle + reach)
+        before, after = int(states[block - 1]), int(states[block])
+        gain = np.cumsum(errors[after, start:stop] - errors[before, start:stop])
+        edges.append(start + int(np.argmax(gain)) + 1)
+    return edges
+
+
+def laden(segments: Sequence[Segment], windows: Windows) -> list[Segment]:
+    """Segments that say when a payload is on board."""
+    out = []
+    for s in segments:
+        aboard = np.zeros(s.motion.size)
+        for run, start, stop in windows:
+            if run == s.run:
+                aboard[(s.motion.time_s >= start) & (s.motion.time_s < stop)] = 1.0
+        out.append(replace(s, motion=replace(s.motion, carried=aboard)))
+    return out
+
+
+def changes(windows: Windows, segments: Sequence[Segment]) -> int:
+    """How often a payload is taken up or dropped inside a stretch."""
+    aboard = [s.motion.carried for s in laden(segments, windows)]
+    return sum(int(np.abs(np.diff(a)).sum()) for a in aboard)
+
+
+def windows_of(segments: Sequence[Segment]) -> Windows:
+    """When segments say that a payload is on board; empty where they say nothing (carried throughout)."""
+    found = []
+    for s in segments:
+        if s.motion.carried is not None:
+            for start, stop in stretches(s.motion.carried > 0.5):
+                found.append((s.run, float(s.motion.time_s[start]), float(s.motion.time_s[stop - 1])))
+    return tuple(found)

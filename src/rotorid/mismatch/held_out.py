@@ -1,0 +1,95 @@
+"""Errors on the held-out part, channel by channel: whether squares have grown, by blocks of a second."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.prepare import Prepared, training_rule
+from rotorid.mismatch.wrench import WrenchModel
+
+HARM_RATIO = 1.1
+"""Held-out error beside another's from which a channel counts as worse."""
+HARM_Z = 2.0
+"""Standard errors over blocks of a second by which its squares must have grown, too: the burden of proof is the
+effect's, and squares of a short flight are widely spread."""
+LEAST_EXCITED = 0.1
+"""Mean square of an effect on the held-out part, beside that on the fitted one, from which the former can judge it."""
+LEAST_BLOCKS = 8
+CHANNELS_OF_WRENCH = 6
+
+
+def held_out_masks(prepared: Prepared, model: WrenchModel, segments: list[Segment]) -> list[np.ndarray]:
+    """Mask of the held-out rows of every stretch."""
+    rule = training_rule(prepared.split, segments)
+    return [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in model.rows]
+
+
+def growth(
+    before: list[np.ndarray], after: list[np.ndarray], held: list[np.ndarray], per: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ratio of the held-out errors after and before of each wrench channel, and its growth in standard errors.
+
+    Squares are compared by blocks of `per` rows; without LEAST_BLOCKS of them nothing is said (ratio 1, growth 0).
+    """
+    blocks = []
+    for b, a, mask in zip(before, after, held, strict=True):
+        rows = np.flatnonzero(mask)
+        if len(rows) >= per:
+            parts = np.array_split(rows, len(rows) // per)
+            squares = [x[:, :CHANNELS_OF_WRENCH] ** 2 for x in (b, a)]
+            blocks += [[s[p].mean(axis=0) for s in squares] for p in parts]
+    if not long_enough(held, per):
+        return np.ones(CHANNELS_OF_WRENCH), np.zeros(CHANNELS_OF_WRENCH)
+    was, now = np.array(blocks).transpose(1, 0, 2)
+    change = now - was
+    doubt = change.std(axis=0, ddof=1) / np.sqrt(len(change))
+    ratio = np.sqrt(now.mean(axis=0) / np.maximum(was.mean(axis=0), 1e-300))
+    return np.nan_to_num(ratio, nan=1.0), np.nan_to_num(change.mean(axis=0) / np.maximum(doubt, 1e-300))
+
+
+def excited(parts: list[np.ndarray], held: list[np.ndarray]) -> bool:
+    """Whether contributions (n,) to a channel are large enough on the held-out rows beside the others."""
+    squares = [
+        np.concatenate([p[m] ** 2 for p, m in zip(parts, masks, strict=True)]) for masks in (held, inverted(held))
+    ]
+    here, there = (float(s.mean()) if len(s) else 0.0 for s in squares)
+    return here >= LEAST_EXCITED * there
+
+
+def inverted(masks: list[np.ndarray]) -> list[np.ndarray]:
+    return [~mask for mask in masks]
+
+
+def about_means(runs: list[str], parts: list[np.ndarray], held: list[np.ndarray]) -> list[np.ndarray]:
+    """Residuals (n, 12) of stretches less the mean of the held-out rows of their run."""
+    means = {}
+    for run in dict.fromkeys(runs):
+        rows = [p[mask] for r, p, mask in zip(runs, parts, held, strict=True) if r == run and mask.any()]
+        means[run] = np.concatenate(rows).mean(axis=0) if rows else 0.0
+    return [p - means[r] for r, p in zip(runs, parts, strict=True)]
+
+
+def long_enough(held: list[np.ndarray], per: int) -> bool:
+    """Whether there are LEAST_BLOCKS of `per` rows held out."""
+    return sum(int(mask.sum()) // per for mask in held) >= LEAST_BLOCKS
+
+
+def harmed(ratio: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Mask of the channels that are worse."""
+    return (ratio > HARM_RATIO) & (z > HARM_Z)
+
+
+def helps(ratio: np.ndarray, z: np.ndarray, channels: list[int]) -> float:
+    """How surely the error of one of some channels grows without an effect: `growth` from with it to without.
+
+    Infinite without a channel: what shows in the comparison of two sensors alone is not judged by the wrench, nor what
+    does not act on the held-out part.
+    """
+    return max((float(z[c]) if ratio[c] > 1.0 else 0.0 for c in channels), default=np.inf)
+
+
+def smaller(one: list[np.ndarray], other: list[np.ndarray], held: list[np.ndarray]) -> list[np.ndarray]:
+    """Residuals (n, 12) of every stretch, in each channel those of the two whose held-out squares are smaller."""
+    sums = [sum((x[mask] ** 2).sum(axis=0) for x, mask in zip(parts, held, strict=True)) for parts in (one, other)]
+    return [np.where(sums[1] < sums[0], b, a) for a, b in zip(one, other, strict=True)]

@@ -1,0 +1,37 @@
+"""The believed vehicle with values refitted and no physics added: what an effect must do better than."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rotorid.mismatch.decide import wrong_values
+from rotorid.mismatch.delivered import Values
+from rotorid.mismatch.prepare import Prepared
+from rotorid.mismatch.regression import Fit
+from rotorid.mismatch.select import Selection
+from rotorid.mismatch.within_trust import settled
+from rotorid.mismatch.wrench import WrenchModel
+
+
+def refitted(prepared: Prepared, model: WrenchModel) -> tuple[Fit, Values]:
+    """The fit of a model's rows by believed values alone, and what it changes of them.
+
+    Beside a wind no value is called wrong: it acts through the drag.
+    """
+    values = {}
+    if model.wind is None:
+        nothing = Selection([], model.selection.fit)
+        values = wrong_values(model.search.regression, model.search, nothing, None, size_of_value(model))
+    fit, moved = settled(prepared, model, values, ())
+    return fit, {**moved, **values}
+
+
+def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:
+    """Function of a value and its relative change that gives the change's size in units of the noise."""
+
+    def size(key: str, change: float) -> float:
+        return float(model.search.ask.sizes_of(key, np.array([change])).max())
+
+    return size
