@@ -34,6 +34,7 @@ MOST_DRIFT = 0.2
 """Share of the slow variation of the loads that the two plateaus may leave."""
 EDGE_S = 1.5
 """Distance from the border of two blocks within which the instant is looked for."""
+BEYOND_ROWS_S = 1.0
 
 Windows = tuple[tuple[str, float, float], ...]
 """(run, start_s, stop_s) of what is carried."""
@@ -56,9 +57,11 @@ def carried_windows(model: WrenchModel) -> Windows:
         edges = change_rows(states, y[:, 0], x[:, 0], per)
         time_s = [*(float(r.time_s[i]) for i in edges), np.inf]
         state, start = bool(states[0]) if len(states) else False, -np.inf
+        # Rows begin and end inside their stretch, by half a filter's length; other stretches of the run are elsewhere.
+        first, last = float(r.time_s[0]) - BEYOND_ROWS_S, float(r.time_s[-1]) + BEYOND_ROWS_S
         for stop in time_s:
             if state:
-                found.append((r.run, max(start, float(r.time_s[0]) - 1.0), min(stop, float(r.time_s[-1]) + 1.0)))
+                found.append((r.run, max(start, first), min(stop, last)))
             state, start = not state, stop
     return tuple(found)
 
