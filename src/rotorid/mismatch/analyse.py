@@ -12,7 +12,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch import within_trust
-from rotorid.mismatch.carried import Windows, windows_of
+from rotorid.mismatch.carried import on_board
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
@@ -127,17 +127,17 @@ def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
         model.search,
         model.selection,
         model.noise,
-        held_out_masks(prepared, model, model.segments),
+        held_out_masks(model),
         nonlinear_intervals(prepared, model, model.segments),
         found.values,
     )
-    aboard = windows_of(model.segments)
+    aboard = on_board(model.segments)
     if aboard:
         findings = [carried_for_a_time(f, aboard) if f.id == "payload" else f for f in findings]
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
-def carried_for_a_time(finding: Finding, windows: Windows) -> Finding:
+def carried_for_a_time(finding: Finding, windows: tuple[tuple[str, float, float], ...]) -> Finding:
     """A payload with when it is on board."""
     when = ", ".join(f"in {run} from {start:.1f} to {stop:.1f} s" for run, start, stop in windows)
     return replace(finding, windows=windows, sentence=f"{finding.sentence}: {when}")

@@ -34,36 +34,25 @@ MOST_DRIFT = 0.2
 """Share of the slow variation of the loads that the two plateaus may leave."""
 EDGE_S = 1.5
 """Distance from the border of two blocks within which the instant is looked for."""
-BEYOND_ROWS_S = 1.0
-
-Windows = tuple[tuple[str, float, float], ...]
-"""(run, start_s, stop_s) of what is carried."""
+Windows = tuple[tuple[float, float], ...]
+"""(start_s, stop_s) of what is carried in a stretch, without end where it is on board from or to its end."""
 
 
-def carried_windows(model: WrenchModel) -> Windows:
-    """When a payload seems to be on board, empty where none is taken up or dropped in the midst of a run."""
-    if TERM not in model.search.terms or model.segments[0].motion.carried is not None:
-        return ()
+def carried_windows(model: WrenchModel) -> list[Windows]:
+    """When a payload seems to be on board in every stretch; empty where none is taken up or dropped in one's midst."""
+    if TERM not in model.search.terms or not np.isfinite(model.rows[0].y[:, SEEN_IN[0][0]]).all():
+        return []
     left, columns = unexplained_loads(model)
     per = max(2, int(BLOCK_S * model.prepared.thinner.rate_hz))
-    loads = [block_loads(y, x, per) for y, x in zip(left, columns, strict=True)]
-    if loads[0].shape[1] == 0:
-        return ()
-    aboard = two_plateaus(loads)
+    aboard = two_plateaus([block_loads(y, x, per) for y, x in zip(left, columns, strict=True)])
     if aboard is None:
-        return ()
-    found = []
+        return []
+    out = []
     for r, y, x, states in zip(model.rows, left, columns, aboard, strict=True):
-        edges = change_rows(states, y[:, 0], x[:, 0], per)
-        time_s = [*(float(r.time_s[i]) for i in edges), np.inf]
-        state, start = bool(states[0]) if len(states) else False, -np.inf
-        # Rows begin and end inside their stretch, by half a filter's length; other stretches of the run are elsewhere.
-        first, last = float(r.time_s[0]) - BEYOND_ROWS_S, float(r.time_s[-1]) + BEYOND_ROWS_S
-        for stop in time_s:
-            if state:
-                found.append((r.run, max(start, first), min(stop, last)))
-            state, start = not state, stop
-    return tuple(found)
+        edges = [-np.inf, *(float(r.time_s[i]) for i in change_rows(states, y[:, 0], x[:, 0], per)), np.inf]
+        first = 0 if len(states) and states[0] else 1
+        out.append(tuple(zip(edges[first:-1:2], edges[first + 1 :: 2], strict=True)))
+    return out
 
 
 def unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -72,18 +61,12 @@ def unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.nda
     regression, fit = model.regression, model.selection.fit
     terms = model.search.terms
     others = [k for k in model.selection.active if terms[k].effect not in {"payload", *UNKNOWNS} and not terms[k].run]
-    cols = regression.columns(others)
+    cols, own = regression.columns(others), regression.columns([TERM])
     beta = fit.beta[fit.places(cols)]
-    own = regression.columns([TERM])
     present = [(c, p) for c, p in SEEN_IN if np.isfinite(model.rows[0].y[:, c]).all()]
-    if present and present[0][0] != SEEN_IN[0][0]:
-        present = []
-    left = [
-        np.stack([r.y[:, c] - r.x[:, c][:, cols] @ beta for c, _ in present], axis=1) for r in model.rows if present
-    ]
-    columns = [np.stack([r.x[:, c, own[p]] for c, p in present], axis=1) for r in model.rows if present]
-    empty = [np.zeros((len(r.y), 0)) for r in model.rows]
-    return (left, columns) if present else (empty, empty)
+    left = [np.stack([r.y[:, c] - r.x[:, c][:, cols] @ beta for c, _ in present], axis=1) for r in model.rows]
+    columns = [np.stack([r.x[:, c, own[p]] for c, p in present], axis=1) for r in model.rows]
+    return left, columns
 
 
 def block_loads(left: np.ndarray, columns: np.ndarray, per: int) -> np.ndarray:
@@ -116,8 +99,7 @@ def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
         if same:
             break
     step = plateaus[1] - plateaus[0]
-    changes = sum(int(np.abs(np.diff(s.astype(int))).sum()) for s in states)
-    if changes == 0 or step[0] < LEAST_STEP:
+    if not any(np.diff(s).any() for s in states) or step[0] < LEAST_STEP:
         return None
     rest = [part - plateaus[s.astype(int)] for part, s in zip(scaled, states, strict=True)]
     return states if slow_variance(rest) < MOST_DRIFT * slow_variance(scaled) else None
@@ -147,12 +129,11 @@ def cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
 def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: int) -> list[int]:
     """Rows at which the vertical force (n,) changes from one plateau to the other, near where the blocks do."""
     state_of = np.repeat(states, per)
-    rows = slice(0, len(state_of))
-    y, x = left[rows], column[rows]
+    y, x = left[: len(state_of)], column[: len(state_of)]
     mass = [float((x * y)[state_of == s].sum() / max((x**2)[state_of == s].sum(), 1e-12)) for s in (False, True)]
     errors = np.stack([(y - m * x) ** 2 for m in mass])
     edges = []
-    for block in np.flatnonzero(np.diff(states.astype(int))) + 1:
+    for block in np.flatnonzero(np.diff(states)) + 1:
         middle, reach = block * per, int(EDGE_S / BLOCK_S * per)
         start, stop = max(0, middle - reach), min(len(y), middle + reach)
         before, after = int(states[block - 1]), int(states[block])
@@ -161,26 +142,24 @@ def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: i
     return edges
 
 
-def laden(segments: Sequence[Segment], windows: Windows) -> list[Segment]:
-    """Segments that say when a payload is on board."""
+def laden(segments: Sequence[Segment], windows: Sequence[Windows]) -> list[Segment]:
+    """Segments that say when a payload is on board, from the windows of each."""
     out = []
-    for s in segments:
+    for s, own in zip(segments, windows, strict=True):
         aboard = np.zeros(s.motion.size)
-        for run, start, stop in windows:
-            if run == s.run:
-                aboard[(s.motion.time_s >= start) & (s.motion.time_s < stop)] = 1.0
+        for start, stop in own:
+            aboard[(s.motion.time_s >= start) & (s.motion.time_s < stop)] = 1.0
         out.append(replace(s, motion=replace(s.motion, carried=aboard)))
     return out
 
 
-def changes(windows: Windows, segments: Sequence[Segment]) -> int:
-    """How often a payload is taken up or dropped inside a stretch."""
-    aboard = [s.motion.carried for s in laden(segments, windows)]
-    return sum(int(np.abs(np.diff(a)).sum()) for a in aboard)
+def changes(segments: Sequence[Segment]) -> int:
+    """How often a payload is taken up or dropped inside a segment."""
+    return sum(int(np.abs(np.diff(s.motion.carried)).sum()) for s in segments)
 
 
-def windows_of(segments: Sequence[Segment]) -> Windows:
-    """When segments say that a payload is on board; empty where they say nothing (carried throughout)."""
+def on_board(segments: Sequence[Segment]) -> tuple[tuple[str, float, float], ...]:
+    """(run, start_s, stop_s) of a payload as segments say it; empty where they say nothing (carried throughout)."""
     found = []
     for s in segments:
         if s.motion.carried is not None:

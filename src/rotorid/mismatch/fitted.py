@@ -85,9 +85,11 @@ def borne_out(prepared: Prepared, model: WrenchModel, values: Values, values_of:
     What is right only beside an effect of no use (a thrust curve beside a mass that it called for) does harm without.
     """
     while True:
+        harmless = model.selection.active
         model, values = without_useless(prepared, model, values, values_of)
         useful = model.selection.active
-        model, values, values_of, _ = without_harm(prepared, model, values_of, commanded)
+        if useful != harmless:
+            model, values, values_of, _ = without_harm(prepared, model, values_of, commanded)
         if model.selection.active == useful:
             return without_unsure(model, values, values_of)
 
@@ -161,18 +163,19 @@ def with_own_scales(prepared: Prepared, segments, noisy) -> WrenchModel:
     return wrench_model(prepared, with_run_scales(prepared.terms, prepared), segments=segments, noisy_segments=noisy)
 
 
-def with_payload(prepared: Prepared, model: WrenchModel, windows: Windows):
+def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows]):
     """Segments, their noisy copies and the model with a payload on board in some windows, where that explains more.
 
     Each taking up and dropping costs as much as an effect; without a payload in the model everything is as it was.
     """
-    both = tuple(laden(segments, windows) for segments in (model.segments, model.noisy_segments))
+    segments, noisy = model.segments, model.noisy_segments
+    both = laden(segments, windows), laden(noisy, windows) if noisy else noisy
     with_it = with_own_scales(prepared, *both)
     carries = any(k.startswith("payload/rigid") for k in with_it.selection.active)
-    filters, price = model.regression.filters, COST_PER_EFFECT * changes(windows, model.segments)
+    filters, price = model.regression.filters, COST_PER_EFFECT * changes(both[0])
     if carries and cost_of(with_it, filters) + price < cost_of(model, filters):
         return *both, with_it
-    return model.segments, model.noisy_segments, model
+    return segments, noisy, model
 
 
 def changes_its_columns(form: Form) -> bool:

@@ -81,7 +81,7 @@ def without_harm(
     """
     values = values_of(model, ())
     believed = believed_residuals(prepared, model, commanded)
-    held = held_out_masks(prepared, model, model.segments)
+    held = held_out_masks(model)
     per = max(2, int(prepared.thinner.rate_hz))
     before = smaller(believed, residuals_of(model, refitted(prepared, model)[0]), held)
     refused: tuple[str, ...] = ()
@@ -168,7 +168,7 @@ def without_useless(
     useful goes first, and the others are looked at again without it.
     Where too little is held out to say anything, or an effect hardly acts (no landing, no turn), nothing goes.
     """
-    held = held_out_masks(prepared, model, model.segments)
+    held = held_out_masks(model)
     per = max(2, int(prepared.thinner.rate_hz))
     runs = [r.run for r in model.rows]
     if not long_enough(held, per):

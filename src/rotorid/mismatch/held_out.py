@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import Prepared, training_rule
+from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.wrench import WrenchModel
 
 HARM_RATIO = 1.1
@@ -19,9 +18,9 @@ LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
 
 
-def held_out_masks(prepared: Prepared, model: WrenchModel, segments: list[Segment]) -> list[np.ndarray]:
+def held_out_masks(model: WrenchModel) -> list[np.ndarray]:
     """Mask of the held-out rows of every stretch."""
-    rule = training_rule(prepared.split, segments)
+    rule = training_rule(model.prepared.split, model.segments)
     return [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in model.rows]
 
 

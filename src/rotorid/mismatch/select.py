@@ -385,8 +385,7 @@ class Search:
 
     def _turn(self, candidate: Candidate) -> int:
         """When a candidate is looked at: one that could be two effects, or has no name, where nothing else enters."""
-        form = self.terms[candidate.key].form
-        return 2 if not candidate.named else int(form is not None and form.compound)
+        return int(self.terms[candidate.key].form.compound) if candidate.named else 2
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
         """A term that another sensor, the held-out runs or the runs among themselves speak against, with the reason."""
@@ -515,9 +514,9 @@ class Search:
         base = self.regression.explained(self.always + active)
         best: dict[str, tuple[float, Term]] = {}
         for gain, term in self.gains(active):
-            if term.form is not None and term.form.compound:
+            if term.form.compound or term.once in dropped:
                 continue
-            if term.once not in dropped and (term.once not in best or gain > best[term.once][0]):
+            if term.once not in best or gain > best[term.once][0]:
                 best[term.once] = (gain, term)
         pool = sorted(best.values(), key=lambda c: -c[0])[:most]
         winner, top = None, 0.0

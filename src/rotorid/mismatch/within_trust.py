@@ -66,7 +66,7 @@ def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequ
     moved = changes(model, free)
     if strained(model, values, moved):
         return plain, {}
-    held = held_out_masks(prepared, model, model.segments)
+    held = held_out_masks(model)
     per = max(2, int(prepared.thinner.rate_hz))
     if not pays(residuals_of(model, plain), residuals_of(model, free), held, per):
         return plain, {}
