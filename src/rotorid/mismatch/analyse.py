@@ -19,14 +19,15 @@ from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
-from rotorid.mismatch.held_out import held_out_masks
+from rotorid.mismatch.leave_one_out import without_each
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
-from rotorid.mismatch.prepare import Prepared, prepare
+from rotorid.mismatch.prepare import Prepared, parts_of, prepare, split_runs
 from rotorid.mismatch.refitted import refitted
 from rotorid.mismatch.regime import regime_variables
+from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -53,18 +54,22 @@ NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturati
 
 
 def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
-    """The whole analysis of a set of kind `flight`."""
+    """The whole analysis of a set of kind `flight`.
+
+    Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
+    """
     recordings, mistakes, remarks = find_mistakes(recordings)
-    prepared = prepare(recordings, cutoff_hz)
+    split = split_runs(recordings)
+    known, unseen = parts_of(recordings, split)
+    prepared = prepare(known, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     model, values = found.model, found.values
-    segments, noisy = model.segments, model.noisy_segments
 
     told, scale = values, {}
     if only_throttle(recordings):
         told = speed_for_coefficients(values, prepared.vehicle)
         if prepared.vehicle.rotor_speed_limits_rad_s is None:
-            told, scale = throttle_scale(values, model, full_speed(recordings.runs, prepared.vehicle))
+            told, scale = throttle_scale(values, model, full_speed(known.runs, prepared.vehicle))
     fit, moved = settled(prepared, model, values, model.selection.active)
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
     for _, full, _, _ in scale.values():
@@ -78,27 +83,41 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     told = without_values_in_question(findings, told)
     if found.commanded:
         told = told_of_commands(findings, told)
-
-    delivered = residuals_of(model, fit)
-    before, after, depends = dependence(prepared, model, segments, noisy)
     strained = beyond_trust(model, values, model.selection.active)
     claimed = bool(values) or any(f.status in CLAIMED for f in findings)
-    left = leftover(prepared, model, segments, noisy, after, depends, delivered if strained else None, claimed)
     findings = together(findings)
     fly = next_flight(findings, prepared, model.noise)
+
+    # The last decision is made: the runs held out are opened.
+    seen = on_every_run(found, recordings, split, unseen)
+    fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
+    delivered = residuals_of(seen, fit)
+    before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
+    left = leftover(
+        seen.prepared,
+        seen,
+        seen.segments,
+        seen.noisy_segments,
+        after,
+        depends,
+        delivered if strained else None,
+        claimed,
+    )
+    traces = make_traces(seen, found, residuals_of(seen, plain_fit), delivered)
     return Analysis(
         recordings=recordings,
-        split=prepared.split,
+        split=split,
         believed=prepared.vehicle,
         refitted=changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()}),
         improved=improved,
         findings=tuple(findings),
         values={**contract_values(prepared.vehicle, told), **scale},
         not_testable=not_testable(prepared, found.chain, findings),
-        traces=make_traces(prepared, found, residuals_of(model, plain_fit), delivered),
+        traces=traces,
+        without=without_each(found, seen, values, fit, findings, traces),
         noise_floor=noise_floors(prepared, found),
         p_values={c: (before[c], after[c]) for c in before},
-        regimes=regimes_by_run(segments, prepared),
+        regimes=regimes_by_run(seen.segments, seen.prepared),
         unexplained_share=left.share,
         unexplained_channels=left.channels,
         unexplained_depends_on=left.depends_on,
@@ -106,7 +125,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         next_manoeuvre=fly.manoeuvre,
         next_separates=fly.separates,
         next_sigma=fly.sigma,
-        force_source=segments[0].force_source,
+        force_source=model.segments[0].force_source,
         notes=(*remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
         instead=instead_of(model, values),
         put_right=within_trust.in_words(moved),
@@ -127,9 +146,7 @@ def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
         model.search,
         model.selection,
         model.noise,
-        held_out_masks(model),
         nonlinear_intervals(prepared, model, model.segments),
-        found.values,
     )
     aboard = on_board(model.segments)
     if aboard:
@@ -324,10 +341,10 @@ def absorbed_findings(model: WrenchModel, values: dict, findings: list[Finding])
 
 
 def make_traces(
-    prepared: Prepared, found: Fitted, refitted: list[np.ndarray], delivered: list[np.ndarray]
+    model: WrenchModel, found: Fitted, refitted: list[np.ndarray], delivered: list[np.ndarray]
 ) -> tuple[Trace, ...]:
     """Residual of every channel before refitting, after refitting and with the effects, (n, 12) each per stretch."""
-    model, chain = found.model, found.chain
+    prepared, chain = model.prepared, found.chain
     believed_left = believed_residuals(prepared, model, found.commanded)
     out = []
     parts = (model.rows, prepared.segments, believed_left, refitted, delivered)

@@ -8,6 +8,7 @@ contribution stands as it is.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,10 +37,31 @@ class Contributions:
         # All columns in one product: to pick some out of an array of gigabytes costs several times as much.
         whole = np.zeros(self.rows[0].x.shape[2])
         whole[columns] = beta
-        parts = [_product(r.x, whole) for r in self.rows]
+        return self._less_noise(lambda rows: [_product(r.x, whole) for r in rows])
+
+    def left_out(self, columns: np.ndarray, betas: np.ndarray, fold: list[np.ndarray]) -> list[np.ndarray]:
+        """The same where every row has the coefficients that were fitted without its fold.
+
+        `betas` (folds, k); `fold` holds the fold of every row of each stretch, (n,), -1 for a row of none, of which
+        nothing is said (zero).
+        """
+
+        def made(rows: list[Rows]) -> list[np.ndarray]:
+            out = [np.zeros_like(r.y) for r in rows]
+            for part, r, own in zip(out, rows, fold, strict=True):
+                for number, beta in enumerate(betas):
+                    where = np.flatnonzero(own == number)
+                    part[where] = r.x[where][:, :, columns] @ beta
+            return out
+
+        return self._less_noise(made)
+
+    def _less_noise(self, made: Callable[[list[Rows]], list[np.ndarray]]) -> list[np.ndarray]:
+        """Contributions (n, 12) made of rows, through Wiener's filter where much of them is noise."""
+        parts = made(self.rows)
         if self.noisy is None:
             return parts
-        noise = [_product(n.x, whole) - p for n, p in zip(self.noisy, parts, strict=True)]
+        noise = [again - p for again, p in zip(made(self.noisy), parts, strict=True)]
         for run in dict.fromkeys(r.run for r in self.rows):
             own = [k for k, r in enumerate(self.rows) if r.run == run]
             for c in range(parts[0].shape[1]):

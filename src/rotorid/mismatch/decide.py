@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,7 +13,14 @@ from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
-from rotorid.mismatch.select import EXPECTED_HELD_OUT, SHARE_OF_LARGEST, SMALLEST_SIZE, Search, Selection
+from rotorid.mismatch.select import (
+    LEAST_PROMISE,
+    LEAST_TRANSFER,
+    SHARE_OF_LARGEST,
+    SMALLEST_SIZE,
+    Search,
+    Selection,
+)
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 COST_PER_VALUE = 12.0
@@ -121,34 +127,19 @@ def wrench_findings(
     search: Search,
     selection: Selection,
     noise: np.ndarray,
-    held: list[np.ndarray],
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
-    values: Iterable[str] = (),
 ) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive.
-
-    `values` are the keys of the believed values that are called wrong: what a term gains on the held-out part is
-    judged as it is delivered, with those free alone and without the empirical terms.
     """
     effects, rows = catalogue(), contributions.rows
     findings = []
-    loose = {k: WIDEST_TRUST for k in values}
-    kept = [k for k in search.always if search.terms[k].kind != "value" or k in loose]
-    empirical = regression.columns([k for k in selection.active if search.terms[k].effect in UNKNOWNS])
-
-    def delivered(active: list[str]) -> Fit:
-        fit = regression.fit([*kept, *active], loose=loose)
-        return replace(fit, beta=np.where(np.isin(fit.columns, empirical), 0.0, fit.beta))
-
-    beside, with_it = suggested(search, selection.active), delivered(selection.active)
+    beside = suggested(search, selection.active)
     for key in selection.active:
         term = search.terms[key]
         if term.effect in UNKNOWNS:
             continue  # told as unexplained
         effect = effects[term.effect]
         beta, _ = coefficients(regression, selection.fit, key)
-        rest = [k for k in selection.active if k != key]
-        without = delivered(rest)
         channels = main_channels(rows, regression.columns([key]), beta, noise)
         alternatives = search.alternatives(key, selection.active)
         status = "ambiguous" if alternatives else "established"
@@ -178,7 +169,6 @@ def wrench_findings(
                 p_value=selection.p_values[key],
                 channels=tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels),
                 alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
-                gain=held_out_gain(contributions, with_it, without, channels[0], held),
                 windows=(term.window,) if term.window else (),
             )
         )
@@ -192,19 +182,12 @@ def wrench_findings(
     return findings
 
 
-def fails_held_out(
+def fails_elsewhere(
     regression: Regression, always: list[str], named: list[str], key: str, loose: dict[str, float]
 ) -> bool:
-    """Whether a changed value that should help on the held-out blocks does harm there: it is of the runs fitted."""
-    mask = regression.held_out
-    if mask.sum() < 4:
-        return False
-    with_it = regression.fit(always + named, loose=loose)
-    without = regression.fit(always + [k for k in named if k != key], loose=loose)
-    return (
-        regression.held_out_gain(with_it, without) < 0
-        and regression.expected_gain(with_it, without, mask) > EXPECTED_HELD_OUT
-    )
+    """Whether a changed value does not keep what it promises on environments it was not fitted on."""
+    seen = regression.compare(always + named, always + [k for k in named if k != key], loose)
+    return seen.promised.sum() > LEAST_PROMISE and seen.transfer < LEAST_TRANSFER
 
 
 def wrong_values(
@@ -266,11 +249,7 @@ def wrong_values(
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
-            fails = fails_held_out(regression, always, named, key, loose)
-            if not fails and search.ask.harms is not None:
-                # A thrust that mends the moment and spoils the force is none: something else is missing there.
-                without = regression.fit(always + [k for k in named if k != key], loose=loose)
-                fails = search.ask.harms(key, fit, without)
+            fails = fails_elsewhere(regression, always, named, key, loose)
             if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:

@@ -33,13 +33,39 @@ def with_sure_nuisances(model: WrenchModel, keys: Sequence[str], values: Values)
     A calm flight does not know the offset between two sensors, and one that is nothing but noise where it was fitted
     is a mismatch in the first turn held out.
     """
+    return model.regression.fit(with_sure(model, keys, values), loose=widely(values))
+
+
+def with_sure(model: WrenchModel, keys: Sequence[str], values: Values) -> list[str]:
+    """Keys of the terms that are delivered with those of `keys`: winds, and the nuisances that are sure beside them."""
     regression = model.regression
-    loose = {k: WIDEST_TRUST for k in values}
     nuisances = regression.keys_of("nuisance")
     always = [*regression.keys_of("wind"), *keys]
-    fit = regression.fit([*nuisances, *always], loose=loose)
-    sure = [k for k in nuisances if surely_there(*coefficients(regression, fit, k))]
-    return fit if sure == nuisances else regression.fit([*sure, *always], loose=loose)
+    fit = regression.fit([*nuisances, *always], loose=widely(values))
+    return [*(k for k in nuisances if surely_there(*coefficients(regression, fit, k))), *always]
+
+
+def widely(values: Values) -> dict[str, float]:
+    """Priors of the values called wrong."""
+    return dict.fromkeys(values, WIDEST_TRUST)
+
+
+def left_out_residuals(model: WrenchModel, keys: Sequence[str], values: Values) -> list[np.ndarray]:
+    """What a model of some terms leaves of every stretch where it was not fitted, (n, 12).
+
+    Each environment of the fitted runs is judged by coefficients found without it. Empirical terms stay out.
+    """
+    regression = model.regression
+    cols, betas = regression.left_out(tuple(keys), False, widely(values))
+    betas = np.where(model.unnamed(cols), 0.0, betas)
+    fold = np.append(regression.folds(False), -1)  # the last stands for rows that are in no block
+    added = model.contributions.left_out(cols, betas, [fold[b] for b in regression.blocks_of_rows])
+    return [r.y - part for r, part in zip(model.rows, added, strict=True)]
+
+
+def judged_rows(model: WrenchModel) -> list[np.ndarray]:
+    """Mask of the rows of every stretch that are in an environment."""
+    return [b >= 0 for b in model.regression.blocks_of_rows]
 
 
 def surely_there(beta: np.ndarray, covariance: np.ndarray) -> bool:
@@ -61,8 +87,8 @@ def residuals_of(model: WrenchModel, fit: Fit) -> list[np.ndarray]:
 
 
 def delivered_residuals(model: WrenchModel, values: Values) -> list[np.ndarray]:
-    """What wrong values and named effects leave of every stretch, (n, 12)."""
-    return residuals_of(model, delivered_fit(model, values, model.selection.active))
+    """What wrong values and named effects leave of every stretch where they were not fitted, (n, 12)."""
+    return left_out_residuals(model, with_sure(model, [*values, *model.selection.active], values), values)
 
 
 def believed_residuals(prepared: Prepared, model: WrenchModel, commanded: bool) -> list[np.ndarray]:

@@ -13,7 +13,7 @@ from rotorid.effects.contract import Form
 from rotorid.effects.loading import Instrument, Loading
 from rotorid.recordings import RecordingSet, Split, Vehicle
 
-Status = Literal["established", "ambiguous", "absorbed", "not_established"]
+Status = Literal["established", "ambiguous", "suggested", "absorbed", "not_established"]
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,8 @@ class Analysis:
     """Channel to p-value that the residual does not depend on the inputs, before and after."""
     regimes: dict[str, dict[str, np.ndarray]]
     """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
+    without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
+    """To the id of a stated effect what is left of every trace without it, all else fitted anew."""
     unexplained_share: float = 0.0
     """Share of the residual's energy above the noise floor that the findings leave (0 where nothing was off)."""
     unexplained_channels: tuple[str, ...] = ()

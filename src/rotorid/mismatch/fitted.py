@@ -60,6 +60,11 @@ class Fitted:
     """Whether rotor speeds are measured."""
 
     @property
+    def prepared(self) -> Prepared:
+        """What was fitted: the fitted runs alone."""
+        return self.model.prepared
+
+    @property
     def commanded(self) -> bool:
         """Whether rotor speeds are known from their commands alone."""
         return self.chain is not None and not self.measured
@@ -196,7 +201,7 @@ def thrust_differs(model: WrenchModel) -> bool:
 
 def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
     """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
-    runs = dict.fromkeys(s.run for s in prepared.segments)
+    runs = dict.fromkeys([*(s.run for s in prepared.segments), *prepared.unseen])
     return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(RUN_TRUST,), run=r) for r in runs)]
 
 

@@ -174,6 +174,49 @@ def strongest(found: list[tuple[str, list]], most_knots: int = MOST_KNOTS) -> li
     return [(run, [w for w in own if (run, w) in kept]) for run, own in found]
 
 
+def with_gusts_of_new_runs(model: WrenchModel, segments: list[Segment], noisy: list[Segment], rows: list[Rows]):
+    """Other stretches of the vehicle, and their noisy copies, in the wind of their own gusts.
+
+    `rows` are those stretches' rows by the model. The vehicle's numbers stay as they are.
+    """
+    if not feels_wind(model) or any(s.motion.rotation is None or s.motion.velocity is None for s in segments):
+        return segments, noisy
+    full = model.full_fit()
+    left = [r.y - r.x[:, :, full.columns] @ full.beta for r in rows]
+    parts = zip(segments, rows, left, strict=True)
+    found = [(s.run, windows(part[:, :3], rotation_at(s, r), r.time_s)) for s, r, part in parts]
+    winds = {}
+    for run, own in strongest(found):
+        for start, stop, _ in own:
+            term = wind_term(run, knots_of(start, stop, KNOT_S))
+            wind = wind_in(model, [s for s in segments if s.run == run], term)
+            gust = Gust(run, np.array(term.values), wind.reshape(2, -1).T, np.eye(len(wind)), 0.0)
+            if size_of(gust, model, segments) > BESIDE_A_BURST:
+                winds[term.key] = (term, wind)
+    return in_gusts(segments, winds), in_gusts(noisy, winds) if noisy else noisy
+
+
+def wind_in(model: WrenchModel, segments: list[Segment], term: Term) -> np.ndarray:
+    """Wind at a term's knots (2 knots,), m/s, by Gauss-Newton with everything else as it is in the model."""
+    full, felt, wind = model.full_fit(), felt_by(model), np.zeros(term.size)
+    active = [model.search.terms[k] for k in lasting(model)]
+    always = [t for t in model.terms if t.kind != "effect" and not t.run]
+    kept = [*always, *active]
+    cols = model.regression.columns([t.key for t in kept])
+    beta = np.array([full.beta[full.columns == c][0] if c in full.columns else 0.0 for c in cols])
+    for _ in range(STEPS):
+        moved = in_gusts(segments, {term.key: (term, wind)})
+        rows = assemble_rows(model.prepared, [*kept, term], moved, felt)
+        normal, right = 1e-9 * np.eye(term.size), np.zeros(term.size)
+        for r in rows:
+            left = (r.y - r.x[:, :, : len(cols)] @ beta)[:, :2] / model.noise[:2]
+            own = r.x[:, :2, len(cols) :] / model.noise[:2, None]
+            normal, right = normal + np.einsum("nci,ncj->ij", own, own), right + np.einsum("nci,nc->i", own, left)
+        ridge = 1e-6 * np.trace(normal) / term.size * np.eye(term.size)
+        wind = wind + np.clip(np.linalg.solve(normal + ridge, right), -LARGEST_STEP_M_S, LARGEST_STEP_M_S)
+    return wind
+
+
 def beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -> bool:
     """Whether a window of a run that is not fitted flies faster than all that is: drag extrapolated is no gust."""
     fitted, inside = [0.0], [0.0]
@@ -279,11 +322,12 @@ def horizontal_energy(model: WrenchModel) -> float:
     return float(np.mean(left**2))
 
 
-def size_of(gust: Gust, model: WrenchModel) -> float:
-    """Root mean square of a gust's force in its window, in units of the noise of the force."""
+def size_of(gust: Gust, model: WrenchModel, segments: list[Segment] | None = None) -> float:
+    """Root mean square of a gust's force in its window, in units of the noise of the force; of the model's segments
+    or of others."""
     knots, wind = gust.knots_s, gust.wind_m_s.T.ravel()
     own = Term("gust", "wind", "gust", None, tuple(knots), len(wind), (np.inf,) * len(wind), run=gust.run)
-    segments = [s for s in model.segments if s.run == gust.run]
+    segments = [s for s in (model.segments if segments is None else segments) if s.run == gust.run]
     felt = felt_by(model)
     total, count = 0.0, 0
     for rows in assemble_rows(model.prepared, [own], segments, felt):

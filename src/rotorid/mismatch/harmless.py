@@ -17,28 +17,26 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.mismatch.decide import coefficients, estimates, main_channels, suggested
-from rotorid.mismatch.delivered import Values, believed_residuals, delivered_residuals, nuisances_in, residuals_of
+from rotorid.mismatch.delivered import Values, believed_residuals, delivered_residuals, judged_rows, nuisances_in
 from rotorid.mismatch.held_out import (
     CHANNELS_OF_WRENCH,
     about_means,
-    excited,
     growth,
     harmed,
-    held_out_masks,
     helps,
     long_enough,
     smaller,
 )
 from rotorid.mismatch.prepare import Prepared
-from rotorid.mismatch.refitted import refitted
+from rotorid.mismatch.refitted import refitted_left_out
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import WrenchModel
 
 HELP_Z = 0.5
 """Standard errors by which the squares of one channel that an effect acts in must grow without it: it has been found
 already, in the runs fitted, so doubt is not held against it beyond the coin's."""
-REASON = "what is delivered with it is worse on the held-out runs than the believed vehicle, or that one refitted"
-USELESS = "without it the held-out error is no larger in any channel that it acts in"
+REASON = "where it was not fitted, what is delivered with it is worse than the believed vehicle, or that one refitted"
+USELESS = "where it was not fitted, the error without it is no larger in any channel that it acts in"
 UNSURE = "none of it at all is within its interval"
 
 ValuesOf = Callable[[WrenchModel, Sequence[str]], Values]
@@ -81,9 +79,9 @@ def without_harm(
     """
     values = values_of(model, ())
     believed = believed_residuals(prepared, model, commanded)
-    held = held_out_masks(model)
+    held = judged_rows(model)
     per = max(2, int(prepared.thinner.rate_hz))
-    before = smaller(believed, residuals_of(model, refitted(prepared, model)[0]), held)
+    before = smaller(believed, refitted_left_out(prepared, model), held)
     refused: tuple[str, ...] = ()
     while True:
         after = delivered_residuals(model, values)
@@ -168,7 +166,7 @@ def without_useless(
     useful goes first, and the others are looked at again without it.
     Where too little is held out to say anything, or an effect hardly acts (no landing, no turn), nothing goes.
     """
-    held = held_out_masks(model)
+    held = judged_rows(model)
     per = max(2, int(prepared.thinner.rate_hz))
     runs = [r.run for r in model.rows]
     if not long_enough(held, per):
@@ -183,7 +181,6 @@ def without_useless(
             beta, _ = coefficients(model.regression, model.selection.fit, key)
             cols = model.regression.columns([key])
             wrench = [c for c in main_channels(model.rows, cols, beta, model.noise) if c < CHANNELS_OF_WRENCH]
-            wrench = [c for c in wrench if excited([r.x[:, c, cols] @ beta for r in model.rows], held)]
             fewer = without(model, key, USELESS)
             left = delivered_residuals(fewer, values)
             pairs = (with_it, left), tuple(about_means(runs, part, held) for part in (with_it, left))

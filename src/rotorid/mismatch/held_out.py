@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.mismatch.prepare import training_rule
-from rotorid.mismatch.wrench import WrenchModel
-
 HARM_RATIO = 1.1
 """Held-out error beside another's from which a channel counts as worse."""
 HARM_Z = 2.0
@@ -16,12 +13,6 @@ LEAST_EXCITED = 0.1
 """Mean square of an effect on the held-out part, beside that on the fitted one, from which the former can judge it."""
 LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
-
-
-def held_out_masks(model: WrenchModel) -> list[np.ndarray]:
-    """Mask of the held-out rows of every stretch."""
-    rule = training_rule(model.prepared.split, model.segments)
-    return [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in model.rows]
 
 
 def growth(

@@ -62,7 +62,9 @@ def split_runs(recordings: RecordingSet) -> Split:
     if recordings.held_out is not None:
         held = [n for n in names if n in recordings.held_out]
     elif len(names) == 1:
-        return Split((names[0],), (names[0],))
+        time_s = recordings.runs[0].time_s
+        border_s = time_s[0] + (time_s[-1] - time_s[0]) * (1 - HELD_OUT_SHARE)
+        return Split((names[0],), (names[0],), float(border_s))
     else:
         count = max(1, round(len(names) * HELD_OUT_SHARE))
         held = [names[int((k + 0.5) * len(names) / count)] for k in range(count)]
@@ -76,9 +78,11 @@ def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float
     """
     if split.held_out != split.training:
         return lambda run, time_s: run in split.training
-    start = min(s.motion.time_s[0] for s in segments)
-    stop = max(s.motion.time_s[-1] for s in segments)
-    border = start + (stop - start) * (1 - HELD_OUT_SHARE)
+    border = split.border_s
+    if border is None:
+        start = min(s.motion.time_s[0] for s in segments)
+        stop = max(s.motion.time_s[-1] for s in segments)
+        border = start + (stop - start) * (1 - HELD_OUT_SHARE)
 
     def rule(run: str, time_s: float) -> bool | None:
         if abs(time_s - border) < GAP_S / 2:
@@ -86,6 +90,18 @@ def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float
         return bool(time_s < border)
 
     return rule
+
+
+def parts_of(recordings: RecordingSet, split: Split) -> tuple[RecordingSet, RecordingSet]:
+    """The set with its fitted runs alone, and with the runs held out; of a single run its two parts, a gap between."""
+    if split.held_out != split.training:
+        fitted, held = ([r for r in recordings.runs if r.name in names] for names in (split.training, split.held_out))
+    else:
+        (run,) = recordings.runs
+        early = run.time_s < split.border_s - GAP_S / 2
+        late = run.time_s >= split.border_s + GAP_S / 2
+        fitted, held = ([Run(run.name, run.table[mask].reset_index(drop=True))] for mask in (early, late))
+    return tuple(replace(recordings, runs=tuple(runs), held_out=()) for runs in (fitted, held))
 
 
 def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) -> float:
@@ -162,6 +178,8 @@ class Prepared:
     noise: dict[str, float]
     terms: list[Term]
     not_testable: dict[str, str] = field(default_factory=dict)
+    unseen: tuple[str, ...] = ()
+    """Names of the runs held out, of which nothing else is known here."""
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -248,8 +266,16 @@ def form_terms(effect_id: str, form: Form, suggested: tuple[tuple[float, ...], .
     return terms
 
 
-def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str, float] | None = None) -> Prepared:
-    """Segments, noise and terms of a set."""
+def prepare(
+    recordings: RecordingSet,
+    cutoff_hz: float = 20.0,
+    shift_s: dict[str, float] | None = None,
+    unseen: tuple[str, ...] = (),
+) -> Prepared:
+    """Segments, noise and terms of a set; `held_out` () of a set says that all of it is to be fitted.
+
+    `unseen` names runs of the whole set that are not in it.
+    """
     vehicle, split = recordings.vehicle, split_runs(recordings)
     rate_hz, cutoff = analysis_rate_hz(recordings.runs, vehicle, cutoff_hz)
     noise = sensor_noise(recordings.runs, vehicle, cutoff)
@@ -266,9 +292,23 @@ def prepare(recordings: RecordingSet, cutoff_hz: float = 20.0, shift_s: dict[str
             noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng, full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     segments = representative(without_noise(segments))
-    prepared = Prepared(recordings, vehicle, split, segments, noisy, thinner, noise, [])
+    prepared = Prepared(recordings, vehicle, split, segments, noisy, thinner, noise, [], unseen=unseen)
     terms, reasons = make_terms(vehicle, segments, prepared.groups)
     return replace(prepared, terms=terms, not_testable=reasons)
+
+
+def prepare_like(prepared: Prepared, recordings: RecordingSet) -> tuple[list[Segment], list[Segment]]:
+    """Segments of other runs of the same vehicle, and the same with the noise that `prepared` found added once more."""
+    vehicle = prepared.vehicle
+    full = full_speed(prepared.recordings.runs, vehicle)
+    rng = np.random.default_rng(1)
+    segments, noisy = [], []
+    for run in recordings.runs:
+        own = run, vehicle, prepared.segments[0].rate_hz, prepared.thinner.cutoff_hz, None
+        segments += build_segments(*own, full_speed_rad_s=full)
+        noisy += build_segments(*own, prepared.noise, rng, full)
+    noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
+    return representative(without_noise(segments)), noisy
 
 
 def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, np.ndarray]]):

@@ -7,25 +7,36 @@ from collections.abc import Callable
 import numpy as np
 
 from rotorid.mismatch.decide import wrong_values
-from rotorid.mismatch.delivered import Values
+from rotorid.mismatch.delivered import Values, left_out_residuals
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
-from rotorid.mismatch.within_trust import settled
+from rotorid.mismatch.within_trust import settled, settled_keys
 from rotorid.mismatch.wrench import WrenchModel
 
 
 def refitted(prepared: Prepared, model: WrenchModel) -> tuple[Fit, Values]:
-    """The fit of a model's rows by believed values alone, and what it changes of them.
+    """The fit of a model's rows by believed values alone, and what it changes of them."""
+    values = values_alone(model)
+    fit, moved = settled(prepared, model, values, ())
+    return fit, {**moved, **values}
+
+
+def refitted_left_out(prepared: Prepared, model: WrenchModel) -> list[np.ndarray]:
+    """What the refitted vehicle leaves of every stretch where it was not fitted, (n, 12)."""
+    values = values_alone(model)
+    return left_out_residuals(model, settled_keys(prepared, model, values, ())[0], values)
+
+
+def values_alone(model: WrenchModel) -> Values:
+    """The believed values that the recordings contradict where no effect is at work.
 
     Beside a wind no value is called wrong: it acts through the drag.
     """
-    values = {}
-    if model.wind is None:
-        nothing = Selection([], model.selection.fit)
-        values = wrong_values(model.search.regression, model.search, nothing, None, size_of_value(model))
-    fit, moved = settled(prepared, model, values, ())
-    return fit, {**moved, **values}
+    if model.wind is not None:
+        return {}
+    nothing = Selection([], model.selection.fit)
+    return wrong_values(model.search.regression, model.search, nothing, None, size_of_value(model))
 
 
 def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:

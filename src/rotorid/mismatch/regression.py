@@ -20,6 +20,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2, f
 
+from rotorid.mismatch.comparison import LEAST_RUNS, Comparison, environments, folds
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.signal.kernels import causal
 
@@ -127,6 +128,10 @@ class Regression:
     """Number of each run."""
     memory: int = 0
     """Blocks over which the noise of neighbours may still be alike (1/f noise of a sensor at rest)."""
+    block_s: float = 1.0
+    """Length of a block, s."""
+    blocks_of_rows: tuple[np.ndarray, ...] = ()
+    """Of every stretch the block that each of its rows is in, (n,); -1 where it is in none."""
 
     def keys_of(self, *kinds: str) -> list[str]:
         """Keys of the terms of some kinds."""
@@ -147,6 +152,7 @@ class Regression:
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
         self._explained: dict[tuple[str, ...], float] = {}
         self._fits: dict[tuple, Fit] = {}
+        self._left_out: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}
 
     def with_room(self, least: float) -> Regression:
         """The same with believed values that may move by at least a share `least`."""
@@ -273,8 +279,8 @@ class Regression:
                 continue
             column = self.start[term.key]
             where = np.flatnonzero(cols == column)
-            own = self.run == self.names[term.run]
-            if not len(where) or (own & mask).any():
+            own = self.run == self.names.get(term.run, -1)
+            if not own.any() or not len(where) or (own & mask).any():
                 continue
             gram = self.gram[own, column][:, cols].sum(axis=0)
             beta[where] = 0.0
@@ -299,6 +305,85 @@ class Regression:
         normal = gram - bias + np.diag(self.precision[cols])
         beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
         return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
+
+    def folds(self, whole_runs: bool) -> np.ndarray:
+        """Fold of every block (blocks,), -1 for one that is not fitted; blocks of a fold are left out together."""
+        out = np.full(len(self.training), -1)
+        run = self.run[self.training]
+        out[self.training] = folds(environments(run, self.block_s), run, whole_runs)
+        return out
+
+    def left_out(
+        self, keys: Iterable[str], whole_runs: bool, loose: dict[str, float] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Columns (k,) of terms and their coefficients fitted without each fold in turn, (folds, k)."""
+        asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
+        if asked not in self._left_out:
+            if len(self._left_out) > MOST_REMEMBERED:
+                self._left_out.clear()
+            self._left_out[asked] = self._leave_out(*asked)
+        return self._left_out[asked]
+
+    def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray]:
+        cols, fold = self.columns(keys), self.folds(whole_runs)
+        precision = self.precision
+        if loose:
+            precision = precision.copy()
+            for key, sd in loose:
+                precision[self.columns([key])] = 1.0 / sd**2
+        found = []
+        for out in range(fold.max() + 1):
+            mask = self.training & (fold != out)
+            gram, cross, bias, bias_cross = self._normal(cols, mask)
+            normal = gram - bias + np.diag(precision[cols])
+            found.append(bounded(normal, cross - bias_cross, self.limit[cols])[0])
+            self._fit_held_out_scales(cols, found[-1], mask)
+        return cols, np.array(found)
+
+    def compare(
+        self, more: list[str], fewer: list[str], loose: dict[str, float] | None = None, whole_runs: bool | None = None
+    ) -> Comparison:
+        """The model of the terms `more` against that of `fewer`, on environments that neither was fitted on.
+
+        Whole runs are left out where there are enough of them and where what is asked of one run is seen in the
+        others; else environments of every run in turn.
+        """
+        if whole_runs is None:
+            if len(np.unique(self.run[self.training])) < LEAST_RUNS:
+                return self.compare(more, fewer, loose, False)
+            apart = self.compare(more, fewer, loose, True)
+            return apart if apart.answers else self.compare(more, fewer, loose, False)
+        fold = self.folds(whole_runs)
+        environment = environments(self.run[self.training], self.block_s)
+        (cols, a), (others, b) = (self.left_out(keys, whole_runs, loose) for keys in (more, fewer))
+        index = np.flatnonzero(self.training)
+        a, b = a[fold[index]], b[fold[index]]
+        left = [
+            -2 * np.einsum("bk,bk->b", self.cross[np.ix_(index, c)], beta)
+            + np.einsum("bk,bkl,bl->b", beta, self.gram[np.ix_(index, c, c)], beta)
+            for c, beta in ((cols, a), (others, b))
+        ]
+        shift = a.copy()
+        shared = np.isin(cols, others)
+        at = [list(others).index(c) for c in cols[shared]]
+        shift[:, shared] -= b[:, at]
+        gram = self.gram[np.ix_(index, cols, cols)]
+        promised = np.einsum("bk,bkl,bl->b", shift, gram, shift)
+        # What the fitted blocks of each fold hold of the same change of coefficients.
+        every = gram.sum(axis=0)
+        seen = np.empty(len(index))
+        for out in np.unique(fold[index]):
+            own = fold[index] == out
+            one = shift[own][0]
+            seen[own] = one @ (every - gram[own].sum(axis=0)) @ one
+        count = int(environment.max()) + 1
+        size = np.bincount(environment, minlength=count)
+        return Comparison(
+            np.bincount(environment, left[1] - left[0], count),
+            np.bincount(environment, promised, count),
+            np.bincount(environment, seen, count) / size,
+            np.bincount(environment, fold[index], count) / size,
+        )
 
     def shown(self, key: str) -> np.ndarray:
         """Which columns of a term act in any row fitted, (k,)."""
@@ -613,11 +698,16 @@ def build(
     grams, crosses, squares, runs, training = [], [], [], [], []
     bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
     names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
+    blocks_of_rows = []
     for k, r in enumerate(rows):
         size = len(r.y) - longest
+        blocks_of_rows.append(np.full(len(r.y), -1))
         if size < 2:
             continue  # shorter than the whitening reaches: it says nothing
         parts = np.array_split(np.arange(size), max(1, size // per_block))
+        for b, part in enumerate(parts):
+            blocks_of_rows[-1][longest + part] = len(runs) + b
+        blocks_of_rows[-1][:longest] = len(runs)
         gram, cross, square = np.zeros((len(parts), at, at)), np.zeros((len(parts), at)), np.zeros(len(parts))
         for channel, taps in filters.items():
             y, x = whiten(r, channel, taps, longest)
@@ -654,6 +744,8 @@ def build(
         bias_cross,
         filters,
         names,
+        block_s=per_block / rate_hz,
+        blocks_of_rows=tuple(blocks_of_rows),
     )
 
 

@@ -12,8 +12,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rotorid.mismatch.decide import coefficients, relative_change
-from rotorid.mismatch.delivered import Values, delivered_fit, residuals_of, with_sure_nuisances
-from rotorid.mismatch.held_out import growth, held_out_masks
+from rotorid.mismatch.delivered import (
+    Values,
+    judged_rows,
+    left_out_residuals,
+    widely,
+    with_sure,
+    with_sure_nuisances,
+)
+from rotorid.mismatch.held_out import growth
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import PARAMETER_NAMES
@@ -56,19 +63,27 @@ def changes(model: WrenchModel, fit: Fit) -> Values:
 
 
 def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:
-    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong.
+    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong."""
+    keys, moved = settled_keys(prepared, model, values, active)
+    return model.regression.fit(keys, loose=widely(values)), moved
 
-    Those move together, and only if held-out error falls by it in some channel, grows in none, and none of them would
-    move beyond its trust.
+
+def settled_keys(
+    prepared: Prepared, model: WrenchModel, values: Values, active: Sequence[str]
+) -> tuple[list[str], Values]:
+    """Keys of the terms to deliver with those of `active`, and the changes of values that are not called wrong.
+
+    Those values move together, and only if where it was not fitted the error falls by it in some channel, grows in
+    none, and none of them would move beyond its trust.
     """
-    plain = delivered_fit(model, values, active)
-    free = all_values(model, values, active)
-    moved = changes(model, free)
+    plain = with_sure(model, [*values, *active], values)
+    free = with_sure(model, [*model.regression.keys_of("value"), *active], values)
+    moved = changes(model, model.regression.fit(free, loose=widely(values)))
     if strained(model, values, moved):
         return plain, {}
-    held = held_out_masks(model)
     per = max(2, int(prepared.thinner.rate_hz))
-    if not pays(residuals_of(model, plain), residuals_of(model, free), held, per):
+    left = (left_out_residuals(model, keys, values) for keys in (plain, free))
+    if not pays(*left, judged_rows(model), per):
         return plain, {}
     return free, {k: change for k, change in moved.items() if k not in values}
 

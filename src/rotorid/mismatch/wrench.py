@@ -53,11 +53,6 @@ MEMORY_GRID = 37
 
 MOST_INFLATION = 2.0
 """A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
-LEAST_ACTION = 1.0
-"""Size of a term in a channel, in units of its noise, from which it can do harm there."""
-LEAST_BLOCKS = 16
-HARM_Z = 5.0
-"""Standard errors beyond which a channel is worse off on the held-out rows."""
 
 
 @dataclass
@@ -84,6 +79,8 @@ class WrenchModel:
     noisy_segments: list[Segment] = field(default_factory=list)
     contributions: Contributions | None = None
     """What the terms add to the channels as far as their regressors are more than noise."""
+    effects: list[tuple[Form, np.ndarray]] | None = None
+    """Effects that shape the accelerations in the rows' regressors."""
 
     def full_fit(self) -> Fit:
         """The fit of everything in the model, winds of single runs and all."""
@@ -151,7 +148,7 @@ def wrench_model(
         active = model.selection.active
         again = searched(prepared, terms, rows, noisy, left, active, segments, known_sizes)
         model = replace(again, floor=model.floor)
-    return replace(model, segments=segments, noisy_segments=noisy_segments)
+    return replace(model, segments=segments, noisy_segments=noisy_segments, effects=effects)
 
 
 def whole_floor(model: WrenchModel, beta: np.ndarray, segments: list[Segment]) -> np.ndarray:
@@ -203,13 +200,6 @@ def searched(
         cols, coefficients = regression.beyond(values, key, beta) if key not in values else (own, beta)
         return seconds.sizes(cols, coefficients, 1.0 if short else 0.9)
 
-    rule = training_rule(prepared.split, segments)
-    held = [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in rows]
-
-    def harms(key: str, with_it: Fit, without: Fit) -> bool:
-        acts = regression.columns([key])
-        return spoils_a_channel(contributions, held, acts, with_it, without, noise, per)
-
     errors = {t.key for t in terms if t.effect in catalogue() and catalogue()[t.effect].kind == "sensor"}
     fitted_rows = [r for r in rows if r.run in prepared.split.training]
 
@@ -219,7 +209,7 @@ def searched(
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
     confusers = {i: e.confusers for i, e in catalogue().items()}
     known = np.zeros(12) if known_sizes is None else known_sizes
-    ask = Questions(sizes_of, seconds.sizes, known, harms, contradicted, confusers)
+    ask = Questions(sizes_of, seconds.sizes, known, contradicted, confusers)
     search = Search(regression.without_winds(), ask)
     selection = search.run(start)
     if (wide := search.values_alone(selection)) is not None:
@@ -227,39 +217,6 @@ def searched(
         search = Search(wide, ask)
         selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
-
-
-def spoils_a_channel(
-    contributions: Contributions,
-    held: list[np.ndarray],
-    cols: np.ndarray,
-    with_it: Fit,
-    without: Fit,
-    noise: np.ndarray,
-    per: int,
-) -> bool:
-    """Whether a term leaves more of a channel that it acts on than there is without it, held out and beyond doubt.
-
-    Squares are compared by blocks of `per` rows without their outermost eighths, as for the whole.
-    """
-    own = with_it.beta[with_it.places(cols)]
-    rows = contributions.rows
-    parts = (contributions.of(*pair) for pair in ((with_it.columns, with_it.beta), (without.columns, without.beta)))
-    changes, acts = [], np.zeros(12, bool)
-    for r, mask, more, less in zip(rows, held, *parts, strict=True):
-        if mask.sum() < 2 * per:
-            continue
-        blocks = np.array_split(np.flatnonzero(mask), mask.sum() // per)
-        gain = (r.y - less) ** 2 - (r.y - more) ** 2
-        changes += [gain[b].mean(axis=0) for b in blocks]
-        acts |= np.sqrt(((r.x[mask][:, :, cols] @ own) ** 2).mean(axis=0)) > LEAST_ACTION * noise
-    if len(changes) < LEAST_BLOCKS:
-        return False
-    gains = np.sort(np.array(changes)[:, acts], axis=0)
-    cut = len(gains) // 8
-    gains = gains[cut : len(gains) - cut]
-    doubt = gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
-    return bool((gains.mean(axis=0) < -HARM_Z * np.maximum(doubt, 1e-300)).any())
 
 
 def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float) -> dict[int, np.ndarray]:

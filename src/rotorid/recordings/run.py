@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -51,6 +51,8 @@ class Split:
 
     training: tuple[str, ...]
     held_out: tuple[str, ...]
+    border_s: float | None = field(default=None, compare=False)
+    """Of a single run, named on both sides: time at which the fitted part ends and the held-out part begins."""
 
 
 @dataclass(frozen=True)

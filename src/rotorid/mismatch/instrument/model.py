@@ -31,7 +31,7 @@ from rotorid.mismatch.select import (
     COST_PER_EFFECT,
     COST_PER_PARAMETER,
     ENTER_P,
-    EXPECTED_HELD_OUT,
+    LEAST_PROMISE,
     SMALLEST_SIZE,
     UNSTEADY_P,
     UNSTEADY_SHARE,
@@ -202,7 +202,7 @@ class ReadingSearch(Search):
         parameters = sum(self.terms[k].size for k in keys)
         return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
-    def failed_held_out(self, active):
+    def refuted_elsewhere(self, active):
         """The term whose own part should help on the held-out blocks and does most harm there instead.
 
         The other coefficients are held: on an instrument a run may load one axis only, and a believed value that
@@ -223,7 +223,7 @@ class ReadingSearch(Search):
             gains = np.sort(2 * cross @ beta - 2 * (every @ fit.beta) @ beta + own)
             cut = max(1, len(gains) // 8)
             gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
-            if own.sum() > EXPECTED_HELD_OUT and gain < worst:
+            if own.sum() > LEAST_PROMISE and gain < worst:
                 worst, found = gain, key
         return found
 

@@ -1,0 +1,114 @@
+"""One question in many places: does model A predict better than model B where neither was fitted?
+
+The fitted part of a set is cut into environments of at least five seconds, never across runs. Both models are fitted on
+all environments but some and scored on those, so that every environment is scored by coefficients that never saw it
+(leave-one-out over folds of environments; whole runs are left out where there are at least three). Beside what A gains
+on an environment stands what its extra part promises there if its coefficients are right; environments that hardly
+excite it do not vote.
+
+An effect that is at work keeps what it promises, and does so in nearly every environment that excites it. One that
+fills a gap left by another cause gains on average only (Pfister, Bauer and Peters, Learning stable and predictive
+structures in kinetic systems, PNAS 2019, rank terms of differential equations by the same stability).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+ENVIRONMENT_S = 5.0
+LEAST_ENVIRONMENTS = 6
+"""Fewer environments of ENVIRONMENT_S are made shorter ones, so that something is left to compare."""
+SHORTEST_S = 1.0
+MOST_FOLDS = 8
+LEAST_RUNS = 3
+"""Fitted runs from which whole runs are left out."""
+VOTES_FROM = 0.05
+"""Promise of an environment, beside the largest of all, from which it votes."""
+SEEN_ELSEWHERE = 1.0
+"""What the fitted blocks must hold of the same change, beside what is asked of the blocks left out, for these to judge:
+an effect that only one run excites cannot be learnt from the others."""
+ANSWERED = 0.5
+"""Share of all that is promised on environments that may judge, from which leaving out whole runs is an answer."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What model A gains over model B on environments that neither was fitted on, in whitened squares."""
+
+    gained: np.ndarray
+    """(environments,) squares that A leaves less than B."""
+    promised: np.ndarray
+    """(environments,) squares that A's extra part explains there if its coefficients are right."""
+    seen: np.ndarray
+    """(environments,) squares that the same part explains in all that was fitted when this one was left out."""
+    fold: np.ndarray
+    """(environments,) which were left out together."""
+
+    @property
+    def judges(self) -> np.ndarray:
+        """Mask of the environments whose fold asks no more than was seen elsewhere."""
+        asked = np.array([self.promised[self.fold == f].sum() for f in self.fold])
+        return self.seen >= SEEN_ELSEWHERE * asked
+
+    @property
+    def answers(self) -> bool:
+        """Whether enough of what is promised lies where it may be judged."""
+        whole = float(self.promised.sum())
+        return float(self.promised[self.judges].sum()) >= ANSWERED * whole if whole > 0 else False
+
+    @property
+    def votes(self) -> np.ndarray:
+        """Mask of the environments that excite A's extra part and may judge it."""
+        most = float(self.promised.max(initial=0.0))
+        return self.judges & (self.promised > max(VOTES_FROM * most, 1e-12))
+
+    @property
+    def total(self) -> float:
+        """Squares gained over all environments."""
+        return float(self.gained.sum())
+
+    @property
+    def transfer(self) -> float:
+        """Share of what was promised that is gained where it was not fitted; 1 where nothing votes."""
+        own = self.votes
+        promised = float(self.promised[own].sum())
+        return float(self.gained[own].sum()) / promised if promised > 0 else 1.0
+
+    @property
+    def won(self) -> float:
+        """Share of the voting environments in which A is better; 1 where nothing votes."""
+        own = self.votes
+        return float((self.gained[own] > 0).mean()) if own.any() else 1.0
+
+    @property
+    def p_value(self) -> float:
+        """One-sided p-value that A is no better, environments being the independent things (Student's t)."""
+        own = self.gained[self.votes]
+        if len(own) < 2:
+            return 1.0
+        error = float(own.std(ddof=1)) / np.sqrt(len(own))
+        return float(student.sf(own.mean() / error, len(own) - 1)) if error > 0 else float(own.mean() <= 0)
+
+
+def environments(run: np.ndarray, seconds: float) -> np.ndarray:
+    """Number of the environment of every block (n,), given its run's number and the blocks' length in seconds."""
+    total = len(run) * seconds
+    length = max(SHORTEST_S, min(ENVIRONMENT_S, total / LEAST_ENVIRONMENTS))
+    per = max(1, int(round(length / seconds)))
+    out, at = np.zeros(len(run), int), 0
+    for number in np.unique(run):
+        own = np.flatnonzero(run == number)
+        for part in np.array_split(own, max(1, len(own) // per)):
+            out[part] = at
+            at += 1
+    return out
+
+
+def folds(environment: np.ndarray, run: np.ndarray, whole_runs: bool) -> np.ndarray:
+    """Fold of every block (n,): blocks of one fold are left out together, whole runs or environments in turn."""
+    if whole_runs:
+        return np.searchsorted(np.unique(run), run) % MOST_FOLDS
+    return environment % min(MOST_FOLDS, int(environment.max(initial=0)) + 1)
