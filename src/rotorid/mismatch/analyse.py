@@ -16,6 +16,7 @@ from rotorid.mismatch.carried import on_board
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
+from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
@@ -104,7 +105,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         claimed,
     )
     traces = make_traces(seen, found, residuals_of(seen, plain_fit), delivered)
-    return Analysis(
+    analysis = Analysis(
         recordings=recordings,
         split=split,
         believed=prepared.vehicle,
@@ -130,6 +131,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
         instead=instead_of(model, values),
         put_right=within_trust.in_words(moved),
     )
+    return weighed(analysis)
 
 
 def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
@@ -365,14 +367,32 @@ def make_traces(
 
 
 def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
-    """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain."""
-    floor, chain = found.model.floor, found.chain
-    out = {CHANNELS[c]: float(floor[c]) for c in range(6) if np.isfinite(floor[c])}
+    """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain.
+
+    Never less than the sensors' own noise makes of the channel: the whole catalogue may fit that, too.
+    """
+    model, chain = found.model, found.chain
+    own = sensor_floor(model)
+    out = {CHANNELS[c]: float(max(model.floor[c], own[c])) for c in range(6) if np.isfinite(model.floor[c])}
     if chain is not None and found.measured and chain[0].noise_rad_s is not None:
         gain = float(np.sqrt((prepared.thinner.kernel**2).sum()))
         for i in range(prepared.vehicle.rotor_count):
             out[f"rotor_speed_{i + 1}"] = chain[0].noise_rad_s * gain
     return out
+
+
+def sensor_floor(model: WrenchModel) -> np.ndarray:
+    """What the sensors' noise makes of each channel (12,), but no more than the model leaves; 0 where not known."""
+    if model.contributions.noisy is None:
+        return np.zeros(12)
+    pairs = list(zip(model.rows, model.contributions.noisy, strict=True))
+    added = np.concatenate([n.y - r.y for r, n in pairs])
+    full = model.full_fit()
+    left = np.concatenate(
+        [r.y - part for r, part in zip(model.rows, model.contributions.of(full.columns, full.beta), strict=True)]
+    )
+    rms = [np.sqrt(np.mean(x**2, axis=0)) for x in (added, left)]
+    return np.nan_to_num(np.minimum(*rms))
 
 
 def regimes_by_run(segments, prepared: Prepared) -> dict[str, dict[str, np.ndarray]]:

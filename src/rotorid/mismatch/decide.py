@@ -129,8 +129,7 @@ def wrench_findings(
     noise: np.ndarray,
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
 ) -> list[Finding]:
-    """A finding for every term that entered, and for those that looked like something and did not survive.
-    """
+    """A finding for every term that entered, and for those that looked like something and did not survive."""
     effects, rows = catalogue(), contributions.rows
     findings = []
     beside = suggested(search, selection.active)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,6 +13,8 @@ from rotorid.effects.contract import Form
 from rotorid.effects.loading import Instrument, Loading
 from rotorid.recordings import RecordingSet, Split, Vehicle
 
+CLAIMED = ("established", "ambiguous")
+"""Statuses of what is held to be at work."""
 Status = Literal["established", "ambiguous", "suggested", "absorbed", "not_established"]
 
 
@@ -47,6 +49,8 @@ class Finding:
     """For `ambiguous`: the whole class, itself included."""
     gain: tuple[float, float, float] | None = None
     """Held-out rmse ratio (with / without the effect) and its 95 % interval, block bootstrap."""
+    objection: str = ""
+    """Of a `suggested` one: why it is not established."""
     windows: tuple[tuple[str, float, float], ...] = ()
     """(run, start_s, stop_s) where it acts, for effects in part of the flight; empty for always."""
 
@@ -115,3 +119,19 @@ class Analysis:
     def wrong_values(self) -> dict[str, tuple[float, float, float, float]]:
         """Those of `values` that were believed to be something else; a scale that nobody stated is no mismatch."""
         return {name: v for name, v in self.values.items() if math.isfinite(v[0])}
+
+
+def with_status(analysis: Analysis, *statuses: str) -> list[Finding]:
+    """Findings of these statuses, the surest first."""
+    return sorted((f for f in analysis.findings if f.status in statuses), key=lambda f: f.p_value)
+
+
+def one_per_class(findings: Sequence[Finding]) -> list[Finding]:
+    """The surest of each class of alternatives."""
+    kept, seen = [], set()
+    for finding in findings:
+        members = frozenset(finding.alternatives) | {finding.id}
+        if not members & seen:
+            kept.append(finding)
+        seen |= members
+    return kept

@@ -33,7 +33,7 @@ def fitted_part(analysis: Analysis) -> Callable[[str, np.ndarray], np.ndarray]:
 
     Whole runs where there are several; of a single run the stretches that the analysis chose.
     """
-    rule = training_rule(analysis.split, segments_of(analysis))
+    rule = training_rule(analysis.split, [])
     code = {True: 1, False: -1, None: 0}
 
     def part(run: str, time_s: np.ndarray) -> np.ndarray:
@@ -52,7 +52,7 @@ def shares(analysis: Analysis, segments: list[Segment]) -> dict[int, dict[str, l
     for segment in segments:
         by_run.setdefault(segment.run, []).append(segment)
     for number, finding in enumerate(analysis.findings):
-        at_work = finding.status in ("established", "ambiguous")
+        at_work = finding.status in ("established", "ambiguous", "suggested")
         if not at_work or finding.windows or not isinstance(finding.form, Form):
             continue
         series = {run: _series(finding, parts, analysis.improved) for run, parts in by_run.items()}

@@ -1,0 +1,355 @@
+"""A verdict in words: one sentence of at most forty words, and the details that it has no room for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.mismatch.consistency import by_share, carrying, quoted
+from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, one_per_class, with_status
+from rotorid.mismatch.words import (
+    capital,
+    channel_words,
+    effect_words,
+    listed,
+    number,
+    on_the_ground,
+    parameter_words,
+    plus_minus,
+    regime_words,
+    sure,
+)
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.verdict import Channel, Location
+
+MOST_WORDS = 40
+MOST_NAMES = 2
+"""Effects or values that the sentence names; more are counted."""
+NO_BETTER = 0.02
+"""Relative change of an error run forward below which it is neither better nor worse."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the words are made from."""
+
+    analysis: Analysis
+    word: str
+    locations: Sequence[Location]
+    channels: Mapping[str, Channel]
+    """Of the inverse dynamics, or of the reading."""
+    shares: Mapping[str, float]
+    left: float
+    """Share of the mismatch that is left."""
+    forward: Mapping[str, Channel]
+
+
+def spoken(text: str, analysis: Analysis) -> str:
+    """A text about flights as it is said of this kind of set."""
+    return text if analysis.recordings.vehicle.kind == "flight" else on_the_ground(text)
+
+
+def first_words(text: str, most: int = MOST_WORDS) -> str:
+    """A text cut at its last whole clause within so many words."""
+    words = text.split()
+    if len(words) <= most:
+        return text
+    short = " ".join(words[:most])
+    ends = [short.rfind(mark) for mark in (";", ":", ",")]
+    return short[: max(ends)] if max(ends) > 0 else short
+
+
+def headline(told: Told) -> str:
+    """What a pilot is told in at most MOST_WORDS words: where and how much, what was left out, how much better."""
+    analysis = told.analysis
+    if told.word == "no_mismatch":
+        return _agreement(analysis, told.channels)
+    stated = with_status(analysis, *CLAIMED)
+    if stated and all(_concerns_the_recording(f) for f in stated) and not analysis.wrong_values:
+        rest = "" if told.word == "explained" else f" {_rest(told)}"
+        return first_words(f"{_put_right(stated)}{rest}")
+    main = main_channel(analysis, told.locations, told.channels)
+    where = _where(main, told.locations, told.channels, analysis)
+    causes = _causes(told)
+    if not causes:
+        return first_words(f"{where}; {_rest(told)}")
+    better = _better_in_short(main, told.channels)
+    rest = "" if told.word == "explained" else f"; {100 * told.left:.0f} % stays unexplained"
+    for parts in (
+        (where, causes, better, rest),
+        (where, causes, "", rest),
+        (off_words(main, told.channels), causes, "", rest),
+    ):
+        text = f"{parts[0]}; {parts[1]}{parts[2]}{parts[3]}."
+        if len(text.split()) <= MOST_WORDS:
+            return capital(text)
+    return first_words(capital(f"{causes}{rest}."))
+
+
+def details(told: Told) -> list[str]:
+    """What the sentence has no room for: each effect with its numbers and share, values, what is left, what is run
+    forward."""
+    analysis, out = told.analysis, []
+    for finding in by_share(with_status(analysis, "established"), told.shares):
+        out.append(_left_out(finding, told.shares.get(finding.id)))
+    out += [_either(f, analysis) for f in by_share(one_per_class(with_status(analysis, "ambiguous")), told.shares)]
+    out += [_wrong(name, values, analysis.instead.get(name, ())) for name, values in analysis.values.items()]
+    if told.word != "no_mismatch" and (with_status(analysis, *CLAIMED) or analysis.wrong_values):
+        main = main_channel(analysis, told.locations, told.channels)
+        out.append(_better(main, told.channels, analysis.put_right))
+        out += _worse(told.channels)
+    for finding in by_share(with_status(analysis, "suggested"), told.shares):
+        name, numbers = capital(effect_words(finding.id)), _parameters(finding)
+        out.append(f"{name} is suggested{f' ({numbers})' if numbers else ''}, not established: {finding.objection}.")
+    if told.word in ("partly_explained", "unexplained"):
+        out.append(
+            capital(_rest(told))
+            + (f" {capital(analysis.unexplained_description)}." if analysis.unexplained_description else "")
+        )
+    out += _run_forward(told.forward)
+    return [text for text in out if text]
+
+
+def _causes(told: Told) -> str:
+    """Effects and values that carry nine tenths of the error, in a clause."""
+    analysis = told.analysis
+    stated = [f for f in one_per_class(with_status(analysis, *CLAIMED)) if not _concerns_the_recording(f)]
+    names = []
+    for finding in carrying(stated, told.shares):
+        either = dict.fromkeys((finding.id, *(finding.alternatives if finding.status == "ambiguous" else ())))
+        names.append(listed([effect_words(i) for i in either], "or"))
+    clauses = []
+    if names:
+        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+        shown = f"{', '.join(names[:MOST_NAMES])}{more}" if more else listed(names)
+        clauses.append(f"{shown} {'was' if len(names) == 1 else 'were'} left out")
+    wrong = list(analysis.wrong_values.items())
+    for name, values in wrong[: max(1, MOST_NAMES - len(names))]:
+        words, unit = parameter_words(name)
+        clauses.append(f"the {words} is {number(values[1], 3)} {unit}, not {number(values[0], 3)}".replace("  ", " "))
+    if len(wrong) > max(1, MOST_NAMES - len(names)):
+        clauses.append(f"{len(wrong) - max(1, MOST_NAMES - len(names))} more values are wrong")
+    return listed(clauses)
+
+
+def _put_right(stated: Sequence[Finding]) -> str:
+    """Faults of the recording, put right before any physics was looked at."""
+    texts = [capital(f.sentence.rstrip(".")) for f in stated]
+    return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
+
+
+def off_words(main: str, channels: Mapping[str, Channel]) -> str:
+    """How much a channel is off, in words."""
+    if not main:
+        return "the model and the recordings differ"
+    return f"the {channel_words(main)} is {number(quoted(channels[main]).before)} {channels[main].unit} off"
+
+
+def _better_in_short(main: str, channels: Mapping[str, Channel]) -> str:
+    errors = quoted(channels[main]) if main else None
+    if errors is None or errors.before is None or errors.after is None:
+        return ""
+    unit, floor = channels[main].unit, number(channels[main].noise_floor)
+    if errors.after >= errors.before:
+        return f"; the error is not smaller with this ({number(errors.after)} {unit})"
+    return f"; the error falls to {number(errors.after)} {unit} (noise {floor})"
+
+
+def _worse(channels: Mapping[str, Channel]) -> list[str]:
+    """A warning for every channel that is worse on the runs held out."""
+    out = []
+    for name, channel in channels.items():
+        errors = quoted(channel)
+        if errors.before and errors.after and errors.after > 1.1 * max(errors.before, channel.noise_floor or 0.0):
+            out.append(
+                f"Warning: the {channel_words(name)} is worse with this, {number(errors.before)} before and "
+                f"{number(errors.after)} {channel.unit} after."
+            )
+    return out
+
+
+def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
+    """What the improved vehicle does for the simulation run forward, channel by channel."""
+    groups: dict[str, list[str]] = {"better": [], "no better": [], "worse": []}
+    for name, channel in forward.items():
+        errors = quoted(channel)
+        if not errors.before or errors.after is None:
+            continue
+        change = errors.after / errors.before - 1.0
+        word = "better" if change < -NO_BETTER else "worse" if change > NO_BETTER else "no better"
+        groups[word].append(
+            f"{name.replace('_', ' ')} ({number(errors.before)} before, {number(errors.after)} {channel.unit} after)"
+        )
+    if not any(groups.values()):
+        return []
+    texts = [f"{word}: {listed(own)}" for word, own in groups.items() if own]
+    out = [f"Simulated forward for half a second with the improved vehicle, {'; '.join(texts)}."]
+    if groups["worse"]:
+        out.append(
+            f"Warning: the simulation run forward is worse in {listed([g.split(' (')[0] for g in groups['worse']])}."
+        )
+    return out
+
+
+def _concerns_the_recording(finding: Finding) -> bool:
+    """Whether a finding is a fault of the recording itself, put right before any physics was looked at."""
+    return finding.form is None and not finding.equation and bool(finding.sentence)
+
+
+def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]) -> str:
+    """The channel in which the mismatch stands out most: its error before over its noise.
+
+    Of the channels located, those of what was named come first.
+    """
+    inverse = [t.channel for t in analysis.traces]
+    there = [loc.channel for loc in locations if loc.channel in channels]
+    named = [c for f in with_status(analysis, *CLAIMED) for c in f.channels if c in there]
+    pool = named or there or inverse
+
+    def excess(name):
+        errors = quoted(channels[name])
+        before, after = errors.before or 0.0, errors.after or 0.0
+        removed = (
+            math.sqrt(max(before**2 - after**2, 0.0))
+            if with_status(analysis, *CLAIMED) or analysis.wrong_values
+            else before
+        )
+        return removed / max(channels[name].noise_floor or after or 1e-12, 1e-12)
+
+    return max(dict.fromkeys(pool), key=excess) if pool else ""
+
+
+def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Channel], analysis: Analysis) -> str:
+    if not main:
+        return off_words(main, channels)
+    here = [loc for loc in locations if loc.channel == main]
+    off = off_words(main, channels)
+    if not here:
+        return off
+    best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
+    doubt = f" ({sure(best.p_value if best.p_value is not None else 1.0)})"
+    return f"{_when(best, here, analysis)}{off}{doubt}"
+
+
+def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
+    """Lead-in that says in which regime, else at what time, the mismatch shows."""
+    regime = best.regime
+    if regime is not None and regime.variable != "time_s" and regime.low is not None and regime.high is not None:
+        name, unit = regime_words(regime.variable)
+        space = f" {unit}" if unit else ""
+        flown = np.concatenate([r[regime.variable] for r in analysis.regimes.values() if regime.variable in r])
+        to_the_end = regime.high >= np.nanquantile(flown, 0.98)
+        from_the_start = regime.low <= np.nanquantile(flown, 0.02)
+        if from_the_start and not to_the_end:
+            return f"up to {number(regime.high)}{space} of {name}, "
+        if to_the_end and not from_the_start:
+            return f"from {number(regime.low)}{space} of {name} on, "
+        if not to_the_end:
+            return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "
+        return ""
+    if best.energy_share < 0.99 and best.start_s is not None and best.stop_s is not None:
+        more = f" (and in {len(here) - 1} more stretches)" if len(here) > 1 else ""
+        return f"from {best.start_s:.1f} to {best.stop_s:.1f} s of {best.run}{more}, "
+    return ""
+
+
+def _parameters(finding: Finding) -> str:
+    shown = [
+        f"{e.symbol} = {plus_minus(e.value, e.low, e.high)}{' ' + e.unit if e.unit not in ('', '-', '1') else ''}"
+        for e in surest(finding.parameters)
+    ]
+    return listed(shown)
+
+
+def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
+    """The parameters that are furthest from zero beside their intervals, in their order."""
+
+    def beyond(e: Estimate) -> float:
+        width = e.high - e.low
+        return abs(e.value) / max(width, 1e-12 * abs(e.value), 1e-300) if np.isfinite(width) else 0.0
+
+    kept = sorted(range(len(parameters)), key=lambda k: -beyond(parameters[k]))[:most]
+    return [parameters[k] for k in sorted(kept)]
+
+
+def _left_out(finding: Finding, share: float | None) -> str:
+    """An established effect with its numbers and the share of the error that it takes away."""
+    named, sentence, parameters = capital(effect_words(finding.id)), finding.sentence.rstrip("."), _parameters(finding)
+    carries = "" if share is None else f", {100 * share:.0f} % of the error that goes"
+    numbers = f" ({parameters}{carries})" if parameters else f" ({carries[2:]})" if carries else ""
+    return f"{named} was left out{f': {sentence}' if sentence else ''}{numbers}."
+
+
+def _either(finding: Finding, analysis: Analysis) -> str:
+    names = [effect_words(i) for i in dict.fromkeys((finding.id, *finding.alternatives))]
+    text = f"{capital('either ' if len(names) > 1 else '')}{listed(names, 'or')} was left out"
+    text += "; this recording cannot tell which" if len(names) > 1 else "; this recording cannot settle it"
+    # The next experiment is made for one class; it need not help with another.
+    helps = analysis.next_manoeuvre and (not analysis.next_separates or finding.id in analysis.next_separates)
+    return f"{text}, but this would: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
+
+
+def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = ()) -> str:
+    believed, refitted, low, high = values
+    words, unit = parameter_words(name)
+    space = f" {unit}" if unit else ""
+    if not np.isfinite(believed):
+        return f"The {words} is {plus_minus(refitted, low, high)}{space}; nothing was believed about it."
+    # Of a ratio that alone is known the least trusted value is called wrong; the reader may know better.
+    other = f" (or, what explains as much here: {listed(list(instead), 'or')})" if instead else ""
+    value = plus_minus(refitted, low, high)
+    return f"The {words} is {value}{space}, not the {number(believed, 4)}{space} believed{other}."
+
+
+def _better(main: str, channels: Mapping[str, Channel], put_right: Sequence[str] = ()) -> str:
+    if not main:
+        return ""
+    channel = channels[main]
+    errors, where = quoted(channel), _said_of(channel)
+    noise = number(channel.noise_floor)
+    if errors.before is not None and errors.after is not None and errors.after >= errors.before:
+        return (
+            f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
+            f"{number(errors.after)} {channel.unit} after."
+        )
+    also = f", and what was believed put right within its trust ({listed(list(put_right))})," if put_right else ""
+    return (
+        f"With this{also} the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
+        f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."
+    )
+
+
+def _said_of(channel: Channel) -> str:
+    held = channel.rmse.held_out.after is not None
+    return "on flights not used for fitting" if held else "on the flight it was fitted to"
+
+
+def _rest(told: Told) -> str:
+    analysis = told.analysis
+    depends = [regime_words(v)[0] for v in analysis.unexplained_depends_on]
+    if with_status(analysis, *CLAIMED) or analysis.wrong_values:
+        text = f"{100 * told.left:.0f} % of the mismatch stays unexplained"
+    else:
+        text = "none of the known effects explains it"
+    if depends:
+        text += f"; what is left depends on {listed(depends)}"
+    return text + "."
+
+
+def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
+    shown = [c for c in ("force_z", "force_x", "moment_x", "moment_z") if c in channels] or list(channels)
+    chosen = shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]
+    errors = [
+        f"the {channel_words(c)} is {number(quoted(channels[c]).after)} {channels[c].unit} off "
+        f"(noise {number(channels[c].noise_floor)})"
+        for c in chosen
+    ]
+    moved = f", values put right within their trust ({listed(list(analysis.put_right))})" if analysis.put_right else ""
+    where = _said_of(channels[chosen[0]])
+    text = f"The believed vehicle describes these recordings{moved}: {where}, {listed(errors)}."
+    return text if len(text.split()) <= MOST_WORDS else text.replace(moved, "")
