@@ -25,12 +25,13 @@ from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
-from rotorid.mismatch.prepare import Prepared, parts_of, prepare, split_runs
+from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.refitted import refitted
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
+from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import (
     changed_vehicle,
@@ -377,7 +378,7 @@ def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
     if chain is not None and found.measured and chain[0].noise_rad_s is not None:
         gain = float(np.sqrt((prepared.thinner.kernel**2).sum()))
         for i in range(prepared.vehicle.rotor_count):
-            out[f"rotor_speed_{i + 1}"] = chain[0].noise_rad_s * gain
+            out[f"rotor_speed_{i + 1}"] = max(chain[0].noise_rad_s, prepared.noise.get("rotors", 0.0)) * gain
     return out
 
 

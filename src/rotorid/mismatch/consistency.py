@@ -23,7 +23,7 @@ EXPLAINED_SHARE = 0.15
 UNEXPLAINED_SHARE = 0.85
 """From this share on the findings are said to explain nothing that matters."""
 PLAINLY_OFF = 1.5
-"""Error of a channel on the runs held out, in units of its noise floor, from which it is a mismatch, wherever it is."""
+"""Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is."""
 NINE_TENTHS = 0.9
 
 
@@ -82,8 +82,9 @@ def missing_places(
     if not there and not analysis.wrong_values:
         out |= {c: analysis.p_values.get(c, (1.0, 1.0))[1] for c in analysis.unexplained_channels if c in channels}
     for name, channel in channels.items():
-        off = quoted(channel).before
-        if name not in there and off is not None and channel.noise_floor and off > PLAINLY_OFF * channel.noise_floor:
+        errors = [e.before for e in (channel.rmse.held_out, channel.rmse.training) if e.before is not None]
+        wrench = name.split("_")[0] in ("force", "moment")
+        if wrench and name not in there and max(errors, default=0.0) > PLAINLY_OFF * (channel.noise_floor or np.inf):
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])
     return [(c, p) for c, p in out.items() if c not in {location.channel for location in locations}]
 

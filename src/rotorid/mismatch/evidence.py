@@ -21,7 +21,8 @@ ACTS = 1 / 3
 """Contribution to a channel, in units of its noise and beside the strongest, from which an effect acts there."""
 BLOCK_S = 2.0
 """Length of the blocks that the bootstrap draws: longer than residuals are alike."""
-LEAST_BLOCKS = 4
+LEAST_BLOCKS = 6
+"""Blocks that the bootstrap needs; less than BLOCK_S each where little is held out."""
 BOOTSTRAPS = 400
 LEAST_EXCITED = 0.1
 """Size of a contribution on the runs held out, beside that on the fitted ones, below which they are silent."""
@@ -76,9 +77,10 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray]) -> Find
     if finding.status not in CLAIMED or finding.id not in analysis.without:
         return finding
     without = analysis.without[finding.id]
-    if finding.windows:
-        held = [in_windows(t, finding.windows) for t in analysis.traces]
     found = evidence(analysis, without, held)
+    if finding.windows and not found.ratios:
+        # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
+        found = evidence(analysis, without, [in_windows(t, finding.windows) for t in analysis.traces])
     reason = found.objection or ("" if away_from_nothing(finding) else "every number of it may be nothing")
     best = found.ratios[0] if found.ratios else None
     finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))
@@ -126,14 +128,15 @@ def leftover_rms(analysis: Analysis, held: list[np.ndarray], channel: str) -> fl
 def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], held: list[np.ndarray], channel: str) -> Ratio | None:
     """Error of a channel with an effect over that without, block bootstrap; None with fewer than LEAST_BLOCKS."""
     energies = []
-    for trace, left, mask in zip(analysis.traces, without, held, strict=True):
+    own = [(t, x, m) for t, x, m in zip(analysis.traces, without, held, strict=True) if t.channel == channel]
+    period_s = min((float(np.median(np.diff(t.time_s))) for t, _, _ in own if len(t.time_s) > 1), default=BLOCK_S)
+    block_s = min(BLOCK_S, period_s * sum(int(m.sum()) for _, _, m in own) / (2 * LEAST_BLOCKS))
+    for trace, left, mask in own:
         index = np.flatnonzero(mask & np.isfinite(trace.after) & np.isfinite(left))
-        if trace.channel != channel or not len(index):
-            continue
-        period_s = float(np.median(np.diff(trace.time_s))) if len(trace.time_s) > 1 else BLOCK_S
-        per = max(1, int(round(BLOCK_S / period_s)))
-        for rows in np.array_split(index, max(1, len(index) // per)):
-            energies.append((float(trace.after[rows] @ trace.after[rows]), float(left[rows] @ left[rows])))
+        if len(index):
+            per = max(1, int(block_s / period_s))
+            for rows in np.array_split(index, max(1, len(index) // per)):
+                energies.append((float(trace.after[rows] @ trace.after[rows]), float(left[rows] @ left[rows])))
     if len(energies) < LEAST_BLOCKS:
         return None
     e = np.array(energies)

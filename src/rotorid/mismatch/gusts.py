@@ -184,15 +184,19 @@ def with_gusts_of_new_runs(model: WrenchModel, segments: list[Segment], noisy: l
     full = model.full_fit()
     left = [r.y - r.x[:, :, full.columns] @ full.beta for r in rows]
     parts = zip(segments, rows, left, strict=True)
-    found = [(s.run, windows(part[:, :3], rotation_at(s, r), r.time_s)) for s, r, part in parts]
+    if any(g.window[2] - g.window[1] > 0.9 * length_of(model, g.run) for g in model.gusts):
+        # The wind never rests in the fitted runs: it is looked for everywhere.
+        times = [s.motion.time_s for s in segments]
+        asked = [wind_term(s.run, knots_of(t[0], t[-1], RESTLESS_KNOT_S)) for s, t in zip(segments, times, strict=True)]
+    else:
+        found = [(s.run, windows(part[:, :3], rotation_at(s, r), r.time_s)) for s, r, part in parts]
+        asked = [wind_term(run, knots_of(a, b, KNOT_S)) for run, own in strongest(found) for a, b, _ in own]
     winds = {}
-    for run, own in strongest(found):
-        for start, stop, _ in own:
-            term = wind_term(run, knots_of(start, stop, KNOT_S))
-            wind = wind_in(model, [s for s in segments if s.run == run], term)
-            gust = Gust(run, np.array(term.values), wind.reshape(2, -1).T, np.eye(len(wind)), 0.0)
-            if size_of(gust, model, segments) > BESIDE_A_BURST:
-                winds[term.key] = (term, wind)
+    for term in asked:
+        wind = wind_in(model, [s for s in segments if s.run == term.run], term)
+        gust = Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, np.eye(len(wind)), 0.0)
+        if size_of(gust, model, segments) > BESIDE_A_BURST:
+            winds[term.key] = (term, wind)
     return in_gusts(segments, winds), in_gusts(noisy, winds) if noisy else noisy
 
 

@@ -30,12 +30,12 @@ from rotorid.mismatch.rows import (
 from rotorid.mismatch.rows import (
     measured_moment as moment_of,
 )
+from rotorid.mismatch.split import HELD_OUT_SHARE, split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS, can_show
 from rotorid.mismatch.voltmeter import without_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
-HELD_OUT_SHARE = 1 / 3
 GAP_S = 2.0
 """Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
@@ -51,24 +51,6 @@ PIECE_SAMPLES, SMOOTHED = 256, 9
 are averaged."""
 MOST_NOISE_SAMPLES = 8192
 """Samples of a column that its noise level is read from."""
-
-
-def split_runs(recordings: RecordingSet) -> Split:
-    """Training and held-out runs: as `split.yaml` says, else about a third held out, spread evenly in time.
-
-    A single run is named on both sides: its last third is held out.
-    """
-    names = [run.name for run in recordings.runs]
-    if recordings.held_out is not None:
-        held = [n for n in names if n in recordings.held_out]
-    elif len(names) == 1:
-        time_s = recordings.runs[0].time_s
-        border_s = time_s[0] + (time_s[-1] - time_s[0]) * (1 - HELD_OUT_SHARE)
-        return Split((names[0],), (names[0],), float(border_s))
-    else:
-        count = max(1, round(len(names) * HELD_OUT_SHARE))
-        held = [names[int((k + 0.5) * len(names) / count)] for k in range(count)]
-    return Split(tuple(n for n in names if n not in held), tuple(held))
 
 
 def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float], bool | None]:

@@ -325,6 +325,10 @@ class Regression:
         return self._left_out[asked]
 
     def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray]:
+        kinds = {t.key: t for t in self.terms}
+        winds = [k for k in keys if kinds[k].kind == "wind" and kinds[k].run]
+        if winds:
+            return self._leave_out_in_wind([k for k in keys if k not in winds], winds, whole_runs, loose)
         cols, fold = self.columns(keys), self.folds(whole_runs)
         precision = self.precision
         if loose:
@@ -339,6 +343,17 @@ class Regression:
             found.append(bounded(normal, cross - bias_cross, self.limit[cols])[0])
             self._fit_held_out_scales(cols, found[-1], mask)
         return cols, np.array(found)
+
+    def _leave_out_in_wind(self, keys, winds, whole_runs, loose) -> tuple[np.ndarray, np.ndarray]:
+        """The same where winds of single runs blow: they belong to the run and are found in it, left out or not."""
+        cols, betas = self.without_winds().left_out(keys, whole_runs, dict(loose))
+        own = self.columns(winds)
+        both = np.concatenate([cols, own])
+        gram, cross, bias, bias_cross = self._normal(both, self.training)
+        normal, right, count = gram - bias + np.diag(self.precision[both]), cross - bias_cross, len(cols)
+        inverse = ridge_inverse(normal[count:, count:])
+        blowing = (right[count:, None] - normal[count:, :count] @ betas.T).T @ inverse
+        return both, np.concatenate([betas, blowing], axis=1)
 
     def compare(
         self, more: list[str], fewer: list[str], loose: dict[str, float] | None = None, whole_runs: bool | None = None

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 MOST_WORDS = 40
 MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
+WORTH_SAYING_P = 0.05
 NO_BETTER = 0.02
 """Relative change of an error run forward below which it is neither better nor worse."""
 
@@ -232,7 +233,7 @@ def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Chan
     if not here:
         return off
     best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
-    doubt = f" ({sure(best.p_value if best.p_value is not None else 1.0)})"
+    doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < WORTH_SAYING_P else ""
     return f"{_when(best, here, analysis)}{off}{doubt}"
 
 

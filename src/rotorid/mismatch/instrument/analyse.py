@@ -16,9 +16,17 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS, UNITS
 from rotorid.mismatch.analyse import throttle_or_thrust
 from rotorid.mismatch.decide import wrong_values
-from rotorid.mismatch.findings import Analysis, Finding, Trace
+from rotorid.mismatch.evidence import weighed
+from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_company
-from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved, speed_traces, supply_reason
+from rotorid.mismatch.instrument.chain import (
+    ChainResult,
+    find_chain,
+    moved,
+    speed_traces,
+    supply_reason,
+    without_id,
+)
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
 from rotorid.mismatch.instrument.company import without_remainders
 from rotorid.mismatch.instrument.decide import findings_of
@@ -29,6 +37,7 @@ from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
 from rotorid.mismatch.instrument.useful import without_useless
 from rotorid.mismatch.instrument.values import Values, curved_gains, delivered, settled, without_needless
+from rotorid.mismatch.leave_one_out import first_s
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -133,7 +142,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
             depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
             description = "; ".join([*([description] if description else []), SPEED_LEFT])
     known = {f.id for f in findings if f.status in ("established", "ambiguous")}
-    return Analysis(
+    analysis = Analysis(
         recordings=recordings,
         split=setup.split,
         believed=setup.vehicle,
@@ -159,7 +168,38 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         loadings=model.loadings,
         notes=(*remarks, *notes_of(setup)),
         put_right=in_words(moved_values, VALUE_NAMES),
+        without=without_each(setup, model, values, chain if measured else None, findings, traces),
     )
+    return weighed(analysis)
+
+
+def without_each(
+    setup: Setup, model: ReadingModel, values: Values, chain: ChainResult | None, findings: list[Finding], traces
+) -> dict[str, tuple[np.ndarray, ...]]:
+    """To the id of every stated effect what is left of every trace without it, all else fitted anew.
+
+    `chain` is what lies between command and speed where both are measured. Where only commands are known, what lies
+    between is not taken apart, nor is a mistake of the set.
+    """
+    out, active = {}, model.selection.active
+    names = {f.id for f in findings if f.status in CLAIMED}
+    for effect in dict.fromkeys(model.search.terms[k].effect for k in active):
+        if effect in names:
+            fewer = settled(model, values, [k for k in active if model.search.terms[k].effect != effect])[0]
+            out[effect] = on_traces(traces, [(r.run, r.time_s) for r in model.rows], delivered(model, fewer))
+    for key in [] if chain is None else [k for k, _ in chain.fit.chain if k in names and k not in out]:
+        own = speed_traces(setup, without_id(setup, chain, key))
+        left = {(t.run, t.channel, first_s(t.time_s)): t.after for t in own}
+        out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
+    return out
+
+
+def on_traces(traces, parts: list[tuple[str, np.ndarray]], left: list[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Residuals (n, 6) of parts (run, time_s) on the traces; what is delivered where a trace is of none of them."""
+    known = {}
+    for (run, time_s), values in zip(parts, left, strict=True):
+        known |= {(run, name, first_s(time_s)): values[:, c] for c, name in enumerate(CHANNELS)}
+    return tuple(known.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
 
 
 def approximate_forms(model: ReadingModel, company) -> list[str]:

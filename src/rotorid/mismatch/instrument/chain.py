@@ -784,6 +784,15 @@ def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
     return tuple(out)
 
 
+def without_id(setup: Setup, result: ChainResult, key: str) -> ChainResult:
+    """The result with one id less between command and speed, the numbers of the others as they are."""
+    problem, fit = Problem(setup, holds=result.holds), result.fit
+    rest = tuple((k, f) for k, f in fit.chain if k != key)
+    known = int(problem.scaled) + sum(len(f.parameters) for _, f in fit.chain)
+    theta = np.delete(np.asarray(fit.theta)[:known], np.arange(known)[place_of(fit.chain, key, problem.scaled)])
+    return replace(result, fit=replace(fit, chain=rest, theta=theta))
+
+
 def speed_traces(setup: Setup, result: ChainResult) -> tuple[Trace, ...]:
     """Measured less commanded and less modelled speed of every rotor, where both are recorded."""
     problem = Problem(setup, holds=result.holds)
