@@ -9,8 +9,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
 from rotorid.errors import InputError
-from rotorid.mismatch.findings import Analysis, Finding
-from rotorid.mismatch.verdict import one_per_class, with_status
+from rotorid.mismatch.findings import Analysis, Finding, one_per_class, with_status
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import ActiveForm, active_forms
 
@@ -29,11 +28,13 @@ class Model:
 
 
 def modelled(analysis: Analysis) -> list[Finding]:
-    """Findings that the improved model holds: the established ones, and one of each class of alternatives.
+    """Findings that the improved model holds: the established ones, one of each class of alternatives, and what was
+    chosen with them and is only suggested by the runs held out, which change no model.
 
     A force in windows of one run (a gust) is no property of the vehicle: it would blow in every flight simulated.
     """
     found = with_status(analysis, "established") + one_per_class(with_status(analysis, "ambiguous"))
+    found += [f for f in with_status(analysis, "suggested") if f.id in analysis.without]
     chosen = {id(f) for f in found if form_of(f) is not None and not (f.windows and isinstance(form_of(f), Form))}
     return [f for f in analysis.findings if id(f) in chosen]
 

@@ -26,12 +26,12 @@ from scipy.optimize import nnls
 from scipy.stats import chi2, f
 
 from rotorid.mismatch.between_runs import apart
-from rotorid.mismatch.findings import Analysis, Trace
+from rotorid.mismatch.findings import Analysis, Trace, with_status
 from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.shares import effort, segments_of, shares
-from rotorid.mismatch.verdict import SMALLEST_P, Location, Regime, rms, with_status
+from rotorid.mismatch.verdict import SMALLEST_P, Location, Regime, rms
 from rotorid.signal.kernels import causal
 
 FAMILY_ERROR = 0.002

@@ -1,0 +1,108 @@
+"""The runs held out change no model, and a verdict says what its own numbers say."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from rotorid.mismatch.analyse import analyse
+from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
+from rotorid.mismatch.deliver import verdict_of
+from rotorid.mismatch.prepare import parts_of
+from rotorid.mismatch.split import split_runs
+from rotorid.recordings import RecordingSet, Run
+from tests.unit.mismatch.flights import Flight
+
+HELD = "run02"
+
+
+@cache
+def recordings() -> RecordingSet:
+    """Three flights with a drag that the believed vehicle lacks, the second held out."""
+    flights = {f"run0{k}": Flight(k, 14.0, drag=0.6) for k in (1, 2, 3)}
+    runs = tuple(flight.record(100.0, name=name) for name, flight in flights.items())
+    return RecordingSet("made", flights["run01"].vehicle, runs, held_out=(HELD,))
+
+
+def disturbed(size_m_s2: float) -> RecordingSet:
+    """The set with a slow force in the run held out that no effect makes."""
+    whole = recordings()
+
+    def changed(run: Run) -> Run:
+        if run.name != HELD:
+            return run
+        table = run.table.copy()
+        wave = size_m_s2 * np.sin(2 * np.pi * 0.4 * run.time_s)
+        for name in ("specific_force_x_m_s2", "specific_force_y_m_s2"):
+            table[name] = table[name] + wave
+        return Run(run.name, table)
+
+    return replace(whole, runs=tuple(changed(r) for r in whole.runs))
+
+
+@cache
+def analysed(size_m_s2: float):
+    return analyse(disturbed(size_m_s2))
+
+
+def test_what_is_chosen_does_not_depend_on_the_runs_held_out():
+    plain, other = analysed(0.0), analysed(1.5)
+    chosen = [[(f.id, f.values, f.parameters) for f in a.findings if f.id in a.without] for a in (plain, other)]
+    assert chosen[0] == chosen[1] and chosen[0]
+    assert plain.improved == other.improved and plain.refitted == other.refitted and plain.values == other.values
+
+
+def test_the_runs_held_out_lower_a_word():
+    assert {f.id: f.status for f in analysed(0.0).findings}["rotor_drag"] == "established"
+    found = {f.id: f for f in analysed(30.0).findings}["rotor_drag"]
+    assert found.status == "suggested" and "held out" in found.objection
+
+
+@pytest.mark.parametrize("size_m_s2", [0.0, 1.5, 30.0])
+def test_a_reader_with_a_pocket_calculator_gets_the_same_word(size_m_s2):
+    told = json.loads(verdict_of(analysed(size_m_s2)).text())
+    located = {place["channel"] for place in told["locations"]} & set(told["channels"])
+    before = after = noise = 0.0
+    for channel in (told["channels"][name] for name in located):
+        errors, floor = channel["rmse"]["held_out"], channel["noise_floor"]
+        before, after, noise = before + (errors["before"] / floor) ** 2, after + (errors["after"] / floor) ** 2, noise + 1
+    left = min(1.0, max(0.0, after - noise) / max(before - noise, noise))
+    assert told["unexplained"]["share"] == pytest.approx(left, rel=1e-4, abs=1e-4)
+    claims = [e for e in told["effects"] if e["status"] in ("established", "ambiguous")]
+    if claims or told["parameters"]:
+        word = "explained" if left <= EXPLAINED_SHARE else "partly_explained" if left < UNEXPLAINED_SHARE else "unexplained"
+        assert told["verdict"] == word
+    else:
+        assert told["verdict"] == "unexplained"
+    assert len(told["sentence"].split()) <= 40 and all(len(e["sentence"].split()) <= 40 for e in told["effects"])
+
+
+def test_established_effects_better_a_channel_and_come_in_the_order_of_their_shares():
+    told = json.loads(verdict_of(analysed(0.0)).text())
+    stated = [e for e in told["effects"] if e["status"] == "established"]
+    assert stated and all(e["held_out_gain"]["interval_95"][1] < 1.0 for e in stated)
+    shares = [e["share"] for e in stated]
+    assert shares == sorted(shares, reverse=True) and shares[0] > 0.5
+
+
+def test_a_single_run_is_cut_in_two_with_a_gap():
+    (run, *_) = recordings().runs
+    single = replace(recordings(), runs=(run,), held_out=None)
+    split = split_runs(single)
+    fitted, held = parts_of(single, split)
+    assert fitted.runs[0].time_s[-1] < split.border_s < held.runs[0].time_s[0]
+    assert held.runs[0].time_s[0] - fitted.runs[0].time_s[-1] >= 2.0
+    assert split_runs(fitted).held_out == ()
+
+
+def test_the_runs_held_out_share_what_was_flown():
+    """Of a hover and two fast flights a fast one is held out, wherever it stands."""
+    calm, fast, faster = (Flight(k, 10.0, excitation=size) for k, size in ((1, 0.05), (2, 1.0), (3, 1.0)))
+    runs = (fast.record(50.0, name="run01"), calm.record(50.0, name="run02"), faster.record(50.0, name="run03"))
+    whole = RecordingSet("made", calm.vehicle, runs)
+    assert split_runs(whole).held_out != ("run02",)
+    assert split_runs(whole) == split_runs(whole)
