@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, with_status
-from rotorid.mismatch.shares import fitted_part
 
 if TYPE_CHECKING:
     from rotorid.mismatch.verdict import Channel, Errors, Location
@@ -87,31 +86,6 @@ def missing_places(
         if wrench and name not in there and max(errors, default=0.0) > PLAINLY_OFF * (channel.noise_floor or np.inf):
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])
     return [(c, p) for c, p in out.items() if c not in {location.channel for location in locations}]
-
-
-def effect_shares(analysis: Analysis, channels: Mapping[str, Channel], located: Sequence[str]) -> dict[str, float]:
-    """To every stated effect the part of what goes from before to after on the runs held out that goes without it.
-
-    Energies over the located channels, each in units of its floor: what is left without the effect less what is left
-    with all, over what all take away. Effects that only act together add up to more than one.
-    """
-    part = fitted_part(analysis)
-    masks = [part(t.run, t.time_s) < 0 for t in analysis.traces]
-    if not any(m.any() for m in masks):
-        masks = [np.ones(len(t.time_s), bool) for t in analysis.traces]
-    before, after, _ = energies(channels, located)
-    out = {}
-    for finding in (f for f in analysis.findings if f.id in analysis.without):
-        left, count = dict.fromkeys(located, 0.0), dict.fromkeys(located, 0)
-        for trace, own, mask in zip(analysis.traces, analysis.without[finding.id], masks, strict=True):
-            if trace.channel in left:
-                left[trace.channel] += float(np.nansum(own[mask] ** 2))
-                count[trace.channel] += int(np.isfinite(own[mask]).sum())
-        without = sum(
-            left[c] / max(count[c], 1) / channels[c].noise_floor ** 2 for c in located if channels[c].noise_floor
-        )
-        out[finding.id] = float(np.clip((without - after) / (before - after), 0.0, 1.0)) if before > after else 0.0
-    return out
 
 
 def by_share(findings: Sequence[Finding], shares: Mapping[str, float]) -> list[Finding]:

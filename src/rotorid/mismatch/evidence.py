@@ -8,10 +8,12 @@ runs held out lower a word, nothing else.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.mismatch.comparison import VOTES_FROM
 from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.words import channel_words
@@ -19,11 +21,13 @@ from rotorid.mismatch.words import channel_words
 CLAIMED = ("established", "ambiguous")
 ACTS = 1 / 3
 """Contribution to a channel, in units of its noise and beside the strongest, from which an effect acts there."""
-BLOCK_S = 2.0
-"""Length of the blocks that the bootstrap draws: longer than residuals are alike."""
+BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
+"""Lengths of the blocks that the bootstrap draws, the first that gives LEAST_BLOCKS: residuals are alike for less."""
 LEAST_BLOCKS = 6
-"""Blocks that the bootstrap needs; less than BLOCK_S each where little is held out."""
 BOOTSTRAPS = 400
+LEAST_SHARE = 0.005
+"""Part of the error that goes on the runs held out below which an effect is only suggested: names that fill a gap left
+by another cause hold less than 0.7 % of what a model explains."""
 LEAST_EXCITED = 0.1
 """Size of a contribution on the runs held out, beside that on the fitted ones, below which they are silent."""
 
@@ -69,10 +73,34 @@ def weighed(analysis: Analysis) -> Analysis:
     """The analysis with gains on the runs held out, and with the words of its effects that these allow."""
     part = fitted_part(analysis)
     held = [part(t.run, t.time_s) < 0 for t in analysis.traces]
-    return replace(analysis, findings=tuple(judged(f, analysis, held) for f in analysis.findings))
+    shares = effect_shares(analysis, held)
+    findings = tuple(judged(f, analysis, held, shares.get(f.id, 0.0)) for f in analysis.findings)
+    return replace(analysis, findings=findings, shares=shares)
 
 
-def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray]) -> Finding:
+def effect_shares(analysis: Analysis, held: list[np.ndarray]) -> dict[str, float]:
+    """To every stated effect the part of what goes from before to after on the runs held out that goes without it.
+
+    Energies over all channels, each in units of its floor: what is left without the effect less what is left with all,
+    over what all take away. Effects that only act together add up to more than one.
+    """
+
+    def energy(parts: Sequence[np.ndarray]) -> float:
+        sums: dict[str, np.ndarray] = {}
+        for trace, own, mask in zip(analysis.traces, parts, held, strict=True):
+            new = np.array([np.nansum(own[mask] ** 2), np.isfinite(own[mask]).sum()])
+            sums[trace.channel] = sums.get(trace.channel, np.zeros(2)) + new
+        return sum(
+            s[0] / max(s[1], 1) / analysis.noise_floor[c] ** 2 for c, s in sums.items() if analysis.noise_floor.get(c)
+        )
+
+    before, after = (energy([getattr(t, stage) for t in analysis.traces]) for stage in ("before", "after"))
+    if before <= after:
+        return dict.fromkeys(analysis.without, 0.0)
+    return {i: float(np.clip((energy(x) - after) / (before - after), 0.0, 1.0)) for i, x in analysis.without.items()}
+
+
+def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: float) -> Finding:
     """A finding with its gain and the word that it deserves; one that no model holds (a mistake) as it is."""
     if finding.status not in CLAIMED or finding.id not in analysis.without:
         return finding
@@ -82,6 +110,8 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray]) -> Find
         # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
         found = evidence(analysis, without, [in_windows(t, finding.windows) for t in analysis.traces])
     reason = found.objection or ("" if away_from_nothing(finding) else "every number of it may be nothing")
+    if not reason and share < LEAST_SHARE and not finding.windows:
+        reason = f"it carries {100 * share:.1f} % of the error that goes"
     best = found.ratios[0] if found.ratios else None
     finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))
     return replace(finding, status="suggested", objection=reason) if reason else finding
@@ -126,23 +156,35 @@ def leftover_rms(analysis: Analysis, held: list[np.ndarray], channel: str) -> fl
 
 
 def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], held: list[np.ndarray], channel: str) -> Ratio | None:
-    """Error of a channel with an effect over that without, block bootstrap; None with fewer than LEAST_BLOCKS."""
-    energies = []
-    own = [(t, x, m) for t, x, m in zip(analysis.traces, without, held, strict=True) if t.channel == channel]
-    period_s = min((float(np.median(np.diff(t.time_s))) for t, _, _ in own if len(t.time_s) > 1), default=BLOCK_S)
-    block_s = min(BLOCK_S, period_s * sum(int(m.sum()) for _, _, m in own) / (2 * LEAST_BLOCKS))
-    for trace, left, mask in own:
-        index = np.flatnonzero(mask & np.isfinite(trace.after) & np.isfinite(left))
-        if len(index):
-            per = max(1, int(block_s / period_s))
-            for rows in np.array_split(index, max(1, len(index) // per)):
-                energies.append((float(trace.after[rows] @ trace.after[rows]), float(left[rows] @ left[rows])))
-    if len(energies) < LEAST_BLOCKS:
+    """Error of a channel with an effect over that without it, in the blocks in which it acts; None where these are few.
+
+    Blocks are drawn anew for the interval. What acts for a short time is judged in shorter blocks.
+    """
+    parts = zip(analysis.traces, without, held, strict=True)
+    own = [(t, left - t.after, m) for t, left, m in parts if t.channel == channel]
+    for block_s in BLOCKS_S:
+        energies = np.array([e for t, added, m in own for e in block_energies(t, added, m, block_s)]).reshape(-1, 3)
+        acting = energies[energies[:, 2] > VOTES_FROM * energies[:, 2].max(initial=0.0)]
+        if len(acting) >= LEAST_BLOCKS:
+            break
+    else:
         return None
-    e = np.array(energies)
-    draws = e[np.random.default_rng(1).integers(0, len(e), (BOOTSTRAPS, len(e)))].sum(axis=1)
+    draws = acting[np.random.default_rng(1).integers(0, len(acting), (BOOTSTRAPS, len(acting)))].sum(axis=1)
     low, high = np.quantile(np.sqrt(draws[:, 0] / np.maximum(draws[:, 1], 1e-300)), [0.025, 0.975])
-    return Ratio(channel, float(np.sqrt(e[:, 0].sum() / max(e[:, 1].sum(), 1e-300))), float(low), float(high))
+    value = np.sqrt(acting[:, 0].sum() / max(acting[:, 1].sum(), 1e-300))
+    return Ratio(channel, float(value), float(low), float(high))
+
+
+def block_energies(trace: Trace, added: np.ndarray, mask: np.ndarray, block_s: float):
+    """Energies of blocks of masked rows: with the effect, without it (its contribution `added` (n,) put back), and of
+    the contribution alone."""
+    index = np.flatnonzero(mask & np.isfinite(trace.after) & np.isfinite(added))
+    if not len(index):
+        return
+    period_s = float(np.median(np.diff(trace.time_s))) if len(trace.time_s) > 1 else block_s
+    for rows in np.array_split(index, max(1, len(index) // max(1, int(round(block_s / period_s))))):
+        after, own = trace.after[rows], added[rows]
+        yield float(after @ after), float((after + own) @ (after + own)), float(own @ own)
 
 
 def away_from_nothing(finding: Finding) -> bool:

@@ -93,6 +93,8 @@ class Analysis:
     """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
     without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
     """To the id of a stated effect what is left of every trace without it, all else fitted anew."""
+    shares: Mapping[str, float] = field(default_factory=dict)
+    """To the id of a stated effect the part of the error that goes on the runs held out which goes without it."""
     unexplained_share: float = 0.0
     """Share of the residual's energy above the noise floor that the findings leave (0 where nothing was off)."""
     unexplained_channels: tuple[str, ...] = ()

@@ -18,7 +18,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from rotorid.mismatch.consistency import (
     by_share,
-    effect_shares,
     located_channels,
     missing_places,
     share_left,
@@ -214,7 +213,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     locations = with_missing_places(analysis, locations, inverse)
     located = located_channels(locations, inverse)
     left = share_left(inverse, located)
-    shares = effect_shares(analysis, inverse, located)
+    shares = analysis.shares
     word = verdict_word(analysis, locations, left)
     told = Told(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(

@@ -69,12 +69,22 @@ def test_a_reader_with_a_pocket_calculator_gets_the_same_word(size_m_s2):
     before = after = noise = 0.0
     for channel in (told["channels"][name] for name in located):
         errors, floor = channel["rmse"]["held_out"], channel["noise_floor"]
-        before, after, noise = before + (errors["before"] / floor) ** 2, after + (errors["after"] / floor) ** 2, noise + 1
+        before, after, noise = (
+            before + (errors["before"] / floor) ** 2,
+            after + (errors["after"] / floor) ** 2,
+            noise + 1,
+        )
     left = min(1.0, max(0.0, after - noise) / max(before - noise, noise))
     assert told["unexplained"]["share"] == pytest.approx(left, rel=1e-4, abs=1e-4)
     claims = [e for e in told["effects"] if e["status"] in ("established", "ambiguous")]
     if claims or told["parameters"]:
-        word = "explained" if left <= EXPLAINED_SHARE else "partly_explained" if left < UNEXPLAINED_SHARE else "unexplained"
+        word = (
+            "explained"
+            if left <= EXPLAINED_SHARE
+            else "partly_explained"
+            if left < UNEXPLAINED_SHARE
+            else "unexplained"
+        )
         assert told["verdict"] == word
     else:
         assert told["verdict"] == "unexplained"

@@ -11,7 +11,7 @@ from rotorid.mismatch.instrument.chain import find_chain
 from rotorid.mismatch.instrument.columns import make_terms
 from rotorid.mismatch.instrument.decide import wider
 from rotorid.mismatch.instrument.setup import set_up
-from rotorid.mismatch.verdict import _wrong, surest
+from rotorid.mismatch.sentences import _wrong, surest
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 HUBS = ((0.09, 0.09, "ccw"), (0.09, -0.09, "cw"), (-0.09, -0.09, "ccw"), (-0.09, 0.09, "cw"))
