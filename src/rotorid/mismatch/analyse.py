@@ -93,6 +93,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(found, recordings, split, unseen)
     fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
+    windows = tuple(g.window for g in seen.gusts)
+    findings = [replace(f, windows=windows) if f.id == "gust" and seen.gusts else f for f in findings]
     delivered = residuals_of(seen, fit)
     before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
     left = leftover(

@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 from scipy.stats import t as student
 
 ENVIRONMENT_S = 5.0
@@ -82,6 +83,12 @@ class Comparison:
         """Share of the voting environments in which A is better; 1 where nothing votes."""
         own = self.votes
         return float((self.gained[own] > 0).mean()) if own.any() else 1.0
+
+    @property
+    def expected_won(self) -> float:
+        """Share of the voting environments in which A is better if its coefficients are right, by white noise alone."""
+        own = self.votes
+        return float(norm.cdf(np.sqrt(self.promised[own]) / 2).mean()) if own.any() else 1.0
 
     @property
     def p_value(self) -> float:

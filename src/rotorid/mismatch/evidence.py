@@ -28,6 +28,8 @@ BOOTSTRAPS = 400
 LEAST_SHARE = 0.005
 """Part of the error that goes on the runs held out below which an effect is only suggested: names that fill a gap left
 by another cause hold less than 0.7 % of what a model explains."""
+PLAIN_RATIO = 0.9
+"""Error with an effect over that without up to which it is plain in some channel, however small its share of all."""
 LEAST_EXCITED = 0.1
 """Size of a contribution on the runs held out, beside that on the fitted ones, below which they are silent."""
 
@@ -110,7 +112,8 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: 
         # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
         found = evidence(analysis, without, [in_windows(t, finding.windows) for t in analysis.traces])
     reason = found.objection or ("" if away_from_nothing(finding) else "every number of it may be nothing")
-    if not reason and share < LEAST_SHARE and not finding.windows:
+    slight = found.ratios and found.ratios[0].value > PLAIN_RATIO
+    if not reason and share < LEAST_SHARE and slight and not finding.windows:
         reason = f"it carries {100 * share:.1f} % of the error that goes"
     best = found.ratios[0] if found.ratios else None
     finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))

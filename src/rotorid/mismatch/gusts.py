@@ -175,12 +175,12 @@ def strongest(found: list[tuple[str, list]], most_knots: int = MOST_KNOTS) -> li
 
 
 def with_gusts_of_new_runs(model: WrenchModel, segments: list[Segment], noisy: list[Segment], rows: list[Rows]):
-    """Other stretches of the vehicle, and their noisy copies, in the wind of their own gusts.
+    """Other stretches of the vehicle, and their noisy copies, in the wind of their own gusts; and those gusts.
 
     `rows` are those stretches' rows by the model. The vehicle's numbers stay as they are.
     """
     if not feels_wind(model) or any(s.motion.rotation is None or s.motion.velocity is None for s in segments):
-        return segments, noisy
+        return segments, noisy, ()
     full = model.full_fit()
     left = [r.y - r.x[:, :, full.columns] @ full.beta for r in rows]
     parts = zip(segments, rows, left, strict=True)
@@ -191,13 +191,14 @@ def with_gusts_of_new_runs(model: WrenchModel, segments: list[Segment], noisy: l
     else:
         found = [(s.run, windows(part[:, :3], rotation_at(s, r), r.time_s)) for s, r, part in parts]
         asked = [wind_term(run, knots_of(a, b, KNOT_S)) for run, own in strongest(found) for a, b, _ in own]
-    winds = {}
+    winds, gusts = {}, []
     for term in asked:
         wind = wind_in(model, [s for s in segments if s.run == term.run], term)
-        gust = Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, np.eye(len(wind)), 0.0)
+        gust = Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, np.eye(len(wind)), 1.0)
         if size_of(gust, model, segments) > BESIDE_A_BURST:
             winds[term.key] = (term, wind)
-    return in_gusts(segments, winds), in_gusts(noisy, winds) if noisy else noisy
+            gusts.append(gust)
+    return in_gusts(segments, winds), in_gusts(noisy, winds) if noisy else noisy, tuple(gusts)
 
 
 def wind_in(model: WrenchModel, segments: list[Segment], term: Term) -> np.ndarray:

@@ -47,8 +47,9 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
     noisy = as_flown([n for _, n in pairs], found) if noisy else []
     if model.segments and model.segments[0].motion.carried is not None:
         own, noisy = carrying(model, own, noisy)
+    gusts = ()
     if model.gusts:
-        own, noisy = with_gusts_of_new_runs(model, own, noisy, rows_of(model, own))
+        own, noisy, gusts = with_gusts_of_new_runs(model, own, noisy, rows_of(model, own))
     known_noise = bool(model.noisy_segments) and bool(noisy or not own)
     both = [*model.rows, *rows_of(model, own)]
     again = None
@@ -68,6 +69,7 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
         segments=[*model.segments, *own],
         noisy_segments=whole.noisy_segments,
         contributions=Contributions(both, again, prepared.thinner.rate_hz),
+        gusts=(*model.gusts, *gusts),
     )
 
 

@@ -47,7 +47,8 @@ LEAST_TRANSFER = 0.6
 in simulated flights gained 0.94 to 1.00, effects of published size on real ones 0.92 to 1.18; names that only fill a
 gap 0.3 to 0.55."""
 LEAST_WON = 0.7
-"""Share of the environments exciting an effect in which it must gain: 0.88 to 1.00 of those at work."""
+"""Share of the environments exciting an effect in which it must gain, beside that expected of its strength: effects at
+work gained in 0.88 to 1.00 of them."""
 LEAST_PROMISE = 25.0
 """Whitened squares that an effect must promise before its failing counts."""
 MOST_STRAIN = 4.0
@@ -457,7 +458,11 @@ class Search:
             seen = self.regression.compare(self.always + active, self.always + [k for k in active if k != key])
             if seen.promised.sum() <= LEAST_PROMISE or not seen.votes.any():
                 continue
-            kept = seen.transfer if seen.won >= LEAST_WON else min(seen.transfer, LEAST_TRANSFER - 1e-9)
+            kept = (
+                seen.transfer
+                if seen.won >= LEAST_WON * seen.expected_won
+                else min(seen.transfer, LEAST_TRANSFER - 1e-9)
+            )
             if kept < worst:
                 worst, found = kept, key
         return found

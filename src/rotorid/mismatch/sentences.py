@@ -78,7 +78,7 @@ def headline(told: Told) -> str:
     where = _where(main, told.locations, told.channels, analysis)
     causes = _causes(told)
     if not causes:
-        return first_words(f"{where}; {_rest(told)}")
+        return first_words(capital(f"{where}; {_rest(told)}"))
     better = _better_in_short(main, told.channels)
     rest = "" if told.word == "explained" else f"; {100 * told.left:.0f} % stays unexplained"
     for parts in (

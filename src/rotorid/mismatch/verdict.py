@@ -308,7 +308,7 @@ def effect_verdict(finding: Finding, share: float | None) -> EffectVerdict:
         id=finding.id,
         status=finding.status,
         alternatives=finding.alternatives,
-        sentence=first_words(finding.sentence),
+        sentence=first_words(f"only suggested: {finding.objection}" if finding.objection else finding.sentence),
         share=share,
         equation=finding.equation or (finding.form.equation if finding.form else ""),
         channels=finding.channels,

@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch import fitted, harmless
-from rotorid.mismatch.delivered import nuisances_in
-from rotorid.mismatch.fitted import refined_model, turning, values_called_wrong
-from rotorid.mismatch.harmless import HELP_Z, costs_more, fitted_anew, within_bounds, without_harm, without_useless
+from rotorid.mismatch.fitted import refined_model, turning
+from rotorid.mismatch.harmless import HELP_Z, costs_more, fitted_anew, within_bounds, without_useless
 from rotorid.mismatch.held_out import about_means, excited, growth, harmed, helps, smaller
 from rotorid.mismatch.prepare import prepare
 
 from .flights import recorded
 
 PER = 10
-OFFSET = "offset:rotors-gyroscope"
 
 
 def parts(scale: float, blocks: int = 20, seed: int = 0) -> np.ndarray:
@@ -105,19 +103,6 @@ def test_what_hardly_acts_on_the_held_out_part_cannot_be_judged_there():
     held = [np.array([False] * 10 + [True] * 10)]
     for amplitude, judged in ((1.0, True), (0.35, True), (0.3, False), (0.0, False)):
         assert excited([np.repeat([1.0, amplitude], 10)], held) is judged
-
-
-@pytest.mark.parametrize("held_late_s, kept", [(0.008, True), (0.0, False)])
-def test_an_offset_in_time_that_the_runs_held_out_contradict_is_taken_back(held_late_s, kept):
-    """Rotor speeds stamped 8 ms late in both runs fitted, and in the third run or not."""
-    late = recorded(1, 2, late_s={"rotors": 0.008}).runs
-    third = replace(recorded(3, late_s={"rotors": held_late_s}).runs[0], name="run02")
-    recordings = replace(recorded(1), runs=(*late, third), held_out=("run02",))
-    prepared = prepare(recordings)
-    model = refined_model(prepared, *turning(prepared))
-    model, values, _, harm = without_harm(prepared, model, values_called_wrong, False)
-    assert (OFFSET in nuisances_in(model, values)) is kept
-    assert not harm and not model.selection.active and not values
 
 
 @pytest.mark.parametrize(

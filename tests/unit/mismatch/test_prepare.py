@@ -42,10 +42,10 @@ def test_about_a_third_of_the_runs_is_held_out_spread_in_time():
 def test_of_a_single_run_the_last_third_is_held_out_after_a_gap():
     split = split_runs(set_of("a"))
     assert split == Split(("a",), ("a",))
-    (segment,) = prepare(recorded(1)).segments
-    rule = training_rule(split, [segment])
-    begin, end = segment.motion.time_s[[0, -1]]
-    border = begin + (end - begin) * 2 / 3
+    time_s = set_of("a").runs[0].time_s
+    rule = training_rule(split, [])
+    border = split.border_s
+    assert border == pytest.approx(time_s[0] + (time_s[-1] - time_s[0]) * 2 / 3)
     assert [rule("a", border + dt) for dt in (-5, -GAP_S / 2 - 0.1, 0, GAP_S / 2 + 0.1, 5)] == [
         *[True, True, None, False, False]
     ]

@@ -1,4 +1,4 @@
-"""Believed values move within their trust, without a word, where flights not used for fitting bear them out."""
+"""Believed values move within their trust, without a word, where environments not used for fitting bear them out."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((4000, 12))
 
-    def residuals(_, fit):
-        better = len(fit.columns) == len(TRUST)
+    def residuals(_, keys, values):
+        better = len(keys) == len(TRUST)
         return [noise * (0.5 if better and helps else 1.0)]
 
-    monkeypatch.setattr(within_trust, "residuals_of", residuals)
-    monkeypatch.setattr(within_trust, "held_out_masks", lambda *_: [np.ones(4000, bool)])
+    monkeypatch.setattr(within_trust, "left_out_residuals", residuals)
+    monkeypatch.setattr(within_trust, "judged_rows", lambda *_: [np.ones(4000, bool)])
     return SimpleNamespace(thinner=SimpleNamespace(rate_hz=40.0)), model
 
 

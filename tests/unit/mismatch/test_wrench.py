@@ -1,12 +1,11 @@
-"""The model of force and moment: what spoils a channel, and what counts as its noise."""
+"""The model of force and moment: what counts as noise, and how large a term is."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.regression import Fit, full_fit_residuals
+from rotorid.mismatch.regression import full_fit_residuals
 from rotorid.mismatch.rows import Rows
 from rotorid.mismatch.wrench import (
     SAME_WRENCH,
@@ -14,18 +13,11 @@ from rotorid.mismatch.wrench import (
     channel_floor,
     inflated_channels,
     sizes_of_parts,
-    spoils_a_channel,
     without_unseen,
 )
 from rotorid.recordings import Vehicle
 
 from .test_rows import still
-
-
-def fit_of(*beta: float) -> Fit:
-    """A fit of the first columns with given coefficients."""
-    size = len(beta)
-    return Fit(np.arange(size), np.array(beta), np.eye(size), np.zeros(1), 0.0)
 
 
 def two_channels(force: float, moment: float, size: int = 1600) -> Rows:
@@ -36,25 +28,6 @@ def two_channels(force: float, moment: float, size: int = 1600) -> Rows:
         x[:, channel, 0] = 2 * rng.normal(size=size)
         y[:, channel] = coefficient * x[:, channel, 0] + rng.normal(size=size)
     return Rows("b", np.arange(size) / 40.0, y, x)
-
-
-def spoiled(rows: Rows, held: bool = True) -> bool:
-    mask = [np.full(len(rows.y), held)]
-    noise = np.where(np.isfinite(rows.y[0]), 1.0, np.nan)
-    return spoils_a_channel(Contributions([rows]), mask, np.array([0]), fit_of(1.0), fit_of(), noise, 40)
-
-
-def test_a_term_that_helps_everywhere_spoils_nothing():
-    assert not spoiled(two_channels(1.0, 1.0))
-
-
-def test_a_term_that_is_in_the_moment_alone_spoils_the_force():
-    """Taking off x where nothing of it is leaves 1 + 4 of a variance of 1."""
-    assert spoiled(two_channels(0.0, 1.0))
-
-
-def test_rows_that_were_fitted_say_nothing_about_harm():
-    assert not spoiled(two_channels(0.0, 1.0), held=False)
 
 
 def test_a_residual_far_above_its_noise_is_itself_the_noise():
