@@ -377,10 +377,35 @@ def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
     model, chain = found.model, found.chain
     own = sensor_floor(model)
     out = {CHANNELS[c]: float(max(model.floor[c], own[c])) for c in range(6) if np.isfinite(model.floor[c])}
-    if chain is not None and found.measured and chain[0].noise_rad_s is not None:
-        gain = float(np.sqrt((prepared.thinner.kernel**2).sum()))
-        for i in range(prepared.vehicle.rotor_count):
-            out[f"rotor_speed_{i + 1}"] = max(chain[0].noise_rad_s, prepared.noise.get("rotors", 0.0)) * gain
+    if chain is not None and found.measured:
+        out |= {f"rotor_speed_{i + 1}": float(sd) for i, sd in enumerate(speed_floor(found))}
+    return out
+
+
+def speed_floor(found: Fitted) -> np.ndarray:
+    """Noise of the measured speed of each rotor in the band of the traces, (rotors,), rad/s.
+
+    What the chain leaves less what a regression on the command, its square and derivatives and on the voltage still
+    explains.
+    """
+    thinner, left, inputs = found.prepared.thinner, [], []
+    for segment in found.prepared.segments:
+        path = commanded_path(
+            segment, found.chain[0].fit.chain, found.chain[0].fit.values, found.chain[0].fit.shift_s, *found.chain[1:]
+        )
+        left.append(thinner(segment.motion.rotor_speed - path))
+        command = segment.command / max(float(np.abs(segment.command).max()), 1e-12)
+        slope = np.gradient(command, segment.dt_s, axis=0)
+        volts = np.zeros(len(command)) if segment.motion.voltage is None else segment.motion.voltage
+        columns = [command, command**2, slope, np.gradient(slope, segment.dt_s, axis=0), volts[:, None] * command]
+        inputs.append(np.stack([thinner(x) for x in columns], axis=2))
+    left, inputs = np.concatenate(left), np.concatenate(inputs)
+    out = np.zeros(left.shape[1])
+    for i in range(left.shape[1]):
+        x = np.column_stack([np.ones(len(left)), inputs[:, i]])
+        x = x / np.maximum(np.abs(x).max(axis=0), 1e-300)
+        rest = left[:, i] - x @ np.linalg.lstsq(x, left[:, i], rcond=1e-9)[0]
+        out[i] = rest.std()
     return out
 
 

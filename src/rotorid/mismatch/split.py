@@ -19,7 +19,7 @@ from rotorid.recordings import columns as c
 HELD_OUT_SHARE = 1 / 3
 MOST_CHOICES = 500
 WORTH_MOVING = 0.05
-"""Gain of a choice over the even one, as a share of the best possible score, from which it is taken."""
+"""Gain of a choice over the even one, beside the best possible score of 1, from which it is taken."""
 NEAR_GROUND_M = 0.3
 
 
@@ -47,35 +47,51 @@ def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
     even = tuple(int((k + 0.5) * total / count) for k in range(count))
     if recordings.vehicle.kind != "flight" or total < 3 or comb(total, count) > MOST_CHOICES:
         return even
-    table = activity(recordings)
-    table = table[:, table.sum(axis=0) > 0]
-    if not table.shape[1]:
+    groups = [g / g.sum() for g in activity(recordings) if g.sum() > 0]
+    if not groups:
         return even
-    share = table / table.sum(axis=0)
 
     def score(choice: tuple[int, ...]) -> float:
-        held = share[list(choice)].sum(axis=0)
-        return float(np.mean(np.minimum(held / HELD_OUT_SHARE, 1) + np.minimum((1 - held) / (1 - HELD_OUT_SHARE), 1)))
+        held = [share[list(choice)].sum() for share in groups]
+        both = [min(h / HELD_OUT_SHARE, 1.0) + min((1.0 - h) / (1.0 - HELD_OUT_SHARE), 1.0) for h in held]
+        return float(np.mean(both)) / 2.0
 
     best = max(combinations(range(total), count), key=score)
-    return best if score(best) > score(even) + 2 * WORTH_MOVING else even
+    return best if score(best) > score(even) + WORTH_MOVING else even
 
 
-def activity(recordings: RecordingSet) -> np.ndarray:
-    """How much of everything that is flown each run holds, (runs, quantities): energies about the mean of all runs."""
-    count = recordings.vehicle.rotor_count
-    groups = [*c.VELOCITY, *c.ANGULAR_VELOCITY, "battery_voltage_v"]
+def activity(recordings: RecordingSet) -> list[np.ndarray]:
+    """How much of what is flown each run holds, (runs,) of each kind: energies about the mean of all runs.
+
+    Kinds: speed level and vertical, turning, changes of the rotors, nearness of the ground, the voltage's fall.
+    """
+    vehicle = recordings.vehicle
+    kinds = [c.VELOCITY[:2], c.VELOCITY[2:], c.ANGULAR_VELOCITY, ("battery_voltage_v",)]
     for family in ("rotor_speed", "rotor_command", "throttle"):
-        names = c.rotor_columns(family, count)
+        names = c.rotor_columns(family, vehicle.rotor_count)
         if names and all(run.has(*names) for run in recordings.runs):
-            groups += names
+            kinds.append(names)
             break
-    columns = [[run.column(n) for run in recordings.runs] for n in groups if all(r.has(n) for r in recordings.runs)]
-    out = [energies(parts, recordings.runs) for parts in columns]
-    if all(run.has("height_m") for run in recordings.runs):
-        near = [1.0 / (NEAR_GROUND_M + np.maximum(run.column("height_m"), 0.0)) ** 2 for run in recordings.runs]
-        out.append(energies(near, recordings.runs))
-    return np.array(out).T if out else np.zeros((len(recordings.runs), 0))
+    out = []
+    for names in kinds:
+        if all(run.has(*names) for run in recordings.runs):
+            shares = [energies([run.column(n) for run in recordings.runs], recordings.runs) for n in names]
+            out.append(
+                np.mean([x / x.sum() for x in shares if x.sum() > 0] or [np.zeros(len(recordings.runs))], axis=0)
+            )
+    heights = [height_of(run, vehicle.ground_z_m) for run in recordings.runs]
+    if all(h is not None for h in heights):
+        out.append(energies([1.0 / (NEAR_GROUND_M + np.maximum(h, 0.0)) ** 2 for h in heights], recordings.runs))
+    return out
+
+
+def height_of(run: Run, ground_z_m: float | None) -> np.ndarray | None:
+    """Height above ground (n,), m, measured or from the position; None where neither is known."""
+    if run.has("height_m"):
+        return run.column("height_m")
+    if ground_z_m is None or not run.has("position_z_m"):
+        return None
+    return ground_z_m - run.column("position_z_m")
 
 
 def energies(parts: list[np.ndarray], runs: tuple[Run, ...]) -> np.ndarray:
