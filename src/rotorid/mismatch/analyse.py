@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.errors import InputError
 from rotorid.mismatch import within_trust
 from rotorid.mismatch.carried import on_board
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
@@ -61,6 +62,22 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
+    analysis = analysed(recordings, mistakes, remarks, cutoff_hz)
+    if analysis is None:
+        # What is held out lost a sensor throughout: something else must show what the model is worth.
+        left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
+        names = ", ".join(r.name for r in recordings.runs if r not in left)
+        remarks = (*remarks, f"Nothing of {names} could be compared; other recordings were held out instead.")
+        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, cutoff_hz)
+    if analysis is None:
+        raise InputError(
+            f"set {recordings.name}: no run can be held out with every column that the others are fitted by"
+        )
+    return analysis
+
+
+def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> Analysis | None:
+    """The analysis of a set whose mistakes are undone; None where nothing of the runs held out can be compared."""
     split = split_runs(recordings)
     known, unseen = parts_of(recordings, split)
     prepared = prepare(known, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
@@ -92,6 +109,8 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(found, recordings, split, unseen)
+    if len(seen.rows) == len(model.rows):
+        return None
     fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
     windows = tuple(g.window for g in seen.gusts)
     findings = [replace(f, windows=windows) if f.id == "gust" and seen.gusts else f for f in findings]
