@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from rotorid.mismatch.analyse import analyse
@@ -16,6 +17,7 @@ from rotorid.mismatch.locate import locate
 from rotorid.mismatch.page import make_page
 from rotorid.mismatch.verdict import Verdict, make_verdict
 from rotorid.recordings import RecordingSet, read_vehicle, write_vehicle
+from rotorid.recordings.sufficient import sufficient
 
 LOG = logging.getLogger(__name__)
 
@@ -33,8 +35,11 @@ def deliver(
 
 
 def analysis_of(recordings: RecordingSet) -> Analysis:
-    """The analysis for the kind of the set."""
-    return analyse(recordings) if recordings.vehicle.kind == "flight" else analyse_instrument(recordings)
+    """The analysis for the kind of the set; InputError in one sentence where the set does not suffice."""
+    usable = sufficient(recordings)
+    analysis = analyse(usable) if usable.vehicle.kind == "flight" else analyse_instrument(usable)
+    recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with mistakes put right are made anew
+    return replace(analysis, recordings=recordings, notes=(*usable.left_out, *analysis.notes))
 
 
 def judge(recordings: RecordingSet) -> Verdict:
@@ -45,7 +50,13 @@ def judge(recordings: RecordingSet) -> Verdict:
 def verdict_of(analysis: Analysis) -> Verdict:
     """The verdict that an analysis amounts to."""
     forward = forward_channels(analysis).channels if analysis.instrument is None else {}
-    return make_verdict(analysis, locate(analysis), forward)
+    return with_runs_left_out(make_verdict(analysis, locate(analysis), forward), analysis)
+
+
+def with_runs_left_out(verdict: Verdict, analysis: Analysis) -> Verdict:
+    """The verdict, whose sentence also says which runs were of no use."""
+    left_out = analysis.recordings.left_out
+    return verdict.model_copy(update={"sentence": " ".join([verdict.sentence, *left_out])}) if left_out else verdict
 
 
 def write_files(
@@ -69,7 +80,7 @@ def write_files(
     else:
         forward = Forward({})
         prove_reading(analysis, improved, read_vehicle(improved_path))
-    verdict = make_verdict(analysis, locations, forward.channels)
+    verdict = with_runs_left_out(make_verdict(analysis, locations, forward.channels), analysis)
     verdict_path.write_text(verdict.text(), encoding="utf-8")
     progress("drawing")
     page_path.write_text(make_page(analysis, verdict, forward.notes), encoding="utf-8")

@@ -17,6 +17,10 @@ from rotorid.recordings.vehicle import Vehicle
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 
 
+class TooFewSamples(InputError):
+    """A run with a heading and next to nothing below it: a set can do without it."""
+
+
 def explain(error: ValidationError) -> str:
     """First fault of a pydantic error as one clause: key and what was expected."""
     first = error.errors()[0]
@@ -119,7 +123,7 @@ def check_table(table: pd.DataFrame, where: str) -> pd.DataFrame:
     table = table.astype(float)
     time = table[c.TIME].to_numpy()
     if len(time) < 2:
-        raise InputError(f"{where}: expected at least two samples, found {len(time)}")
+        raise TooFewSamples(f"{where}: too little data: expected at least two samples, found {len(time)}")
     if np.isnan(time).any():
         row = int(np.flatnonzero(np.isnan(time))[0])
         raise InputError(f"{where}, line {row + 2}: {c.TIME} is empty")
@@ -160,7 +164,7 @@ def read_run(path: Path) -> Run:
         raise InputError(f"{path}, {where}") from None
     except Exception as error:
         raise InputError(f"{path}: cannot be read as a table ({error})") from None
-    return Run(name, table)
+    return Run(name, table, str(path))
 
 
 def read_set(folder: Path) -> RecordingSet:
@@ -176,12 +180,19 @@ def read_set(folder: Path) -> RecordingSet:
     for first, second in zip(paths, paths[1:], strict=False):
         if run_name(first) == run_name(second):
             raise InputError(f"{folder}: run {run_name(first)} is there twice ({first.name}, {second.name})")
-    runs = tuple(read_run(p) for p in paths)
-    for run, path in zip(runs, paths, strict=True):
+    runs, left_out = [], []
+    for path in paths:
+        try:
+            runs.append(read_run(path))
+        except TooFewSamples as error:
+            left_out.append(f"Left out: {error}.")
+            if len(left_out) == len(paths):
+                raise
+    for run in runs:
         for column in run.table.columns:
             found = c.rotor_number(column)
             if found and vehicle.kind != "bench" and not 1 <= found[1] <= vehicle.rotor_count:
-                raise InputError(f"{path}, column {column}: vehicle.yaml lists {vehicle.rotor_count} rotors only")
+                raise InputError(f"{run.path}, column {column}: vehicle.yaml lists {vehicle.rotor_count} rotors only")
     held_out = None
     if (folder / "split.yaml").exists():
         split = read_yaml(folder / "split.yaml")
@@ -194,7 +205,7 @@ def read_set(folder: Path) -> RecordingSet:
                 raise InputError(f"{folder / 'split.yaml'}: held_out names run {name}, which is not in the set")
         if len(held_out) == len(names):
             raise InputError(f"{folder / 'split.yaml'}: every run is held out, none is left to fit")
-    return RecordingSet(folder.name, vehicle, runs, held_out)
+    return RecordingSet(folder.name, vehicle, tuple(runs), held_out, str(folder), tuple(left_out))
 
 
 def write_set(recordings: RecordingSet, parent: Path, suffix: str = ".parquet") -> Path:
