@@ -15,6 +15,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.names import listed, nearest, plain
 from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.tables import place
 from rotorid.recordings.vehicle import Vehicle
 
 LEAST_FLIGHT_HZ = 2.0
@@ -149,8 +150,8 @@ def absurd(run: Run, vehicle: Vehicle) -> str | None:
         if len(bad):
             unit = c.unit_of(column)
             return (
-                f"{whereof(run)}, line {bad[0] + 2}, column {column}: found {values[bad[0]]:g}, expected a number of "
-                f"at most {most:g}{' ' + unit if unit else ''} (an empty cell where nothing was measured)"
+                f"{whereof(run)}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
+                f"number of at most {most:g}{' ' + unit if unit else ''} (an empty cell where nothing was measured)"
             )
     return None
 
@@ -166,8 +167,8 @@ def no_attitude(run: Run, vehicle: Vehicle) -> str | None:
         return None
     many = f" ({len(bad)} of {len(norm)} samples are like it)" if len(bad) > 1 else ""
     return (
-        f"{whereof(run)}, line {bad[0] + 2}, columns quaternion_w to quaternion_z: found the norm {norm[bad[0]]:.3g}, "
-        f"expected 1{many}; leave the cells empty where the attitude is not known"
+        f"{whereof(run)}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
+        f"{norm[bad[0]]:.3g}, expected 1{many}; leave the cells empty where the attitude is not known"
     )
 
 
@@ -178,8 +179,8 @@ def uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
     jump = int(np.argmax(steps))
     if span / median > max(MOST_GRID, 4 * len(steps)) or (span / median > MOST_GRID and steps[jump] > 0.5 * span):
         return (
-            f"{whereof(run)}, line {jump + 3}: {c.TIME} jumps by {steps[jump]:.6g} s where its usual step is "
-            f"{median:.3g} s, expected one clock throughout"
+            f"{whereof(run)}, {place(run.path, jump + 1)}: {c.TIME} jumps by {steps[jump]:.6g} s where its usual step "
+            f"is {median:.3g} s, expected one clock throughout"
         )
     if vehicle.kind == "flight" and median * LEAST_FLIGHT_HZ > 1:
         unit = next((u for factor, u in ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
