@@ -219,6 +219,12 @@ def test_one_bad_run_is_left_out_and_named() -> None:
     assert usable.left_out[0].startswith("Left out: run run2, line 2, column velocity_y_m_s: found inf")
 
 
+def test_a_sensor_that_never_moves_counts_as_not_recorded() -> None:
+    usable = sufficient(flight(WHOLE.assign(**dict.fromkeys(c.POSITION, 0.0))))
+    assert not set(c.POSITION) & set(usable.runs[0].table.columns)
+    assert usable.left_out[0].startswith("Left out: position_x_m to position_z_m hold one value in every run")
+
+
 def test_a_verdict_names_the_run_that_was_left_out() -> None:
     verdict = judge(flight(flight_table(4.0, seed=1), flight_table(1.0), flight_table(4.0, seed=2)))
     assert "Left out: run run2: too little data" in verdict.sentence

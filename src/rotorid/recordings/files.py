@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -15,8 +14,9 @@ from rotorid.recordings.belief import check_belief
 from rotorid.recordings.names import hint
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import TooFewSamples, check_table, read_csv, read_parquet
-from rotorid.recordings.text_files import check_file, printable, read_yaml
+from rotorid.recordings.text_files import check_file, read_yaml
 from rotorid.recordings.vehicle import Inertia, Noise, Rotor, Vehicle
+from rotorid.wording import expected, found, printable
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
@@ -33,42 +33,11 @@ def explain(error: ValidationError) -> str:
         return f"{key}: is missing"
     if kind == "value_error":
         return ": ".join(x for x in (key, str(first["ctx"]["error"])) if x)
-    found = printable(repr(first["input"]))
-    return f"{key}: found {found if len(found) < 80 else found[:77] + '...'}, expected {_expected(first)}"
+    return f"{key}: found {found(first)}, expected {expected(first)}"
 
 
 _BRANCHES = ("float", "tuple[float, ...]", "constrained-float")
 """Parts of a pydantic location that name a kind of value, not a key."""
-
-
-def _expected(entry: dict[str, Any]) -> str:
-    """What a pydantic error would have, in plain words."""
-    kind, context = entry["type"], entry.get("ctx") or {}
-    words = {
-        "greater_than": "a number greater than {gt:g}",
-        "greater_than_equal": "a number of {ge:g} or more",
-        "less_than": "a number less than {lt:g}",
-        "less_than_equal": "a number of at most {le:g}",
-        "literal_error": "{expected}",
-        "finite_number": "a finite number",
-        "too_short": "at least {min_length} entries",
-        "too_long": "at most {max_length} entries",
-    }
-    if kind in words:
-        return words[kind].format(**context)
-    for start, text in (
-        ("float", "a number"),
-        ("int", "a whole number"),
-        ("string", "text"),
-        ("bool", "true or false"),
-        ("dict", "keys with values"),
-        ("model", "keys with values"),
-        ("tuple", "a list"),
-        ("list", "a list"),
-    ):
-        if kind.startswith(start):
-            return text
-    return "another value"
 
 
 def _keys_at(location: tuple[str | int, ...]) -> list[str]:
@@ -184,8 +153,8 @@ def read_split(path: Path, names: list[str]) -> tuple[str, ...]:
             raise InputError(f"{path}: {printable(key)}: no such key is known{hint(str(key), ['held_out'])}")
     held_out = content.get("held_out")
     if not isinstance(held_out, list):
-        found = printable(held_out) if isinstance(held_out, str) and held_out else "nothing" if not held_out else "keys"
-        raise InputError(f"{path}: held_out: found {found}, expected a list of runs: [{names[-1]}]")
+        what = printable(held_out) if isinstance(held_out, str) and held_out else "nothing" if not held_out else "keys"
+        raise InputError(f"{path}: held_out: found {what}, expected a list of runs: [{names[-1]}]")
     if not held_out:
         raise InputError(f"{path}: held_out: names no run, expected at least one (or no {SPLIT})")
     for number, name in enumerate(held_out):
@@ -221,10 +190,10 @@ def read_set(folder: Path) -> RecordingSet:
                 raise
     for run in runs:
         for column in run.table.columns:
-            found = c.rotor_number(column)
-            if not found or vehicle.kind == "bench" or 1 <= found[1] <= vehicle.rotor_count:
+            rotor = c.rotor_number(column)
+            if not rotor or vehicle.kind == "bench" or 1 <= rotor[1] <= vehicle.rotor_count:
                 continue
-            if found[1] < 1:
+            if rotor[1] < 1:
                 raise InputError(f"{run.path}, column {column}: rotors are numbered from 1")
             raise InputError(f"{run.path}, column {column}: {VEHICLE} lists {vehicle.rotor_count} rotors only")
     held_out = None

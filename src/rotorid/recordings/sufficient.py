@@ -63,7 +63,7 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
     InputError
         One sentence with file and column, where a column is misspelled or what is left does not suffice.
     """
-    recordings = without_rotors_on_a_bench(recordings)
+    recordings = without_dead_sensors(without_rotors_on_a_bench(recordings))
     for run in recordings.runs:
         check_spelling(run, recordings.vehicle)
     usable, reasons = [], []
@@ -90,6 +90,31 @@ def without_rotors_on_a_bench(recordings: RecordingSet) -> RecordingSet:
         return recordings
     without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
     return replace(recordings, vehicle=vehicle.model_copy(update=without))
+
+
+def without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
+    """The flights without sensors that hold one value throughout every run: nothing was read from them."""
+    if recordings.vehicle.kind != "flight":
+        return recordings
+    dead = [names for names in SENSORS if _holds_one_value(recordings.runs, names)]
+    if c.QUATERNION in dead and any(no_attitude(run, recordings.vehicle) for run in recordings.runs):
+        dead.remove(c.QUATERNION)
+    if not dead:
+        return recordings
+    gone = [name for names in dead for name in names]
+    kept = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
+    said = tuple(
+        f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
+        for names in dead
+    )
+    return replace(recordings, runs=tuple(kept), left_out=(*recordings.left_out, *said))
+
+
+def _holds_one_value(runs: Iterable[Run], names: tuple[str, ...]) -> bool:
+    """Whether a sensor is there in some run and in every such run each of its columns keeps one value."""
+    there = [run.array(names) for run in runs if run.has(*names)]
+    there = [values[np.isfinite(values).all(axis=1)] for values in there]
+    return any(len(v) > 1 for v in there) and all((v == v[:1]).all() for v in there)
 
 
 def whereof(run: Run) -> str:

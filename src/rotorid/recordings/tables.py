@@ -12,7 +12,8 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.text_files import check_file, check_text, printable, read_bytes
+from rotorid.recordings.text_files import check_file, check_text, read_bytes
+from rotorid.wording import printable
 
 LARGEST_FILE = 4_000_000_000
 """Bytes of a file; an hour at 1 kHz with forty columns has one and a half thousand million."""

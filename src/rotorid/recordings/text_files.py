@@ -10,17 +10,13 @@ from typing import Any
 import yaml
 
 from rotorid.errors import InputError
+from rotorid.wording import printable
 
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file; that of a vehicle has some thousand."""
 DEEPEST = 50
 MOST_NODES = 20_000
 """Values of a YAML file with all its aliases written out."""
-
-
-def printable(text: object) -> str:
-    """A name as one line of text: line breaks and control characters written as escapes."""
-    return "".join(x if x.isprintable() else x.encode("unicode_escape", "backslashreplace").decode() for x in str(text))
 
 
 def check_file(path: Path) -> int:
