@@ -81,7 +81,8 @@ def sensed() -> dict[str, np.ndarray]:
     """Columns without which nothing can be compared."""
     names = [f"{kind}_{axis}_{unit}" for axis in "xyz" for kind, unit in
              (("specific_force", "m_s2"), ("angular_velocity", "rad_s"))]  # fmt: skip
-    return dict.fromkeys([*names, "rotor_speed_1_rad_s"], np.ones(1000))
+    rng = np.random.default_rng(0)
+    return {name: rng.standard_normal(1000) for name in [*names, "rotor_speed_1_rad_s"]}
 
 
 def test_the_command_checks_one_set_or_a_folder_of_them(tmp_path: Path) -> None:

@@ -225,6 +225,21 @@ def test_a_sensor_that_never_moves_counts_as_not_recorded() -> None:
     assert usable.left_out[0].startswith("Left out: position_x_m to position_z_m hold one value in every run")
 
 
+def test_runs_are_compared_in_the_same_channels() -> None:
+    poor = WHOLE.drop(columns=list(c.SPECIFIC_FORCE))
+    few = sufficient(flight(WHOLE, poor, flight_table(seed=1)))
+    assert [run.name for run in few.runs] == ["run1", "run3"]
+    assert few.left_out == ("Left out: run run2: lacks sensors that the other runs have (for accelerometer).",)
+    half = sufficient(flight(WHOLE, poor))
+    assert [run.has(*c.SPECIFIC_FORCE) for run in half.runs] == [False, False]
+    assert half.left_out == ("Left out: specific_force_x_m_s2 to specific_force_z_m_s2 are not recorded in every run.",)
+
+
+def test_commands_of_nothing_count_as_not_recorded() -> None:
+    usable = sufficient(flight(WHOLE.assign(**dict.fromkeys(COMMANDS, 0.0))))
+    assert not set(COMMANDS) & set(usable.runs[0].table.columns)
+
+
 def test_a_verdict_names_the_run_that_was_left_out() -> None:
     verdict = judge(flight(flight_table(4.0, seed=1), flight_table(1.0), flight_table(4.0, seed=2)))
     assert "Left out: run run2: too little data" in verdict.sentence

@@ -29,8 +29,10 @@ LEAST_READINGS = 10
 """Readings of a stand or a bench that are there in every compared channel at once, in a run."""
 HOLE_PERIODS = 6.0
 """Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
-MOST_GRID = 4_000_000
-"""Samples of the even grid that a run is resampled to; an hour at 1 kHz has 3.6 million."""
+MOST_GRID, MOST_HOLES = 500_000, 20
+"""A run is resampled to an even grid: larger ones may be so many times as long as the samples that are there."""
+LEAST_VALUES = 4
+"""Complete readings from which a sensor counts as recorded."""
 LARGEST = {
     c.POSITION: 1e7,
     c.VELOCITY: 1e4,
@@ -77,7 +79,8 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
         raise InputError(reasons[0] + (f" (and {len(reasons) - 1} more runs likewise)" if len(reasons) > 1 else ""))
     left_out = (*recordings.left_out, *(f"Left out: {reason}." for reason in reasons))
     kept = replace(recordings, runs=tuple(usable), left_out=left_out)
-    if len(usable) == 1:
+    kept = with_alike_runs(kept)
+    if len(kept.runs) == 1:
         check_single(kept)
     check_common(kept)
     return with_split_of_the_rest(kept)
@@ -97,6 +100,9 @@ def without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
     if recordings.vehicle.kind != "flight":
         return recordings
     dead = [names for names in SENSORS if _holds_one_value(recordings.runs, names)]
+    speeds, *ordered = rotor_groups(recordings.vehicle).values()
+    turn = any(run.has(*speeds) and np.nanmax(run.array(speeds)) > 0 for run in recordings.runs)
+    dead += [names for names in ordered if turn and _holds_one_value(recordings.runs, names, 0.0)]
     if c.QUATERNION in dead and any(no_attitude(run, recordings.vehicle) for run in recordings.runs):
         dead.remove(c.QUATERNION)
     if not dead:
@@ -110,11 +116,60 @@ def without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
     return replace(recordings, runs=tuple(kept), left_out=(*recordings.left_out, *said))
 
 
-def _holds_one_value(runs: Iterable[Run], names: tuple[str, ...]) -> bool:
-    """Whether a sensor is there in some run and in every such run each of its columns keeps one value."""
+def _holds_one_value(runs: Iterable[Run], names: tuple[str, ...], value: float | None = None) -> bool:
+    """Whether a sensor is there in some run and in every such run each of its columns keeps one value (this one)."""
     there = [run.array(names) for run in runs if run.has(*names)]
     there = [values[np.isfinite(values).all(axis=1)] for values in there]
-    return any(len(v) > 1 for v in there) and all((v == v[:1]).all() for v in there)
+    return any(len(v) > 1 for v in there) and all((v == (v[:1] if value is None else value)).all() for v in there)
+
+
+def with_alike_runs(recordings: RecordingSet) -> RecordingSet:
+    """The flights with the same channels in every run: what is compared is compared in all of them.
+
+    A few runs that lack a channel are left out; where half of them or more do, the sensor is left out of the others.
+    """
+    if recordings.vehicle.kind != "flight":
+        return recordings
+    channels = {run.name: channels_of(run) for run in recordings.runs}
+    every = set.union(*channels.values())
+    poor = [run for run in recordings.runs if channels[run.name] != every]
+    if not poor:
+        return recordings
+    said = list(recordings.left_out)
+    if 2 * len(poor) < len(recordings.runs):
+        for run in poor:
+            lost = listed(sorted(every - channels[run.name]))
+            said.append(f"Left out: {whereof(run)}: lacks sensors that the other runs have (for {lost}).")
+        kept = tuple(run for run in recordings.runs if run not in poor)
+        return replace(recordings, runs=kept, left_out=tuple(said))
+    partly = [names for names in SENSORS if not all(reads(run, names) for run in recordings.runs)]
+    if all(reads(run, c.VELOCITY) or reads(run, c.POSITION) for run in recordings.runs):
+        partly = [names for names in partly if names not in (c.VELOCITY, c.POSITION)]
+    dropped = [names for names in partly if any(reads(run, names) for run in recordings.runs)]
+    said += [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
+    gone = {name for names in partly for name in names}
+    runs = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
+    return replace(recordings, runs=tuple(runs), left_out=tuple(said))
+
+
+def reads(run: Run, names: tuple[str, ...]) -> bool:
+    """Whether a sensor has enough complete readings in a run to count as recorded."""
+    if not run.has(*names):
+        return False
+    return int(np.isfinite(run.array(names)).all(axis=1).sum()) >= LEAST_VALUES
+
+
+def channels_of(run: Run) -> set[str]:
+    """Channels of a flight that a run can be compared in, beside those of its rotors."""
+    force, turning, attitude = (reads(run, n) for n in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, c.QUATERNION))
+    moving = attitude and (reads(run, c.VELOCITY) or reads(run, c.POSITION))
+    found = {
+        "force": force or moving,
+        "moment": turning or attitude,
+        "accelerometer": force and moving,
+        "gyroscope": turning and attitude,
+    }
+    return {name for name, there in found.items() if there}
 
 
 def whereof(run: Run) -> str:
@@ -202,10 +257,10 @@ def uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
     steps = np.diff(run.time_s)
     median, span = float(np.median(steps)), float(run.time_s[-1] - run.time_s[0])
     jump = int(np.argmax(steps))
-    if span / median > max(MOST_GRID, 4 * len(steps)) or (span / median > MOST_GRID and steps[jump] > 0.5 * span):
+    if span / median > max(MOST_GRID, MOST_HOLES * len(steps)):
         return (
             f"{whereof(run)}, {place(run.path, jump + 1)}: {c.TIME} jumps by {steps[jump]:.6g} s where its usual step "
-            f"is {median:.3g} s, expected one clock throughout"
+            f"is {median:.3g} s, expected one clock throughout (parts that are so far apart are runs of their own)"
         )
     if vehicle.kind == "flight" and median * LEAST_FLIGHT_HZ > 1:
         unit = next((u for factor, u in ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
@@ -281,24 +336,13 @@ def still_rotors(run: Run, vehicle: Vehicle) -> str | None:
 
 def moving_sensors(run: Run) -> list[tuple[str, ...]]:
     """Sensors of a flight that have readings in all their columns."""
-    return [names for names in SENSORS if run.has(*names)]
-
-
-def channel_groups(run: Run, vehicle: Vehicle) -> set[str]:
-    """What can be compared in a run of a flight: force, moment, speed of the rotors."""
-    has = {names: run.has(*names) for names in SENSORS}
-    groups = set()
-    if has[c.SPECIFIC_FORCE] or (has[c.QUATERNION] and (has[c.VELOCITY] or has[c.POSITION])):
-        groups.add("force")
-    if has[c.ANGULAR_VELOCITY] or has[c.QUATERNION]:
-        groups.add("moment")
-    return groups
+    return [names for names in SENSORS if reads(run, names)]
 
 
 def nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
     """Sensors that are missing where a force, a moment or a reading has to be compared."""
     if vehicle.kind == "flight":
-        if channel_groups(run, vehicle):
+        if channels_of(run):
             return None
         wanted = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.QUATERNION)
         return (
@@ -329,8 +373,8 @@ def longest_stretch_s(run: Run, groups: list[tuple[str, ...]]) -> tuple[float, f
     time_s, holes, slowest = run.time_s, [], 0.0
     for names in groups:
         known = time_s[np.isfinite(run.array(names)).all(axis=1)]
-        if len(known) < 4:
-            continue
+        if len(known) < LEAST_VALUES:
+            return 0.0, float("inf")
         steps = np.diff(known)
         period = float(np.median(steps))
         slowest = max(slowest, period)
@@ -348,7 +392,7 @@ def too_short(run: Run, vehicle: Vehicle) -> str | None:
     """A run without a stretch that is long enough to be compared."""
     if vehicle.kind == "flight":
         longest, period = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
-        needed = max(LEAST_STRETCH_S, LEAST_STRETCH_SAMPLES * period)
+        needed = max(LEAST_STRETCH_S, LEAST_STRETCH_SAMPLES * period) if np.isfinite(period) else LEAST_STRETCH_S
         if longest >= needed:
             return None
         return (
@@ -399,7 +443,7 @@ def check_common(recordings: RecordingSet) -> None:
     """InputError where no channel is there in every run."""
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
-        if not set.intersection(*(channel_groups(r, vehicle) for r in runs)):
+        if not set.intersection(*(channels_of(r) for r in runs)):
             raise InputError(f"{recordings.path or recordings.name}: no force or moment is there in every run")
         return
     pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
