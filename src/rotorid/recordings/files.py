@@ -24,7 +24,9 @@ VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
 
 def explain(error: ValidationError) -> str:
     """First fault of a pydantic error as one clause: key, what was found and what was expected."""
-    first = error.errors()[0]
+    entries = error.errors()
+    # A misspelled key is also a missing one: its name says more.
+    first = next((e for e in entries if e["type"] == "extra_forbidden"), entries[0])
     location, kind = first["loc"], first["type"]
     key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
     if kind == "extra_forbidden":

@@ -413,7 +413,16 @@ def too_short(run: Run, vehicle: Vehicle) -> str | None:
     )
 
 
+def hardly_sampled(run: Run, vehicle: Vehicle) -> str | None:
+    """A run of next to no samples."""
+    count = len(run.table)
+    if count >= LEAST_VALUES:
+        return None
+    return f"{whereof(run)}: too little data: found {count} samples, expected some seconds of them"
+
+
 LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
+    hardly_sampled,
     absurd,
     uneven_clock,
     no_rotors,

@@ -81,8 +81,9 @@ def read_yaml(path: Path, as_written: bool = False) -> dict[str, Any]:
     """
     path = Path(path)
     text = read_text(path)
-    loader = (yaml.BaseLoader if as_written else yaml.SafeLoader)(text)
+    loader = None
     try:
+        loader = (yaml.BaseLoader if as_written else yaml.SafeLoader)(text)
         node = loader.get_single_node()
         if node is not None:
             _check_node(node, path)
@@ -97,7 +98,8 @@ def read_yaml(path: Path, as_written: bool = False) -> dict[str, Any]:
     except (ValueError, OverflowError) as error:  # dates and numbers that cannot be
         raise InputError(f"{path}: not valid YAML ({printable(error)})") from None
     finally:
-        loader.dispose()
+        if loader is not None:
+            loader.dispose()
     if not isinstance(content, dict):
         found = {type(None): "nothing", list: "a list", str: "plain text"}.get(type(content), type(content).__name__)
         raise InputError(f"{path}: expected keys with values, found {found}")

@@ -20,9 +20,7 @@ class _Strict(BaseModel):
     @classmethod
     def _truth_is_no_number(cls, content: Any) -> Any:
         for key, value in content.items() if isinstance(content, dict) else ():
-            entries = (
-                value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else [value]
-            )
+            entries = value if isinstance(value, (list, tuple)) else [value]
             if key != "tared" and key in cls.model_fields and any(isinstance(entry, bool) for entry in entries):
                 raise ValueError(f"{key}: found true or false, expected a number or text")
         return content
@@ -101,6 +99,13 @@ class Vehicle(_Strict):
     """Factors of a bench's force readings by axis (`improved_vehicle.yaml` only)."""
     effects: tuple[dict[str, Any], ...] = ()
     """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""
+
+    @field_validator("trust", mode="before")
+    @classmethod
+    def _trust_is_a_number(cls, trust: Any) -> Any:
+        if isinstance(trust, dict) and any(isinstance(sigma, bool) for sigma in trust.values()):
+            raise ValueError("found true or false, expected a relative one-sigma")
+        return trust
 
     @field_validator("trust")
     @classmethod
