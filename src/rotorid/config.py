@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -239,8 +239,18 @@ def check(values: Mapping[str, Any], source: str = "config.yaml") -> Config:
     try:
         return Config.model_validate(dict(values))
     except ValidationError as error:
-        sentences = [_sentence(entry, source) for entry in error.errors()]
+        sentences = [_sentence(entry, source) for entry in _causes(error.errors())]
         raise ConfigError("\n".join(sentences)) from None
+
+
+def _causes(entries: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The entries of a pydantic error less lists that are too short only because what is in them is wrong."""
+    return [
+        entry
+        for entry in entries
+        if entry["type"] != "too_short"
+        or not any(e is not entry and e["loc"][: len(entry["loc"])] == entry["loc"] for e in entries)
+    ]
 
 
 def _sentence(entry: Mapping[str, Any], source: str) -> str:

@@ -37,6 +37,8 @@ LONGEST = 80
 def expected(entry: Mapping[str, Any]) -> str:
     """What an entry of `ValidationError.errors()` would have accepted."""
     kind, context = entry["type"], entry.get("ctx") or {}
+    if kind == "too_short" and context["min_length"] == 1:
+        return "at least one entry"
     if kind in _EXACT:
         return _EXACT[kind].format(**context)
     return next((text for start, text in _BY_START if kind.startswith(start)), "another value")

@@ -76,7 +76,7 @@ def test_the_command_ends_soon_with_one_sentence_and_little_memory(name: str, tm
 NAMES = (
     "{x}",
     "{{x}}",
-    "<b>bold</b>",
+    "<b>bold",
     "$\\frac{1}{$",
     "it's",
     'a "b"',
