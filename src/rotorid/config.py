@@ -10,13 +10,14 @@ from __future__ import annotations
 import difflib
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from rotorid.errors import InputError
+from rotorid.wording import expected, found
 
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
 
@@ -28,11 +29,21 @@ class ConfigError(InputError):
 class Section(BaseModel):
     """A group of keys: frozen, no key unknown, no value converted from another type."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 Text = Annotated[str, Field(min_length=1)]
+
+
+def _rising(limits: tuple[float, float]) -> tuple[float, float]:
+    if not 0 <= limits[0] < limits[1]:
+        raise ValueError(f"found {list(limits)}, expected [low, high] with 0 <= low < high")
+    return limits
+
+
+Limits = Annotated[tuple[float, float], AfterValidator(_rising)]
+Counts = Annotated[tuple[int, int], AfterValidator(_rising)]
 
 
 class Report(Section):
@@ -143,14 +154,14 @@ class GreyBox(Section):
     inertia_rate: float = Field(gt=0, description="Learning rate of the inertia network [1].")
     inertia_epochs: int = Field(ge=1, description="Epochs of the inertia network [1].")
     inertia_every: int = Field(ge=1, description="Every how many samples the inertia network is shown [1].")
-    speed_limits_rad_s: tuple[float, float] = Field(
+    speed_limits_rad_s: Limits = Field(
         strict=False, description="Lowest and highest rotor speed that the motors can hold [rad/s]."
     )
-    design_limits_rad_s: tuple[float, float] = Field(
+    design_limits_rad_s: Limits = Field(
         strict=False, description="Rotor speeds that the excitation may use, room left for control [rad/s]."
     )
     design_tilt_deg: float = Field(gt=0, lt=60, description="Largest tilt that the excitation may cause [deg].")
-    design_harmonics: tuple[int, int] = Field(
+    design_harmonics: Counts = Field(
         strict=False, description="Lowest and highest harmonic of the excitation's period [1]."
     )
     design_period_s: float = Field(gt=0, description="Period of the excitation [s].")
@@ -159,9 +170,7 @@ class GreyBox(Section):
     flight_step_s: float = Field(gt=0, description="Time for which that flight's motor commands are held [s].")
     motor_time_s: float = Field(ge=0, description="Time constant of the motors on that flight [s].")
     draws: int = Field(ge=1, description="Identification flights, each with its own disturbance and noise [1].")
-    band_hz: tuple[float, float] = Field(
-        strict=False, description="Band in which real flights tell their inertia [Hz]."
-    )
+    band_hz: Limits = Field(strict=False, description="Band in which real flights tell their inertia [Hz].")
     block_s: float = Field(gt=0, description="Blocks of flight that the bootstrap draws [s].")
 
 
@@ -171,7 +180,9 @@ class BlackBox(Section):
     seed: int = Field(ge=0, description="Seed of weights, folds and held-out samples [1].")
     epochs: int = Field(ge=1, description="Epochs of the network [1].")
     rate: float = Field(gt=0, description="Learning rate of the network [1].")
-    hidden: tuple[int, ...] = Field(strict=False, description="Nodes of each hidden layer [1].")
+    hidden: tuple[Annotated[int, Field(ge=1)], ...] = Field(
+        min_length=1, strict=False, description="Nodes of each hidden layer [1]."
+    )
     held_out_samples: int = Field(ge=1, description="Samples held out at random, as the thesis does [1].")
     folds: int = Field(ge=2, description="Parts into which whole experiments are held out [1].")
     share: float = Field(gt=0, lt=1, description="Share of new samples that an interval is to cover [1].")
@@ -228,8 +239,18 @@ def check(values: Mapping[str, Any], source: str = "config.yaml") -> Config:
     try:
         return Config.model_validate(dict(values))
     except ValidationError as error:
-        sentences = [_sentence(entry, source) for entry in error.errors()]
+        sentences = [_sentence(entry, source) for entry in _causes(error.errors())]
         raise ConfigError("\n".join(sentences)) from None
+
+
+def _causes(entries: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The entries of a pydantic error less lists that are too short only because what is in them is wrong."""
+    return [
+        entry
+        for entry in entries
+        if entry["type"] != "too_short"
+        or not any(e is not entry and e["loc"][: len(entry["loc"])] == entry["loc"] for e in entries)
+    ]
 
 
 def _sentence(entry: Mapping[str, Any], source: str) -> str:
@@ -245,8 +266,8 @@ def _sentence(entry: Mapping[str, Any], source: str) -> str:
         return f"{source}: {key} is missing."
     if kind == "value_error":
         return f"{source}: {key + ': ' if key else ''}{entry['ctx']['error']}."
-    wanted = entry["msg"].removeprefix("Input should be ").removeprefix("a valid ").rstrip(".")
-    sentence = f"{source}: {key} is {given!r}, but it must be {wanted}."
+    wanted = expected(entry)
+    sentence = f"{source}: {key} is {found(entry)}, but it must be {wanted}."
     if isinstance(given, str) and "number" in wanted and _reads_as_number(given):
         sentence += " (YAML takes a number with an exponent only with a point and a sign: 1.0e-3.)"
     return sentence

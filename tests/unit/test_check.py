@@ -24,7 +24,8 @@ FLIGHT = Vehicle(
 
 
 def flight(**columns: np.ndarray) -> RecordingSet:
-    time = np.arange(100) * 0.01
+    count = len(next(iter(columns.values()), range(100)))
+    time = np.arange(count) * 0.01
     time[50:] += 0.1
     return RecordingSet("flight", FLIGHT, (Run("a", pd.DataFrame({"time_s": time, **columns})),))
 
@@ -76,14 +77,22 @@ def test_the_text_names_runs_columns_and_gaps() -> None:
     assert "Kept as regime variables: odd" in text
 
 
+def sensed() -> dict[str, np.ndarray]:
+    """Columns without which nothing can be compared."""
+    names = [f"{kind}_{axis}_{unit}" for axis in "xyz" for kind, unit in
+             (("specific_force", "m_s2"), ("angular_velocity", "rad_s"))]  # fmt: skip
+    rng = np.random.default_rng(0)
+    return {name: rng.standard_normal(1000) for name in [*names, "rotor_speed_1_rad_s"]}
+
+
 def test_the_command_checks_one_set_or_a_folder_of_them(tmp_path: Path) -> None:
-    write_set(flight(), tmp_path)
+    write_set(flight(**sensed()), tmp_path)
     runner = CliRunner()
     one = runner.invoke(app, ["check", str(tmp_path / "flight")])
     assert one.exit_code == 0
     assert runner.invoke(app, ["check", str(tmp_path)]).stdout == one.stdout
     listed = json.loads(runner.invoke(app, ["check", "--json", str(tmp_path)]).stdout)
-    assert listed[0]["runs"][0]["samples"] == 100
+    assert listed[0]["runs"][0]["samples"] == 1000
 
 
 def test_the_command_fails_with_the_sentence_of_the_fault(tmp_path: Path) -> None:

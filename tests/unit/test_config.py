@@ -52,7 +52,7 @@ def test_a_missing_key_is_named(values: dict[str, Any]) -> None:
 
 def test_a_wrong_type_is_named_with_value_and_what_is_expected(values: dict[str, Any]) -> None:
     values["recordings"] = 7
-    with pytest.raises(ConfigError, match=r"^config\.yaml: recordings is 7, but it must be string\.$"):
+    with pytest.raises(ConfigError, match=r"^config\.yaml: recordings is 7, but it must be text\.$"):
         check(values)
 
 

@@ -98,11 +98,11 @@ def test_writing_twice_gives_the_same_bytes(folder: Path, tmp_path: Path) -> Non
     ("change", "said"),
     [
         (("mass_kg: 0.652\n", ""), "kind flight needs mass_kg"),
-        (("mass_kg: 0.652", "mass_kg: -1"), "mass_kg: Input should be greater than 0 (found -1)"),
-        (("mass_kg: 0.652", "mass: 0.652"), "mass: no such key is known"),
+        (("mass_kg: 0.652", "mass_kg: -1"), "mass_kg: found -1, expected a number of 1e-06 or more"),
+        (("mass_kg: 0.652", "mass: 0.652"), "mass: no such key is known; did you mean mass_kg?"),
         (("name: example\n", ""), "name: is missing"),
-        (("kind: flight", "kind: fly"), "kind: Input should be 'flight', 'stand' or 'bench' (found 'fly')"),
-        (("spin: cw", "spin: left"), "rotors.1.spin: Input should be 'ccw' or 'cw' (found 'left')"),
+        (("kind: flight", "kind: fly"), "kind: found 'fly', expected 'flight', 'stand' or 'bench'"),
+        (("spin: cw", "spin: left"), "rotors.1.spin: found 'left', expected 'ccw' or 'cw'"),
         (("[1.8e-8, 1.9e-8]", "[1.8e-8]"), "torque_coefficient_n_m_s2 has 1 values for 2 rotors"),
         (("1.3877e-6", "-1.0e-6"), "thrust_coefficient_n_s2 must be positive"),
         (("xx: 2.489e-3,", "xx: 2.489e-3, xy: 3e-3,"), "inertia_kg_m2 is not a positive definite matrix"),
@@ -130,7 +130,7 @@ def test_wrong_optional_keys_are_named(folder: Path, added: str, said: str) -> N
 
 def test_a_vehicle_that_is_no_mapping_or_not_there(folder: Path) -> None:
     (folder / "vehicle.yaml").write_text("- a\n")
-    assert "expected keys with values, found list" in message_of(folder)
+    assert "expected keys with values, found a list" in message_of(folder)
     (folder / "vehicle.yaml").unlink()
     assert message_of(folder) == f"{folder / 'vehicle.yaml'}: file is missing"
     assert message_of(folder / "none") == f"{folder / 'none'}: no such recording set (folder)"
@@ -187,7 +187,7 @@ def test_files_that_are_no_tables_are_told(folder: Path) -> None:
 def test_a_parquet_with_words_in_it_is_told(folder: Path) -> None:
     pd.DataFrame({"time_s": [0.0, 1.0], "x": ["a", "b"]}).to_parquet(folder / "a.parquet")
     (folder / "a.csv").unlink()
-    assert message_of(folder) == f"{folder / 'a.parquet'}, a cell is not a number"
+    assert message_of(folder) == f"{folder / 'a.parquet'}, row 1, column x: expected a number, found 'a'"
 
 
 def test_a_set_without_runs_or_with_one_twice(folder: Path) -> None:

@@ -5,9 +5,14 @@ Answers lie in results/sealed, which the scoring rule alone opens.
 
 import sys
 
+from rotorid.errors import InputError
 from rotorid.proof import plan, studies as real
 
 CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
+try:
+    plan.check_families(CASES, CONFIG.proof.seeds)
+except InputError as error:
+    raise WorkflowError(str(error)) from None
 BATCHES = plan.batches(plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases), CONFIG.proof.batch)
 # Recordings come from code outside the library: its hash stands beside that of the script.
 CONCEALING = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))]

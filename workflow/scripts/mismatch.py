@@ -2,7 +2,7 @@
 
 - Reads the set, analyses it, runs the simulation forward with the believed, refitted and improved vehicle.
 - Writes the verdict, the improved vehicle (read back and simulated to prove that it holds the model) and the page.
-- Bad input ends the job with one sentence.
+- Bad input, a full disk and the like end the job with one sentence; the three files are then as they were before.
 """
 
 import sys
@@ -35,3 +35,6 @@ if __name__ == "__main__":
             )
         except InputError as error:
             sys.exit(f"rotorid: {error}")
+        except OSError as error:
+            what = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+            sys.exit(f"rotorid: {what}; nothing was written")

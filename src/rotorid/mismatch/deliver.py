@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from rotorid.mismatch.analyse import analyse
@@ -15,7 +16,9 @@ from rotorid.mismatch.instrument.predict import prove as prove_reading
 from rotorid.mismatch.locate import locate
 from rotorid.mismatch.page import make_page
 from rotorid.mismatch.verdict import Verdict, make_verdict
-from rotorid.recordings import RecordingSet, read_vehicle, write_vehicle
+from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, write_vehicle
+from rotorid.recordings.sufficient import sufficient
+from rotorid.writing import all_or_none, rounded
 
 LOG = logging.getLogger(__name__)
 
@@ -33,8 +36,22 @@ def deliver(
 
 
 def analysis_of(recordings: RecordingSet) -> Analysis:
-    """The analysis for the kind of the set."""
-    return analyse(recordings) if recordings.vehicle.kind == "flight" else analyse_instrument(recordings)
+    """The analysis for the kind of the set; InputError in one sentence where the set does not suffice."""
+    usable = sufficient(recordings)
+    analysis = analyse(usable) if usable.vehicle.kind == "flight" else analyse_instrument(usable)
+    recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with mistakes put right are made anew
+    analysis = replace(analysis, recordings=recordings, notes=(*usable.left_out, *analysis.notes))
+    return with_rounded_model(analysis)
+
+
+def with_rounded_model(analysis: Analysis) -> Analysis:
+    """The analysis whose improved vehicle is stated, and simulated, to as many digits as the verdict states.
+
+    More digits are chance: the last ones of a sum depend on how many threads added it up.
+    """
+    stated = Vehicle.model_validate(rounded(analysis.improved.model_dump()))
+    findings = tuple(replace(f, values=tuple(rounded(list(map(float, f.values))))) for f in analysis.findings)
+    return replace(analysis, improved=stated, findings=findings)
 
 
 def judge(recordings: RecordingSet) -> Verdict:
@@ -45,7 +62,13 @@ def judge(recordings: RecordingSet) -> Verdict:
 def verdict_of(analysis: Analysis) -> Verdict:
     """The verdict that an analysis amounts to."""
     forward = forward_channels(analysis).channels if analysis.instrument is None else {}
-    return make_verdict(analysis, locate(analysis), forward)
+    return with_runs_left_out(make_verdict(analysis, locate(analysis), forward), analysis)
+
+
+def with_runs_left_out(verdict: Verdict, analysis: Analysis) -> Verdict:
+    """The verdict, whose sentence also says which runs were of no use."""
+    left_out = analysis.recordings.left_out
+    return verdict.model_copy(update={"sentence": " ".join([verdict.sentence, *left_out])}) if left_out else verdict
 
 
 def write_files(
@@ -56,22 +79,21 @@ def write_files(
     progress: Callable[[str], None] = LOG.info,
 ) -> Verdict:
     """Write what an analysis amounts to; the improved vehicle is read back and simulated as proof."""
-    for path in (verdict_path, page_path, improved_path):
-        path.parent.mkdir(parents=True, exist_ok=True)
     progress("locating")
     locations = locate(analysis)
     improved = improved_vehicle(analysis)
-    write_vehicle(improved, improved_path)
-    if analysis.instrument is None:
-        progress("running the simulation forward")
-        forward = forward_channels(analysis)
-        prove(analysis, read_vehicle(improved_path), forward)
-    else:
-        forward = Forward({})
-        prove_reading(analysis, improved, read_vehicle(improved_path))
-    verdict = make_verdict(analysis, locations, forward.channels)
-    verdict_path.write_text(verdict.text(), encoding="utf-8")
-    progress("drawing")
-    page_path.write_text(make_page(analysis, verdict, forward.notes), encoding="utf-8")
+    with all_or_none(verdict_path, page_path, improved_path) as (verdict_part, page_part, improved_part):
+        write_vehicle(improved, improved_part)
+        if analysis.instrument is None:
+            progress("running the simulation forward")
+            forward = forward_channels(analysis)
+            prove(analysis, read_vehicle(improved_part), forward)
+        else:
+            forward = Forward({})
+            prove_reading(analysis, improved, read_vehicle(improved_part))
+        verdict = with_runs_left_out(make_verdict(analysis, locations, forward.channels), analysis)
+        verdict_part.write_text(verdict.text(), encoding="utf-8")
+        progress("drawing")
+        page_part.write_text(make_page(analysis, verdict, forward.notes), encoding="utf-8")
     progress(verdict.sentence)
     return verdict

@@ -25,10 +25,30 @@ def svg(fig: Figure) -> str:
     """The figure as SVG text, the same for the same data; closes it."""
     import matplotlib.pyplot as plt
 
+    names_are_names(fig)
     text = io.StringIO()
     fig.savefig(text, format="svg", metadata={"Date": None})
     plt.close(fig)
     return text.getvalue()
+
+
+def names_are_names(fig: Figure) -> None:
+    """Let no text of the figure be read as mathematics: a run or a column may be called `$x$`.
+
+    The numbers at a logarithmic axis, which matplotlib writes as powers of ten, stay what they are.
+    """
+    from matplotlib.text import Text
+
+    powers = {
+        label
+        for ax in fig.axes
+        for axis in (ax.xaxis, ax.yaxis)
+        if axis.get_scale() == "log"
+        for label in axis.get_ticklabels(which="both")
+    }
+    for text in fig.findobj(Text):
+        if text not in powers:
+            text.set_parse_math(False)
 
 
 def smoothed(values: np.ndarray, width: int) -> np.ndarray:

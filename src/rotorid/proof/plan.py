@@ -7,11 +7,14 @@ first part of a case's name is its family (of an instrument the first two: `stan
 from __future__ import annotations
 
 import csv
+import difflib
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
+
+from rotorid.errors import InputError
 
 BUILD_S, JUDGE_S, PEERS_S, START_S = 6.0, 8.0, 3.0, 4.0
 """Usual seconds of one core: to fly and record a case, to judge it, to ask the peers, to start a job."""
@@ -55,6 +58,16 @@ def choose(entries: Sequence[Entry], seeds: Mapping[str, int], patterns: Sequenc
     return [
         e for e in entries if e.seed < seeds.get(e.family, 0) and any(fnmatch(e.case, pattern) for pattern in patterns)
     ]
+
+
+def check_families(entries: Sequence[Entry], seeds: Mapping[str, int]) -> None:
+    """InputError where `seeds` names a family that is not there: a misspelled one would leave its cases out."""
+    families = list(dict.fromkeys(e.family for e in entries))
+    for family in seeds:
+        if family not in families:
+            close = difflib.get_close_matches(family, families, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"known are {', '.join(families)}."
+            raise InputError(f"config.yaml: proof.seeds.{family} is no family of concealed cases; {hint}")
 
 
 def batches(entries: Sequence[Entry], size: int) -> dict[str, list[Entry]]:

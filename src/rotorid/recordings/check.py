@@ -6,7 +6,7 @@ there, which are not and what that means for testing.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import read_set
 from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.sufficient import sufficient
 
 GAP_FACTOR = 3.0
 """A step of the clock longer than this many median steps is a gap."""
@@ -177,5 +178,8 @@ def as_text(check: SetCheck) -> str:
 
 
 def check_folder(folder: Path) -> SetCheck:
-    """Read a set and check it; InputError if it does not fit the contract."""
-    return check_set(read_set(Path(folder)))
+    """Read a set and check it; InputError if it does not fit the contract or nothing in it can be compared."""
+    recordings = read_set(Path(folder))
+    usable = sufficient(recordings)
+    found = check_set(recordings)
+    return replace(found, lacks=(*usable.left_out, *found.lacks))

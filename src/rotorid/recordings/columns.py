@@ -20,9 +20,9 @@ TEMPERATURE = "temperature_c"
 MOUNT = ("roll_rad", "pitch_rad")
 
 _PER_ROTOR = {
-    "rotor_speed": re.compile(r"rotor_speed_(\d+)_rad_s"),
-    "rotor_command": re.compile(r"rotor_command_(\d+)_rad_s"),
-    "throttle": re.compile(r"throttle_(\d+)"),
+    "rotor_speed": re.compile(r"rotor_speed_(0|[1-9]\d*)_rad_s"),
+    "rotor_command": re.compile(r"rotor_command_(0|[1-9]\d*)_rad_s"),
+    "throttle": re.compile(r"throttle_(0|[1-9]\d*)"),
 }
 FIXED = frozenset(
     (TIME, HEIGHT, BATTERY_VOLTAGE, BATTERY_CURRENT, TEMPERATURE)

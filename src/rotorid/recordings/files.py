@@ -5,45 +5,48 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import yaml
 from pydantic import ValidationError
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.belief import check_belief
+from rotorid.recordings.names import hint
 from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.vehicle import Vehicle
+from rotorid.recordings.tables import TooFewSamples, check_table, read_csv, read_parquet
+from rotorid.recordings.text_files import check_file, read_yaml
+from rotorid.recordings.vehicle import Inertia, Noise, Rotor, Vehicle
+from rotorid.wording import expected, found, printable
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
+VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
 
 
 def explain(error: ValidationError) -> str:
-    """First fault of a pydantic error as one clause: key and what was expected."""
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    message = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        return f"{key}: no such key is known"
-    if first["type"] == "missing":
+    """First fault of a pydantic error as one clause: key, what was found and what was expected."""
+    entries = error.errors()
+    # A misspelled key is also a missing one: its name says more.
+    first = next((e for e in entries if e["type"] == "extra_forbidden"), entries[0])
+    location, kind = first["loc"], first["type"]
+    key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
+    if kind == "extra_forbidden":
+        return f"{key}: no such key is known{hint(str(location[-1]), _keys_at(location))}"
+    if kind == "missing":
         return f"{key}: is missing"
-    value = f" (found {first['input']!r})" if key and first["type"] != "value_error" else ""
-    return f"{key}: {message}{value}" if key else message
+    if kind == "value_error":
+        return ": ".join(x for x in (key, str(first["ctx"]["error"])) if x)
+    return f"{key}: found {found(first)}, expected {expected(first)}"
 
 
-def read_yaml(path: Path) -> dict:
-    """A YAML mapping; InputError names the file and line of a fault."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            content = yaml.safe_load(file)
-    except FileNotFoundError:
-        raise InputError(f"{path}: file is missing") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f", line {mark.line + 1}" if mark else ""
-        raise InputError(f"{path}{line}: not valid YAML ({getattr(error, 'problem', error)})") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: expected keys with values, found {type(content).__name__}")
-    return content
+_BRANCHES = ("float", "tuple[float, ...]", "constrained-float")
+"""Parts of a pydantic location that name a kind of value, not a key."""
+
+
+def _keys_at(location: tuple[str | int, ...]) -> list[str]:
+    """Keys that are known where a location of a pydantic error lies."""
+    inner = {"inertia_kg_m2": Inertia, "rotors": Rotor, "noise": Noise}
+    model = inner.get(str(location[0]), Vehicle) if len(location) > 1 else Vehicle
+    return list(model.model_fields)
 
 
 def _numbers(value):
@@ -62,14 +65,27 @@ def _numbers(value):
 
 def read_vehicle(path: Path) -> Vehicle:
     """Read `vehicle.yaml`; InputError in one sentence if it does not fit the contract."""
+    path = Path(path)
+    if not path.exists() and not path.is_symlink() and path.parent.is_dir():
+        near = _misnamed(path)
+        if near:
+            raise InputError(f"{path}: file is missing; did you mean {printable(near)}?")
     content = read_yaml(path)
     content = {k: v if k in ("name", "kind") else _numbers(v) for k, v in content.items()}
-    if "name" in content:
+    if isinstance(content.get("name"), (int, float)) and not isinstance(content["name"], bool):
         content["name"] = str(content["name"])
     try:
-        return Vehicle.model_validate(content)
+        return Vehicle.model_validate({str(key): value for key, value in content.items()})
     except ValidationError as error:
         raise InputError(f"{path}: {explain(error)}") from None
+
+
+def _misnamed(path: Path) -> str | None:
+    """A file beside this one whose name differs in its case or in `.yml`."""
+    wanted = (path.name.lower(), path.with_suffix(".yml").name.lower())
+    return next(
+        (p.name for p in sorted(path.parent.iterdir()) if p.name.lower() in wanted and p.name != path.name), None
+    )
 
 
 def _plain(value):
@@ -97,104 +113,98 @@ def run_name(path: Path) -> str | None:
     return None
 
 
-def _first_bad_cell(path: Path) -> str:
-    """Where a CSV holds something that is not a number, for the message."""
-    table = pd.read_csv(path, dtype=str, keep_default_na=False, skipinitialspace=True)
-    for name in table.columns:
-        numbers = pd.to_numeric(table[name].replace("", "nan"), errors="coerce")
-        bad = numbers.isna() & ~table[name].str.strip().str.lower().isin(["", "nan"])
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            return f"line {row + 2}, column {name}: expected a number, found {table[name].iloc[row]!r}"
-    return "a cell is not a number"
-
-
-def check_table(table: pd.DataFrame, where: str) -> pd.DataFrame:
-    """The table as floats with a usable `time_s`; InputError says what is wrong and where."""
-    repeated = table.columns[table.columns.duplicated()]
-    if len(repeated):
-        raise InputError(f"{where}: column {repeated[0]} is there twice")
-    if c.TIME not in table.columns:
-        raise InputError(f"{where}: column {c.TIME} is missing")
-    table = table.astype(float)
-    time = table[c.TIME].to_numpy()
-    if len(time) < 2:
-        raise InputError(f"{where}: expected at least two samples, found {len(time)}")
-    if np.isnan(time).any():
-        row = int(np.flatnonzero(np.isnan(time))[0])
-        raise InputError(f"{where}, line {row + 2}: {c.TIME} is empty")
-    steps = np.diff(time)
-    if (steps <= 0).any():
-        row = int(np.flatnonzero(steps <= 0)[0]) + 1
-        raise InputError(
-            f"{where}, line {row + 2}: {c.TIME} must increase strictly, found {time[row]:.9g} after {time[row - 1]:.9g}"
-        )
-    return table
-
-
-def _read_parquet(path: Path) -> pd.DataFrame:
-    try:
-        return pd.read_parquet(path)
-    except ValueError as error:  # pyarrow's own error for broken files is one of these
-        raise InputError(f"{path}: cannot be read as a table ({error})") from None
-
-
 def read_run(path: Path) -> Run:
     """Read one run; InputError names file, line and column of a fault."""
+    path = Path(path)
     name = run_name(path)
     if name is None:
         raise InputError(f"{path}: expected one of {', '.join(RUN_SUFFIXES)}")
-    try:
-        if path.name.endswith(".parquet"):
-            table = _read_parquet(path)
-        else:
-            table = pd.read_csv(path, skipinitialspace=True, encoding="utf-8-sig")
-            table.columns = [str(column).strip() for column in table.columns]
-        table = check_table(table, str(path))
-    except FileNotFoundError:
-        raise InputError(f"{path}: file is missing") from None
-    except InputError:
-        raise
-    except (ValueError, TypeError):
-        where = _first_bad_cell(path) if ".csv" in path.name else "a cell is not a number"
-        raise InputError(f"{path}, {where}") from None
-    except Exception as error:
-        raise InputError(f"{path}: cannot be read as a table ({error})") from None
-    return Run(name, table)
+    check_file(path)
+    table = read_parquet(path) if path.name.endswith(".parquet") else read_csv(path)
+    return Run(name, check_table(table, str(path)), str(path))
+
+
+def run_paths(folder: Path) -> list[Path]:
+    """Files of the runs of a set, in the order of the runs' names; InputError for a name that cannot be one."""
+    paths = []
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith("."):  # what systems and editors leave behind
+            continue
+        if not path.name.isprintable():
+            raise InputError(
+                f"{folder}: the name of file {printable(path.name)} holds a line break or control character"
+            )
+        if run_name(path):
+            paths.append(path)
+        elif run_name(Path(path.name.lower())):
+            raise InputError(f"{path}: expected its ending in small letters ({', '.join(RUN_SUFFIXES)})")
+    if not paths:
+        raise InputError(f"{folder}: no run found, expected files ending in {', '.join(RUN_SUFFIXES)}")
+    paths.sort(key=lambda p: run_name(p))
+    for first, second in zip(paths, paths[1:], strict=False):
+        if run_name(first) == run_name(second):
+            raise InputError(f"{folder}: run {run_name(first)} is there twice ({first.name}, {second.name})")
+    return paths
+
+
+def read_split(path: Path, names: list[str]) -> tuple[str, ...]:
+    """Runs that `split.yaml` holds out, each one of `names`."""
+    content = read_yaml(path, as_written=True)
+    for key in content:
+        if key != "held_out":
+            raise InputError(f"{path}: {printable(key)}: no such key is known{hint(str(key), ['held_out'])}")
+    held_out = content.get("held_out")
+    if not isinstance(held_out, list):
+        what = printable(held_out) if isinstance(held_out, str) and held_out else "nothing" if not held_out else "keys"
+        raise InputError(f"{path}: held_out: found {what}, expected a list of runs: [{names[-1]}]")
+    if not held_out:
+        raise InputError(f"{path}: held_out: names no run, expected at least one (or no {SPLIT})")
+    for number, name in enumerate(held_out):
+        if not isinstance(name, str):
+            raise InputError(f"{path}: held_out: found a list or keys, expected names of runs")
+        if name not in names:
+            near = hint(run_name(Path(name)) or name, names)
+            raise InputError(f"{path}: held_out names run {printable(name)}, which is not in the set{near}")
+        if name in held_out[:number]:
+            raise InputError(f"{path}: held_out names run {name} twice")
+    if len(held_out) == len(names):
+        raise InputError(f"{path}: every run is held out, none is left to fit")
+    return tuple(held_out)
 
 
 def read_set(folder: Path) -> RecordingSet:
     """Read a recording set; InputError in one sentence if anything in it does not fit the contract."""
     folder = Path(folder)
+    if not folder.name.isprintable():
+        raise InputError(f"{printable(folder)}: the folder's name holds a line break or control character")
     if not folder.is_dir():
         raise InputError(f"{folder}: no such recording set (folder)")
-    vehicle = read_vehicle(folder / "vehicle.yaml")
-    paths = sorted((p for p in folder.iterdir() if run_name(p)), key=lambda p: run_name(p))
-    if not paths:
-        raise InputError(f"{folder}: no run found, expected files ending in {', '.join(RUN_SUFFIXES)}")
-    names = [run_name(p) for p in paths]
-    for first, second in zip(paths, paths[1:], strict=False):
-        if run_name(first) == run_name(second):
-            raise InputError(f"{folder}: run {run_name(first)} is there twice ({first.name}, {second.name})")
-    runs = tuple(read_run(p) for p in paths)
-    for run, path in zip(runs, paths, strict=True):
+    vehicle = read_vehicle(folder / VEHICLE)
+    check_belief(vehicle, str(folder / VEHICLE))
+    paths = run_paths(folder)
+    runs, left_out = [], []
+    for path in paths:
+        try:
+            runs.append(read_run(path))
+        except TooFewSamples as error:
+            left_out.append(f"Left out: {error}.")
+            if len(left_out) == len(paths):
+                raise
+    for run in runs:
         for column in run.table.columns:
-            found = c.rotor_number(column)
-            if found and vehicle.kind != "bench" and not 1 <= found[1] <= vehicle.rotor_count:
-                raise InputError(f"{path}, column {column}: vehicle.yaml lists {vehicle.rotor_count} rotors only")
+            rotor = c.rotor_number(column)
+            if not rotor or vehicle.kind == "bench" or 1 <= rotor[1] <= vehicle.rotor_count:
+                continue
+            if rotor[1] < 1:
+                raise InputError(f"{run.path}, column {column}: rotors are numbered from 1")
+            raise InputError(f"{run.path}, column {column}: {VEHICLE} lists {vehicle.rotor_count} rotors only")
     held_out = None
-    if (folder / "split.yaml").exists():
-        split = read_yaml(folder / "split.yaml")
-        unknown = [k for k in split if k != "held_out"]
-        if unknown:
-            raise InputError(f"{folder / 'split.yaml'}: {unknown[0]}: no such key is known")
-        held_out = tuple(str(n) for n in split.get("held_out") or ())
-        for name in held_out:
-            if name not in names:
-                raise InputError(f"{folder / 'split.yaml'}: held_out names run {name}, which is not in the set")
-        if len(held_out) == len(names):
-            raise InputError(f"{folder / 'split.yaml'}: every run is held out, none is left to fit")
-    return RecordingSet(folder.name, vehicle, runs, held_out)
+    split = folder / SPLIT
+    if split.exists() or split.is_symlink():
+        held_out = read_split(split, [run_name(p) for p in paths])
+    elif near := _misnamed(split):
+        raise InputError(f"{folder / near}: expected the name {SPLIT}")
+    return RecordingSet(folder.name, vehicle, tuple(runs), held_out, str(folder), tuple(left_out))
 
 
 def write_set(recordings: RecordingSet, parent: Path, suffix: str = ".parquet") -> Path:

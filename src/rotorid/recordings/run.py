@@ -21,6 +21,8 @@ class Run:
 
     name: str
     table: pd.DataFrame
+    path: str = ""
+    """File that it was read from, for messages; empty where there is none."""
 
     @cached_property
     def time_s(self) -> np.ndarray:
@@ -64,6 +66,10 @@ class RecordingSet:
     runs: tuple[Run, ...]
     held_out: tuple[str, ...] | None = None
     """Runs that `split.yaml` holds out; None where there is no such file."""
+    path: str = ""
+    """Folder that it was read from, for messages; empty where there is none."""
+    left_out: tuple[str, ...] = ()
+    """One sentence for each run that could not be used."""
 
     def run(self, name: str) -> Run:
         """The run of that name; KeyError if there is none."""

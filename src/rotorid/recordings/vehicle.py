@@ -7,7 +7,7 @@ pushes the airframe clockwise: positive yaw moment.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -16,16 +16,25 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _truth_is_no_number(cls, content: Any) -> Any:
+        for key, value in content.items() if isinstance(content, dict) else ():
+            entries = value if isinstance(value, (list, tuple)) else [value]
+            if key != "tared" and key in cls.model_fields and any(isinstance(entry, bool) for entry in entries):
+                raise ValueError(f"{key}: found true or false, expected a number or text")
+        return content
+
 
 class Inertia(_Strict):
     """Entries of the inertia matrix J about the centre of mass, kg m2 (J_xz = -∫ x z dm)."""
 
-    xx: float = Field(gt=0)
-    yy: float = Field(gt=0)
-    zz: float = Field(gt=0)
-    xy: float = 0.0
-    xz: float = 0.0
-    yz: float = 0.0
+    xx: float = Field(ge=1e-12, le=1e6)
+    yy: float = Field(ge=1e-12, le=1e6)
+    zz: float = Field(ge=1e-12, le=1e6)
+    xy: float = Field(0.0, ge=-1e6, le=1e6)
+    xz: float = Field(0.0, ge=-1e6, le=1e6)
+    yz: float = Field(0.0, ge=-1e6, le=1e6)
 
     def matrix(self) -> np.ndarray:
         """Inertia matrix, shape (3, 3), kg m2, body axes."""
@@ -35,9 +44,9 @@ class Inertia(_Strict):
 class Rotor(_Strict):
     """Where a rotor sits (body axes, m) and how it spins seen from above."""
 
-    x_m: float
-    y_m: float
-    z_m: float = 0.0
+    x_m: float = Field(ge=-100, le=100)
+    y_m: float = Field(ge=-100, le=100)
+    z_m: float = Field(0.0, ge=-100, le=100)
     spin: Literal["ccw", "cw"]
 
     @property
@@ -56,9 +65,12 @@ class Noise(_Strict):
     position_m: float | None = Field(None, ge=0)
     force_n: float | None = Field(None, ge=0)
     moment_n_m: float | None = Field(None, ge=0)
-    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
 
+Length = Annotated[float, Field(ge=-100, le=100)]
+Place = tuple[Length, Length, Length]
+SMALLEST_COEFFICIENT, LARGEST_COEFFICIENT = 1e-14, 1e2
+LARGEST_SPEED_RAD_S = 1e6
 _FLIGHT_NEEDS = ("mass_kg", "inertia_kg_m2", "rotors", "thrust_coefficient_n_s2", "torque_coefficient_n_m_s2")
 
 
@@ -67,17 +79,17 @@ class Vehicle(_Strict):
 
     name: str
     kind: Literal["flight", "stand", "bench"]
-    mass_kg: float | None = Field(None, gt=0)
+    mass_kg: float | None = Field(None, ge=1e-6, le=1e5)
     inertia_kg_m2: Inertia | None = None
     rotors: tuple[Rotor, ...] = ()
     thrust_coefficient_n_s2: float | tuple[float, ...] | None = None
     torque_coefficient_n_m_s2: float | tuple[float, ...] | None = None
-    gravity_m_s2: float = Field(9.81, gt=0)
-    rotor_radius_m: float | None = Field(None, gt=0)
-    rotor_inertia_kg_m2: float | None = Field(None, ge=0)
-    ground_z_m: float | None = None
-    accelerometer_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    sensor_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gravity_m_s2: float = Field(9.81, ge=0.01, le=1000)
+    rotor_radius_m: float | None = Field(None, ge=1e-4, le=100)
+    rotor_inertia_kg_m2: float | None = Field(None, ge=0, le=1e6)
+    ground_z_m: float | None = Field(None, ge=-1e7, le=1e7)
+    accelerometer_position_m: Place = (0.0, 0.0, 0.0)
+    sensor_position_m: Place = (0.0, 0.0, 0.0)
     sensor_mount: Literal["level", "tilting"] = "level"
     tared: bool | None = None
     rotor_speed_limits_rad_s: tuple[float, float] | None = None
@@ -87,6 +99,13 @@ class Vehicle(_Strict):
     """Factors of a bench's force readings by axis (`improved_vehicle.yaml` only)."""
     effects: tuple[dict[str, Any], ...] = ()
     """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""
+
+    @field_validator("trust", mode="before")
+    @classmethod
+    def _trust_is_a_number(cls, trust: Any) -> Any:
+        if isinstance(trust, dict) and any(isinstance(sigma, bool) for sigma in trust.values()):
+            raise ValueError("found true or false, expected a relative one-sigma")
+        return trust
 
     @field_validator("trust")
     @classmethod
@@ -112,10 +131,14 @@ class Vehicle(_Strict):
             values = value if isinstance(value, tuple) else () if value is None else (value,)
             if any(v <= 0 for v in values):
                 raise ValueError(f"{key} must be positive")
+            if not all(SMALLEST_COEFFICIENT <= v <= LARGEST_COEFFICIENT for v in values):
+                raise ValueError(f"{key} must lie between {SMALLEST_COEFFICIENT:g} and {LARGEST_COEFFICIENT:g}")
         if self.rotor_speed_limits_rad_s is not None:
             low, high = self.rotor_speed_limits_rad_s
-            if not 0 <= low < high:
-                raise ValueError("rotor_speed_limits_rad_s must be [low, high] with 0 <= low < high")
+            if not 0 <= low < high <= LARGEST_SPEED_RAD_S:
+                raise ValueError(
+                    f"rotor_speed_limits_rad_s must be [low, high] with 0 <= low < high <= {LARGEST_SPEED_RAD_S:g}"
+                )
         if self.inertia_kg_m2 is not None and np.linalg.eigvalsh(self.inertia_kg_m2.matrix())[0] <= 0:
             raise ValueError("inertia_kg_m2 is not a positive definite matrix")
         return self

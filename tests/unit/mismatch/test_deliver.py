@@ -78,3 +78,12 @@ def test_the_page_is_whole_and_the_same_twice(tmp_path, findings, shown):
         assert f"<h2>{heading}</h2>" in page
     assert "no height above ground" in page
     assert verdict.set == "made"
+
+
+def test_names_in_figures_are_no_mathematics():
+    import numpy as np
+
+    from rotorid.plots.mismatch import before_and_after, svg
+
+    time_s, name = np.arange(50) / 10, "$\\frac{1}{$"
+    assert "<svg" in svg(before_and_after(time_s, np.sin(time_s), np.cos(time_s), None, name, name))

@@ -1,0 +1,480 @@
+"""Whether a recording set holds enough to be compared with its vehicle, looked at before any analysis.
+
+A fault that a person mends in a minute (a misspelled column, a rotor without its column) ends with one sentence. A run
+that cannot be used (too short, empty, numbers that nothing measures) is left out and named where the others suffice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.errors import InputError
+from rotorid.recordings import columns as c
+from rotorid.recordings.names import listed, nearest, plain
+from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.tables import place
+from rotorid.recordings.vehicle import Vehicle
+
+LEAST_FLIGHT_HZ = 2.0
+"""Slower flights show no motion of their own: between two samples a quadrotor has turned and come back."""
+LEAST_STRETCH_S = 3.0
+LEAST_STRETCH_SAMPLES = 30
+"""A stretch of flight without a hole must last so long, and so many samples of its slowest sensor."""
+LEAST_SINGLE_S = 9.0
+"""Of a single run a third is held out, after a gap of two seconds; both parts need two seconds."""
+LEAST_READINGS = 10
+"""Readings of a stand or a bench that are there in every compared channel at once, in a run."""
+HOLE_PERIODS = 6.0
+"""Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
+MOST_GRID, MOST_HOLES = 500_000, 20
+"""A run is resampled to an even grid: larger ones may be so many times as long as the samples that are there."""
+LEAST_VALUES = 4
+"""Complete readings from which a sensor counts as recorded."""
+LARGEST = {
+    c.POSITION: 1e7,
+    c.VELOCITY: 1e4,
+    c.ANGULAR_VELOCITY: 1e5,
+    c.SPECIFIC_FORCE: 1e5,
+    c.FORCE: 1e7,
+    c.MOMENT: 1e7,
+    c.REFERENCE_FORCE: 1e7,
+    c.MOUNT: 1e4,
+    (c.HEIGHT,): 1e7,
+    (c.BATTERY_VOLTAGE, c.BATTERY_CURRENT, c.TEMPERATURE): 1e6,
+}
+"""Largest size of a number in the column's unit, loose enough for values in a wrong unit (which is a finding)."""
+LARGEST_OF_ROTOR = 1e7
+LARGEST_UNKNOWN = 1e30
+QUATERNION_NORM = (0.5, 2.0)
+SENSORS = (c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE)
+SURELY_MEANT = 0.85
+"""Likeness from which an unknown column is taken for the missing one of a sensor whose other columns are there."""
+LIFTING = 0.25
+LEAST_LIFT_N = 1.0
+"""Share of the weight, and force, by which a stand's reading beyond the weight shows that its rotors turned."""
+
+
+def sufficient(recordings: RecordingSet) -> RecordingSet:
+    """The set as the analysis can use it: runs that are of no use left out, each with a sentence in `left_out`.
+
+    Raises
+    ------
+    InputError
+        One sentence with file and column, where a column is misspelled or what is left does not suffice.
+    """
+    recordings = without_dead_sensors(without_rotors_on_a_bench(recordings))
+    for run in recordings.runs:
+        check_spelling(run, recordings.vehicle)
+    usable, reasons = [], []
+    for run in recordings.runs:
+        reason = next((why for look in LOOKS if (why := look(run, recordings.vehicle))), None)
+        if reason is None:
+            usable.append(run)
+        else:
+            reasons.append(reason)
+    if not usable:
+        raise InputError(reasons[0] + (f" (and {len(reasons) - 1} more runs likewise)" if len(reasons) > 1 else ""))
+    left_out = (*recordings.left_out, *(f"Left out: {reason}." for reason in reasons))
+    kept = replace(recordings, runs=tuple(usable), left_out=left_out)
+    kept = with_alike_runs(kept)
+    if len(kept.runs) == 1:
+        check_single(kept)
+    check_common(kept)
+    return with_split_of_the_rest(kept)
+
+
+def without_rotors_on_a_bench(recordings: RecordingSet) -> RecordingSet:
+    """A bench compares readings with known loads: rotors that are listed but not recorded play no part."""
+    vehicle = recordings.vehicle
+    if vehicle.kind != "bench" or not vehicle.rotors or any(driven_by(r, vehicle) for r in recordings.runs):
+        return recordings
+    without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
+    return replace(recordings, vehicle=vehicle.model_copy(update=without))
+
+
+def without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
+    """The flights without sensors that hold one value throughout every run: nothing was read from them."""
+    if recordings.vehicle.kind != "flight":
+        return recordings
+    dead = [names for names in SENSORS if _holds_one_value(recordings.runs, names)]
+    speeds, *ordered = rotor_groups(recordings.vehicle).values()
+    turn = any(run.has(*speeds) and np.nanmax(run.array(speeds)) > 0 for run in recordings.runs)
+    dead += [names for names in ordered if turn and _holds_one_value(recordings.runs, names, 0.0)]
+    if c.QUATERNION in dead and any(no_attitude(run, recordings.vehicle) for run in recordings.runs):
+        dead.remove(c.QUATERNION)
+    if not dead:
+        return recordings
+    gone = [name for names in dead for name in names]
+    kept = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
+    said = tuple(
+        f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
+        for names in dead
+    )
+    return replace(recordings, runs=tuple(kept), left_out=(*recordings.left_out, *said))
+
+
+def _holds_one_value(runs: Iterable[Run], names: tuple[str, ...], value: float | None = None) -> bool:
+    """Whether a sensor is there in some run and in every such run each of its columns keeps one value (this one)."""
+    there = [run.array(names) for run in runs if run.has(*names)]
+    there = [values[np.isfinite(values).all(axis=1)] for values in there]
+    return any(len(v) > 1 for v in there) and all((v == (v[:1] if value is None else value)).all() for v in there)
+
+
+def with_alike_runs(recordings: RecordingSet) -> RecordingSet:
+    """The flights with the same channels in every run: what is compared is compared in all of them.
+
+    A few runs that lack a channel are left out; where half of them or more do, the sensor is left out of the others.
+    """
+    if recordings.vehicle.kind != "flight":
+        return recordings
+    channels = {run.name: channels_of(run) for run in recordings.runs}
+    every = set.union(*channels.values())
+    poor = [run for run in recordings.runs if channels[run.name] != every]
+    if not poor:
+        return recordings
+    said = list(recordings.left_out)
+    if 2 * len(poor) < len(recordings.runs):
+        for run in poor:
+            lost = listed(sorted(every - channels[run.name]))
+            said.append(f"Left out: {whereof(run)}: lacks sensors that the other runs have (for {lost}).")
+        kept = tuple(run for run in recordings.runs if run not in poor)
+        return replace(recordings, runs=kept, left_out=tuple(said))
+    partly = [names for names in SENSORS if not all(reads(run, names) for run in recordings.runs)]
+    if all(reads(run, c.VELOCITY) or reads(run, c.POSITION) for run in recordings.runs):
+        partly = [names for names in partly if names not in (c.VELOCITY, c.POSITION)]
+    dropped = [names for names in partly if any(reads(run, names) for run in recordings.runs)]
+    said += [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
+    gone = {name for names in partly for name in names}
+    runs = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
+    return replace(recordings, runs=tuple(runs), left_out=tuple(said))
+
+
+def reads(run: Run, names: tuple[str, ...]) -> bool:
+    """Whether a sensor has enough complete readings in a run to count as recorded."""
+    if not run.has(*names):
+        return False
+    return int(np.isfinite(run.array(names)).all(axis=1).sum()) >= LEAST_VALUES
+
+
+def channels_of(run: Run) -> set[str]:
+    """Channels of a flight that a run can be compared in, beside those of its rotors."""
+    force, turning, attitude = (reads(run, n) for n in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, c.QUATERNION))
+    moving = attitude and (reads(run, c.VELOCITY) or reads(run, c.POSITION))
+    found = {
+        "force": force or moving,
+        "moment": turning or attitude,
+        "accelerometer": force and moving,
+        "gyroscope": turning and attitude,
+    }
+    return {name for name, there in found.items() if there}
+
+
+def whereof(run: Run) -> str:
+    """The run's file, or its name where it was never one."""
+    return run.path or f"run {run.name}"
+
+
+def rotor_groups(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
+    """Kind of column to its names for the vehicle's rotors, measured speeds first."""
+    return {kind: c.rotor_columns(kind, vehicle.rotor_count) for kind in ("rotor_speed", "rotor_command", "throttle")}
+
+
+def driven_by(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
+    """Columns that the rotors' speeds are known from; empty where no kind of them is whole."""
+    return next((names for names in rotor_groups(vehicle).values() if names and run.has(*names)), ())
+
+
+def groups_of(vehicle: Vehicle) -> tuple[tuple[str, ...], ...]:
+    """Sensors whose columns only make sense together."""
+    if vehicle.kind == "flight":
+        return (*rotor_groups(vehicle).values(), *SENSORS)
+    if vehicle.kind == "stand":
+        return (*rotor_groups(vehicle).values(), c.MOUNT)
+    return ()
+
+
+def known_names(vehicle: Vehicle) -> list[str]:
+    """Every column that the contract knows for this vehicle."""
+    return sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
+
+
+def check_spelling(run: Run, vehicle: Vehicle) -> None:
+    """InputError where an unknown column is surely a known one that is missing."""
+    there = set(run.table.columns)
+    missing = [name for name in known_names(vehicle) if name not in there]
+    halved = {
+        name for names in groups_of(vehicle) if any(n in there for n in names) for name in names if name not in there
+    }
+    for column in run.unknown_columns:
+        meant = next((name for name in missing if plain(name) == plain(column)), None)
+        meant = meant or nearest(column, halved, SURELY_MEANT)
+        if meant:
+            raise InputError(
+                f"{whereof(run)}: column {column} is not known and {meant} is missing; did you mean {meant}?"
+            )
+
+
+def absurd(run: Run, vehicle: Vehicle) -> str | None:
+    """The first cell that no sensor can have written: infinite, or far beyond what its unit allows."""
+    limits = {name: most for names, most in LARGEST.items() for name in names}
+    for column in run.table.columns:
+        values = run.column(column)
+        most = limits.get(column, LARGEST_OF_ROTOR if c.rotor_number(column) else LARGEST_UNKNOWN)
+        if column in c.QUATERNION or column == c.TIME:
+            most = LARGEST_UNKNOWN
+        with np.errstate(invalid="ignore"):
+            bad = np.flatnonzero(np.abs(values) > most)
+        if len(bad):
+            unit = c.unit_of(column)
+            return (
+                f"{whereof(run)}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
+                f"number of at most {most:g}{' ' + unit if unit else ''} (an empty cell where nothing was measured)"
+            )
+    return None
+
+
+def no_attitude(run: Run, vehicle: Vehicle) -> str | None:
+    """The first quaternion that is no attitude."""
+    if vehicle.kind != "flight" or not run.has(*c.QUATERNION):
+        return None
+    norm = np.linalg.norm(run.array(c.QUATERNION), axis=1)
+    low, high = QUATERNION_NORM
+    bad = np.flatnonzero((norm < low) | (norm > high))
+    if not len(bad):
+        return None
+    many = f" ({len(bad)} of {len(norm)} samples are like it)" if len(bad) > 1 else ""
+    return (
+        f"{whereof(run)}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
+        f"{norm[bad[0]]:.3g}, expected 1{many}; leave the cells empty where the attitude is not known"
+    )
+
+
+def uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
+    """A clock that jumps so far, or counts in such a unit, that no even grid can hold the run."""
+    steps = np.diff(run.time_s)
+    median, span = float(np.median(steps)), float(run.time_s[-1] - run.time_s[0])
+    jump = int(np.argmax(steps))
+    if span / median > max(MOST_GRID, MOST_HOLES * len(steps)):
+        return (
+            f"{whereof(run)}, {place(run.path, jump + 1)}: {c.TIME} jumps by {steps[jump]:.6g} s where its usual step "
+            f"is {median:.3g} s, expected one clock throughout (parts that are so far apart are runs of their own)"
+        )
+    if vehicle.kind == "flight" and median * LEAST_FLIGHT_HZ > 1:
+        unit = next((u for factor, u in ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
+                     if 1e-4 < median / factor < 0.2), None)  # fmt: skip
+        return (
+            f"{whereof(run)}: {c.TIME} has a usual step of {median:.6g} s, expected at most {1 / LEAST_FLIGHT_HZ:g} s "
+            f"({LEAST_FLIGHT_HZ:g} samples a second)" + (f"; is it in {unit}?" if unit else "")
+        )
+    return None
+
+
+def no_rotors(run: Run, vehicle: Vehicle) -> str | None:
+    """Rotor columns that are missing where a thrust has to be predicted."""
+    if vehicle.kind == "bench" or driven_by(run, vehicle):
+        return None
+    there = run.table.columns
+    partly = {k: names for k, names in rotor_groups(vehicle).items() if any(run.has(n) for n in names)}
+    if partly:
+        kind, names = max(partly.items(), key=lambda item: sum(run.has(n) for n in item[1]))
+        lost = [n for n in names if not run.has(n)]
+        empty = [n for n in lost if n in there]
+        state = "empty" if len(empty) == len(lost) else "missing"
+        found = len(names) - len(lost)
+        return (
+            f"{whereof(run)}: {'columns' if len(lost) > 1 else 'column'} {listed(lost)} "
+            f"{'are' if len(lost) > 1 else 'is'} {state}: vehicle.yaml lists {len(names)} rotors, the run has "
+            f"the {kind.replace('_', ' ')} of {found}, and no other kind of rotor column is whole{likely(run, lost)}"
+        )
+    speeds, commands, throttles = rotor_groups(vehicle).values()
+    empty = [n for n in (*speeds, *commands, *throttles) if n in there]
+    found = f" ({listed(empty)} {'are' if len(empty) > 1 else 'is'} empty)" if empty else ""
+    return (
+        f"{whereof(run)}: no thrust can be predicted without {speeds[0]} to {speeds[-1]}, {commands[0]} … or "
+        f"{throttles[0]} …: none of these columns has a value{found}{likely(run, (*speeds, *commands, *throttles))}"
+    )
+
+
+def likely(run: Run, missing: Iterable[str]) -> str:
+    """Which unknown column of the run may be one of those that are missing, to end a sentence with."""
+    for column in run.unknown_columns:
+        meant = nearest(column, missing)
+        if meant:
+            return f"; is {column} meant to be {meant}?"
+    return ""
+
+
+def still_rotors(run: Run, vehicle: Vehicle) -> str | None:
+    """Rotor speeds that are zero throughout although something lifts: they were not measured."""
+    if vehicle.kind == "bench":
+        return None
+    names = driven_by(run, vehicle)
+    turning = np.nan_to_num(run.array(names))
+    if np.any(turning != 0):
+        return None
+    because = ""
+    if vehicle.kind == "stand":
+        # Rotors may truly stand still: what is read is then the weight, or what tilting the mount changes of it.
+        weight = (vehicle.mass_kg or 0.0) * vehicle.gravity_m_s2
+        tilt = float(np.nanmax(np.abs(run.array(c.MOUNT)).sum(axis=1))) if run.has(*c.MOUNT) else 0.0
+        carried = 2 * weight * np.sin(min(tilt, np.pi) / 2) if vehicle.tared else weight
+        force = np.linalg.norm(np.nan_to_num(run.array(c.FORCE)), axis=1)
+        largest = float(np.quantile(force, 0.9))
+        ordered = [n for k, g in rotor_groups(vehicle).items() if k != "rotor_speed" and run.has(*g) for n in g]
+        commanded = bool(ordered) and np.nanmax(np.abs(run.array(tuple(ordered)))) > 0
+        if largest <= carried + max(LIFTING * weight, LEAST_LIFT_N) and not commanded:
+            return None
+        because = f" although the sensor reads {largest:.3g} N" + (" and commands are given" if commanded else "")
+    return (
+        f"{whereof(run)}: columns {names[0]} to {names[-1]} are 0 throughout{because}, expected the speeds that the "
+        "rotors turned at (leave the columns out where nothing was measured)"
+    )
+
+
+def moving_sensors(run: Run) -> list[tuple[str, ...]]:
+    """Sensors of a flight that have readings in all their columns."""
+    return [names for names in SENSORS if reads(run, names)]
+
+
+def nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
+    """Sensors that are missing where a force, a moment or a reading has to be compared."""
+    if vehicle.kind == "flight":
+        if channels_of(run):
+            return None
+        wanted = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.QUATERNION)
+        return (
+            f"{whereof(run)}: nothing can be compared without {c.SPECIFIC_FORCE[0]} …, {c.ANGULAR_VELOCITY[0]} … or "
+            f"quaternion_w …: no such sensor has values in all its columns{likely(run, wanted)}"
+        )
+    if vehicle.kind == "stand":
+        names = c.FORCE + c.MOMENT
+        if any(run.has(n) for n in names):
+            return None
+        return (
+            f"{whereof(run)}: nothing can be compared without {names[0]} … or {c.MOMENT[0]} …: none of these columns "
+            f"has a value{likely(run, names)}"
+        )
+    pairs = tuple(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
+    if any(run.has(a, b) for a, b in pairs):
+        return None
+    half = next(((b if run.has(a) else a, a if run.has(a) else b) for a, b in pairs if run.has(a) or run.has(b)), None)
+    what = f"column {half[0]} is missing beside {half[1]}" if half else "there is no such pair of columns"
+    return (
+        f"{whereof(run)}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
+        f"{likely(run, (*c.FORCE, *c.REFERENCE_FORCE))}"
+    )
+
+
+def longest_stretch_s(run: Run, groups: list[tuple[str, ...]]) -> tuple[float, float]:
+    """Longest time in which every sensor gives readings without a hole, s, and the slowest sensor's period, s."""
+    time_s, holes, slowest = run.time_s, [], 0.0
+    for names in groups:
+        known = time_s[np.isfinite(run.array(names)).all(axis=1)]
+        if len(known) < LEAST_VALUES:
+            return 0.0, float("inf")
+        steps = np.diff(known)
+        period = float(np.median(steps))
+        slowest = max(slowest, period)
+        holes += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > HOLE_PERIODS * period)]
+        holes += [(-np.inf, known[0]), (known[-1], np.inf)]
+    holes.sort()
+    longest, reached = 0.0, time_s[0]
+    for start, stop in holes:
+        longest = max(longest, min(start, time_s[-1]) - reached)
+        reached = max(reached, stop)
+    return float(max(longest, time_s[-1] - reached, 0.0)), slowest
+
+
+def too_short(run: Run, vehicle: Vehicle) -> str | None:
+    """A run without a stretch that is long enough to be compared."""
+    if vehicle.kind == "flight":
+        longest, period = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
+        needed = max(LEAST_STRETCH_S, LEAST_STRETCH_SAMPLES * period) if np.isfinite(period) else LEAST_STRETCH_S
+        if longest >= needed:
+            return None
+        return (
+            f"{whereof(run)}: too little data: the longest stretch in which every sensor has readings lasts "
+            f"{longest:.3g} s, expected at least {needed:.3g} s"
+        )
+    names = [n for n in c.FORCE + c.MOMENT if run.has(n)]
+    if vehicle.kind == "bench":
+        pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
+        names = [n for n in names if n in pairs and run.has(pairs[n])]
+        names += [pairs[n] for n in names]
+    count = int(np.isfinite(run.array(tuple(names))).all(axis=1).sum())
+    if count >= LEAST_READINGS:
+        return None
+    return (
+        f"{whereof(run)}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
+        f"{LEAST_READINGS}"
+    )
+
+
+def hardly_sampled(run: Run, vehicle: Vehicle) -> str | None:
+    """A run of next to no samples."""
+    count = len(run.table)
+    if count >= LEAST_VALUES:
+        return None
+    return f"{whereof(run)}: too little data: found {count} samples, expected some seconds of them"
+
+
+LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
+    hardly_sampled,
+    absurd,
+    uneven_clock,
+    no_rotors,
+    nothing_compared,
+    no_attitude,
+    still_rotors,
+    too_short,
+)
+"""What is looked at in each run, the cause before its consequences."""
+
+
+def check_single(recordings: RecordingSet) -> None:
+    """InputError where a single run is too short to hold out a part of it."""
+    run, vehicle = recordings.runs[0], recordings.vehicle
+    if vehicle.kind != "flight":
+        return
+    longest, _ = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
+    if longest < LEAST_SINGLE_S:
+        others = f", and the other runs cannot be used ({first_reason(recordings)})" if recordings.left_out else ""
+        raise InputError(
+            f"{whereof(run)}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
+            f"because its last third is held out; found {longest:.3g} s{others}"
+        )
+
+
+def check_common(recordings: RecordingSet) -> None:
+    """InputError where no channel is there in every run."""
+    vehicle, runs = recordings.vehicle, recordings.runs
+    if vehicle.kind == "flight":
+        if not set.intersection(*(channels_of(r) for r in runs)):
+            raise InputError(f"{recordings.path or recordings.name}: no force or moment is there in every run")
+        return
+    pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
+    names = [n for n in c.FORCE + c.MOMENT if all(r.has(n) for r in runs)]
+    if vehicle.kind == "bench":
+        names = [n for n in names if n in pairs and any(r.has(pairs[n]) for r in runs)]
+    if not names:
+        raise InputError(f"{recordings.path or recordings.name}: no force or moment is compared in every run")
+
+
+def first_reason(recordings: RecordingSet) -> str:
+    """Why the first of the runs left out is of no use."""
+    return recordings.left_out[0].removeprefix("Left out: ").removesuffix(".")
+
+
+def with_split_of_the_rest(recordings: RecordingSet) -> RecordingSet:
+    """The set with `held_out` less the runs left out; InputError where one side of the split is then empty."""
+    if not recordings.held_out or not recordings.left_out:
+        return recordings
+    names = {run.name for run in recordings.runs}
+    held_out = tuple(name for name in recordings.held_out if name in names)
+    if held_out and set(held_out) != names:
+        return replace(recordings, held_out=held_out)
+    side = "left to fit" if held_out else "held out"
+    raise InputError(f"{first_reason(recordings)}; without it no run is {side}")

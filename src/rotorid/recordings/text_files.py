@@ -1,0 +1,148 @@
+"""Files that people write, read with limits: nothing in one can hang the reader, fill the memory or run code."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rotorid.errors import InputError
+from rotorid.wording import printable
+
+LARGEST_YAML = 1_000_000
+"""Bytes of a YAML file; that of a vehicle has some thousand."""
+DEEPEST = 50
+MOST_NODES = 20_000
+"""Values of a YAML file with all its aliases written out."""
+
+
+def check_file(path: Path) -> int:
+    """Size of a regular file, bytes; InputError for anything else that bears its name."""
+    try:
+        state = os.stat(path)
+    except FileNotFoundError:
+        if path.is_symlink():
+            raise InputError(f"{path}: is a link to {os.readlink(path)}, where no file is") from None
+        raise InputError(f"{path}: file is missing") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be opened ({error.strerror or error})") from None
+    if stat.S_ISDIR(state.st_mode):
+        raise InputError(f"{path}: is a folder, expected a file")
+    if not stat.S_ISREG(state.st_mode):
+        raise InputError(f"{path}: is a pipe, socket or device, expected a file")
+    return state.st_size
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """Content of a regular file of at most `most` bytes; InputError in one sentence otherwise."""
+    size = check_file(path)
+    if size > most:
+        raise InputError(f"{path}: has {size / 1e6:.3g} MB, expected at most {most / 1e6:.3g} MB")
+    try:
+        with open(path, "rb") as file:
+            return file.read(most + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def check_text(data: bytes, path: Path) -> None:
+    """InputError where bytes are no UTF-8 text, with the line and what they look like instead."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError(f"{path}: is UTF-16 text, expected UTF-8")
+    zero = data.find(b"\0")
+    if zero >= 0:
+        line = data.count(b"\n", 0, zero) + 1
+        kind = "UTF-16 text" if data[:2000].count(b"\0") > 0.3 * len(data[:2000]) else "binary data"
+        raise InputError(f"{path}, line {line}: has a zero byte in it ({kind}?), expected UTF-8 text")
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8 text (Latin-1, or not text at all?), "
+            "expected UTF-8"
+        ) from None
+
+
+def read_text(path: Path, most: int = LARGEST_YAML) -> str:
+    """UTF-8 text of a regular file of at most `most` bytes, without a byte-order mark."""
+    data = read_bytes(path, most)
+    check_text(data, path)
+    return data.decode("utf-8-sig")
+
+
+def read_yaml(path: Path, as_written: bool = False) -> dict[str, Any]:
+    """A YAML mapping; InputError names the file and line of a fault.
+
+    `as_written` keeps every value as the text that stands there (`002` is no number).
+    """
+    path = Path(path)
+    text = read_text(path)
+    loader = None
+    try:
+        loader = (yaml.BaseLoader if as_written else yaml.SafeLoader)(text)
+        node = loader.get_single_node()
+        if node is not None:
+            _check_node(node, path)
+        content = None if node is None else loader.construct_document(node)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f", line {mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "cannot be parsed"
+        raise InputError(f"{path}{line}: not valid YAML ({printable(problem)})") from None
+    except RecursionError:
+        raise InputError(f"{path}: is nested too deeply, expected at most {DEEPEST} levels") from None
+    except (ValueError, OverflowError) as error:  # dates and numbers that cannot be
+        raise InputError(f"{path}: not valid YAML ({printable(error)})") from None
+    finally:
+        if loader is not None:
+            loader.dispose()
+    if not isinstance(content, dict):
+        found = {type(None): "nothing", list: "a list", str: "plain text"}.get(type(content), type(content).__name__)
+        raise InputError(f"{path}: expected keys with values, found {found}")
+    return content
+
+
+def _check_node(root: yaml.Node, path: Path) -> None:
+    """InputError for a key given twice, for too many levels, and for aliases that hold themselves or grow too large."""
+    sizes: dict[int, int] = {}
+    open_nodes: set[int] = set()
+
+    def size_of(node: yaml.Node, depth: int) -> int:
+        line = f"{path}, line {node.start_mark.line + 1}"
+        if id(node) in open_nodes:
+            raise InputError(f"{line}: an alias refers to itself")
+        if depth > DEEPEST:
+            raise InputError(f"{line}: is nested too deeply, expected at most {DEEPEST} levels")
+        if id(node) in sizes:
+            return sizes[id(node)]
+        open_nodes.add(id(node))
+        total = 1
+        if isinstance(node, yaml.MappingNode):
+            _check_keys(node, path)
+            total += sum(size_of(key, depth + 1) + size_of(value, depth + 1) for key, value in node.value)
+        elif isinstance(node, yaml.SequenceNode):
+            total += sum(size_of(value, depth + 1) for value in node.value)
+        open_nodes.discard(id(node))
+        if total > MOST_NODES:
+            raise InputError(f"{line}: holds more than {MOST_NODES} values (aliases written out)")
+        sizes[id(node)] = total
+        return total
+
+    size_of(root, 0)
+
+
+def _check_keys(node: yaml.MappingNode, path: Path) -> None:
+    seen: dict[str, int] = {}
+    for key, _ in node.value:
+        line = key.start_mark.line + 1
+        if not isinstance(key, yaml.ScalarNode):
+            raise InputError(f"{path}, line {line}: a list or mapping stands where a key is expected")
+        if key.value in seen:
+            raise InputError(
+                f"{path}, line {line}: key {printable(key.value)} is there twice (first in line {seen[key.value]})"
+            )
+        seen[key.value] = line

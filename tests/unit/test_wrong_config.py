@@ -1,0 +1,119 @@
+"""Wrong configurations: one sentence that names the key, what stands there and what is expected."""
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from rotorid.config import ConfigError, check
+from rotorid.errors import InputError
+from rotorid.proof import plan
+
+ROOT = Path(__file__).parents[2]
+SOUND = yaml.safe_load((ROOT / "config.yaml").read_text())
+INF, NAN = float("inf"), float("nan")
+WRONG = [
+    ("recordings", 7, "but it must be text"),
+    ("recordings", "", "at least 1 character"),
+    ("recordings", None, "but it must be text"),
+    ("recordings", ["a"], "but it must be text"),
+    ("recordings", True, "but it must be text"),
+    ("raw", 7, "but it must be text"),
+    ("filter", 5, "but it must be keys with values"),
+    ("filter.bench", [], "but it must be keys with values"),
+    ("filter.bench.low_pass_hz", -1.0, "greater than 0"),
+    ("filter.bench.low_pass_hz", 0.0, "greater than 0"),
+    ("filter.bench.low_pass_hz", 25.0, "less than 25"),
+    ("filter.bench.low_pass_hz", INF, "a finite number"),
+    ("filter.bench.low_pass_hz", NAN, "a finite number"),
+    ("filter.bench.low_pass_hz", "1.5", "but it must be a number"),
+    ("filter.bench.low_pass_hz", "1e-3", "YAML takes a number with an exponent"),
+    ("filter.bench.low_pass_hz", True, "but it must be a number"),
+    ("filter.bench.low_pass_hz", None, "but it must be a number"),
+    ("filter.bench.spike_window", 2, "3 or more"),
+    ("filter.bench.spike_window", 5.5, "a whole number"),
+    ("filter.jr3.steady_tolerance", INF, "a finite number"),
+    ("bench.noise_n", -0.1, "0 or more"),
+    ("bench.matrix_largest_n", INF, "a finite number"),
+    ("stand.clock_error", 0.5, "less than 0.1"),
+    ("stand.speed_noise_relative", 0.3, "less than 0.2"),
+    ("residuals.cutoff_hz", 200.0, "less than 190"),
+    ("residuals.seed", -1, "0 or more"),
+    ("simulation.step_s", 0.02, "at most 0.01"),
+    ("simulation.duration_s", NAN, "a finite number"),
+    ("grey_box.rotor_epochs", 0, "1 or more"),
+    ("grey_box.speed_limits_rad_s", [1900.0, 300.0], "expected [low, high] with 0 <= low < high"),
+    ("grey_box.speed_limits_rad_s", [-300.0, 300.0], "expected [low, high] with 0 <= low < high"),
+    ("grey_box.speed_limits_rad_s", [300.0, 300.0], "expected [low, high] with 0 <= low < high"),
+    ("grey_box.speed_limits_rad_s", [0.0, INF], "a finite number"),
+    ("grey_box.speed_limits_rad_s", [1.0], "grey_box.speed_limits_rad_s"),
+    ("grey_box.speed_limits_rad_s", 5.0, "a list"),
+    ("grey_box.design_limits_rad_s", [550.0, NAN], "a finite number"),
+    ("grey_box.design_harmonics", [80, 10], "0 <= low < high"),
+    ("grey_box.design_harmonics", [-10, 10], "0 <= low < high"),
+    ("grey_box.band_hz", [-5.0, 15.0], "0 <= low < high"),
+    ("grey_box.band_hz", [15.0, 5.0], "0 <= low < high"),
+    ("grey_box.design_tilt_deg", 80.0, "less than 60"),
+    ("black_box.hidden", [20, -20], "1 or more"),
+    ("black_box.hidden", [20, 0], "1 or more"),
+    ("black_box.hidden", [], "at least one entry"),
+    ("black_box.hidden", 20, "a list"),
+    ("black_box.hidden", [20.5], "a whole number"),
+    ("black_box.share", 1.0, "less than 1"),
+    ("proof.seeds", 5, "keys with values"),
+    ("proof.seeds.single", -1, "0 or more"),
+    ("proof.seeds.single", 1.5, "a whole number"),
+    ("proof.cases", [], "at least one entry"),
+    ("proof.cases", "*", "a list"),
+    ("proof.batch", 0, "1 or more"),
+    ("proof.peers", "yes", "true or false"),
+    ("proof.peers", 1, "true or false"),
+    ("report.title", 5, "but it must be text"),
+    ("report.chapters", [], "at least one entry"),
+    ("report.chapters", ["../../etc"], "small letters"),
+    ("report.chapters", ["A b"], "small letters"),
+]
+
+
+def with_value(key: str, value: Any) -> dict[str, Any]:
+    """The project's own configuration with one value changed."""
+    changed = copy.deepcopy(SOUND)
+    *path, last = key.split(".")
+    section = changed
+    for part in path:
+        section = section[part]
+    section[last] = value
+    return changed
+
+
+@pytest.mark.parametrize(("key", "value", "said"), WRONG, ids=lambda x: repr(x)[:40])
+def test_a_wrong_value_is_named(key: str, value: Any, said: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        check(with_value(key, value))
+    text = str(error.value)
+    assert text.startswith(f"config.yaml: {key}")
+    assert said in text
+    for foreign in ("Input should", "valid integer", "valid string", "pydantic", "NoneType"):
+        assert foreign not in text
+    assert len(text.splitlines()) == 1
+
+
+@pytest.mark.parametrize("section", [k for k, v in SOUND.items() if isinstance(v, dict)])
+def test_a_misspelled_key_of_each_section_gets_the_right_one(section: str) -> None:
+    changed = copy.deepcopy(SOUND)
+    key = next(iter(changed[section]))
+    changed[section][key + "x"] = changed[section].pop(key)
+    with pytest.raises(ConfigError) as error:
+        check(changed)
+    assert f"{section}.{key}x is not a known key; did you mean {key}?" in str(error.value)
+
+
+def test_an_unknown_family_of_the_proof_is_named() -> None:
+    cases = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")
+    plan.check_families(cases, SOUND["proof"]["seeds"])
+    with pytest.raises(
+        InputError, match=r"proof\.seeds\.singel is no family of concealed cases; did you mean single\?"
+    ):
+        plan.check_families(cases, {"singel": 1})

@@ -1,0 +1,99 @@
+"""The table of wrong inputs: each is one sentence with file, line or column, what was found and what was expected."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rotorid.errors import InputError
+from rotorid.recordings import read_set
+from rotorid.recordings.sufficient import sufficient
+from tests.unit.wrong_inputs import Wrong, all_wrong, sound
+
+TABLE = all_wrong()
+MOST_S = 10.0
+MOST_BYTES = 1_000_000_000
+
+
+def test_the_table_is_large_and_the_sound_set_is_accepted(tmp_path: Path) -> None:
+    assert len(TABLE) >= 250
+    assert len({wrong.name for wrong in TABLE}) == len(TABLE)
+    assert sufficient(read_set(sound(tmp_path / "set"))).left_out == ()
+
+
+@pytest.mark.parametrize("wrong", TABLE, ids=lambda wrong: wrong.name[:70].encode("unicode_escape").decode())
+def test_a_wrong_set_is_one_sentence(wrong: Wrong, tmp_path: Path) -> None:
+    folder = sound(tmp_path / "set")
+    wrong.spoil(folder)
+    before = sorted(p.name for p in folder.iterdir())
+    start = time.perf_counter()
+    with pytest.raises(InputError) as error:
+        sufficient(read_set(folder))
+    assert time.perf_counter() - start < MOST_S
+    text = str(error.value)
+    assert text.startswith(str(folder))
+    assert text.isprintable(), "one line"
+    assert len(text) < 600 + len(str(folder))
+    for words in wrong.said:
+        assert words in text, text
+    for foreign in ("Input should be", "pydantic", "Traceback", "NoneType", "<class"):
+        assert foreign not in text
+    assert sorted(p.name for p in folder.iterdir()) == before
+
+
+BY_COMMAND = (
+    "gzip bomb of lines",
+    "vehicle # x",
+    "pipe as run.csv",
+    "data with the clock set",
+    "loop of links as vehicle",
+)
+CHECK = """
+import resource, sys
+from rotorid.cli import app
+try:
+    app(["check", sys.argv[1]])
+finally:
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.parametrize("name", BY_COMMAND)
+def test_the_command_ends_soon_with_one_sentence_and_little_memory(name: str, tmp_path: Path) -> None:
+    wrong = next(w for w in TABLE if name in w.name)
+    folder = sound(tmp_path / "set")
+    wrong.spoil(folder)
+    done = subprocess.run([sys.executable, "-c", CHECK, folder], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    for words in wrong.said:
+        assert words in done.stderr
+    assert int(done.stdout) * 1024 < MOST_BYTES
+
+
+NAMES = (
+    "{x}",
+    "{{x}}",
+    "<b>bold",
+    "$\\frac{1}{$",
+    "it's",
+    'a "b"',
+    "-rf",
+    "a b",
+    "#typst[x]",
+    "*",
+    "Ω_ü",
+    "a;b",
+    "%s",
+    "&amp;",
+)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_odd_names_are_only_names(name: str, tmp_path: Path) -> None:
+    folder = sound(tmp_path / name)
+    (folder / "run.csv").rename(folder / f"{name}.csv")
+    usable = sufficient(read_set(folder))
+    assert (usable.name, usable.runs[0].name) == (name, name)
