@@ -242,7 +242,7 @@ def test_commands_of_nothing_count_as_not_recorded() -> None:
 
 def test_a_verdict_names_the_run_that_was_left_out() -> None:
     verdict = judge(flight(flight_table(4.0, seed=1), flight_table(1.0), flight_table(4.0, seed=2)))
-    assert "Left out: run run2: too little data" in verdict.sentence
+    assert "Left out: run run2: too little data" in " ".join(verdict.details)
     assert "run2" not in (*verdict.runs.training, *verdict.runs.held_out)
 
 

@@ -66,9 +66,9 @@ def verdict_of(analysis: Analysis) -> Verdict:
 
 
 def with_runs_left_out(verdict: Verdict, analysis: Analysis) -> Verdict:
-    """The verdict, whose sentence also says which runs were of no use."""
+    """The verdict, whose details also say which runs were of no use."""
     left_out = analysis.recordings.left_out
-    return verdict.model_copy(update={"sentence": " ".join([verdict.sentence, *left_out])}) if left_out else verdict
+    return verdict.model_copy(update={"details": (*left_out, *verdict.details)}) if left_out else verdict
 
 
 def write_files(

@@ -15,11 +15,11 @@ import numpy as np
 
 from rotorid.effects.contract import Form
 from rotorid.mismatch.carried import Windows, carried_windows, changes, laden
+from rotorid.mismatch.channel_harm import REASON as HARM
+from rotorid.mismatch.channel_harm import ValuesOf, without_harm, without_unsure, without_useless
 from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.gusts import with_gusts
-from rotorid.mismatch.harmless import REASON as HARM
-from rotorid.mismatch.harmless import ValuesOf, without_harm, without_unsure, without_useless
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from rotorid.mismatch.channel_errors import growth
 from rotorid.mismatch.decide import coefficients, relative_change
 from rotorid.mismatch.delivered import (
     Values,
@@ -20,7 +21,6 @@ from rotorid.mismatch.delivered import (
     with_sure,
     with_sure_nuisances,
 )
-from rotorid.mismatch.held_out import growth
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import PARAMETER_NAMES

@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.harmless import HELP_Z
-from rotorid.mismatch.held_out import excited, growth, helps
+from rotorid.mismatch.channel_errors import excited, growth, helps
+from rotorid.mismatch.channel_harm import HELP_Z
 from rotorid.mismatch.instrument.decide import main_channels
 from rotorid.mismatch.instrument.model import REFUTED, ReadingModel, block_length, of_single_runs
 from rotorid.mismatch.instrument.values import Values, delivered, held_out, settled

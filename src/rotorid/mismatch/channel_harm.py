@@ -16,9 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.decide import coefficients, estimates, main_channels, suggested
-from rotorid.mismatch.delivered import Values, believed_residuals, delivered_residuals, judged_rows, nuisances_in
-from rotorid.mismatch.held_out import (
+from rotorid.mismatch.channel_errors import (
     CHANNELS_OF_WRENCH,
     about_means,
     growth,
@@ -27,6 +25,8 @@ from rotorid.mismatch.held_out import (
     long_enough,
     smaller,
 )
+from rotorid.mismatch.decide import coefficients, estimates, main_channels, suggested
+from rotorid.mismatch.delivered import Values, believed_residuals, delivered_residuals, judged_rows, nuisances_in
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import refitted_left_out
 from rotorid.mismatch.unknowns import UNKNOWNS

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.mismatch import fitted, harmless
+from rotorid.mismatch import channel_harm, fitted
+from rotorid.mismatch.channel_errors import about_means, excited, growth, harmed, helps, smaller
+from rotorid.mismatch.channel_harm import HELP_Z, costs_more, fitted_anew, within_bounds, without_useless
 from rotorid.mismatch.fitted import refined_model, turning
-from rotorid.mismatch.harmless import HELP_Z, costs_more, fitted_anew, within_bounds, without_useless
-from rotorid.mismatch.held_out import about_means, excited, growth, harmed, helps, smaller
 from rotorid.mismatch.prepare import prepare
 
 from .flights import recorded
@@ -134,7 +134,7 @@ def test_an_effect_is_of_use_where_another_is_beyond_its_bounds_without_it(monke
         fit = replace(model.selection.fit, beta=beta)
         return within_bounds(replace(model, selection=replace(model.selection, fit=fit)))
 
-    monkeypatch.setattr(harmless, "within_bounds", only_with_the_spare)
+    monkeypatch.setattr(channel_harm, "within_bounds", only_with_the_spare)
     kept, _ = without_useless(prepared, model, {}, lambda *_: {})
     assert kept.selection.active == [drag, spare]
 
