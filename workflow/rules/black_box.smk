@@ -6,13 +6,12 @@ rule prepare_experiments:
     message:
         "Black box: samples of the 48 experiments"
     input:
-        logs=campaign_logs("dynamics"),
+        quadrotor=ingested("dynamics", "quadrotor"),
+        wrench=ingested("dynamics", "wrench"),
         thrust=rules.fit_white_box.output.thrust,
-        vehicle=THESIS_VEHICLE,
     output:
         experiments="results/black_box/experiments.csv",
     params:
-        seed=CONFIG.black_box.seed,
         code=code_of("prepare_experiments"),
     log:
         "results/logs/prepare_experiments.log",
