@@ -82,6 +82,13 @@ def render(path: str | Path, files: Mapping[str, str]) -> str:
         raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
 
 
+def not_recorded(path: str | Path, kinds: Sequence[str], index: str) -> str:
+    """A chapter that cannot be made: its heading, and which kinds of recordings the index does not list."""
+    heading = Path(path).read_text(encoding="utf-8").splitlines()[0]
+    named = " and ".join(filter(None, (", ".join(kinds[:-1]), kinds[-1])))
+    return f"{heading}\n\nThis chapter needs {named} recordings, and `{index}` lists none.\n"
+
+
 def _defined(form: Callable[..., str]) -> Callable[..., str]:
     """`form`, but naming the value where it is undefined."""
 

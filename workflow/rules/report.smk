@@ -9,11 +9,32 @@ for name in CONFIG.report.chapters:
             f"config.yaml: report.chapters names {name}, but there is no notebooks/{name}.md."
         )
 
+# Kinds of recordings that a chapter is made of: where the index lists none of one, a sentence stands in its place.
+KINDS_OF_CHAPTER = {
+    "bench": ["calibration", "static", "combined", "dynamic", "tensile"],
+    "stand": ["thrust", "torque", "dynamics"],
+    "white_box": ["thrust", "torque"],
+    "grey_box": ["thrust", "torque"],
+    "black_box": ["thrust", "torque", "dynamics"],
+}
+RECORDED = {row["kind"] for row in SESSIONS}
+
+
+def kinds_lacking(chapter):
+    """Kinds of recordings that a chapter needs and the index does not list."""
+    return [kind for kind in KINDS_OF_CHAPTER.get(chapter, []) if kind not in RECORDED]
+
+
+def kinds_lacking_of(wildcards):
+    """The same of the chapter that is rendered."""
+    return kinds_lacking(wildcards.chapter)
+
+
 # A chapter without a rule of its own is text alone.
 CHAPTERS = {
     name: getattr(rules, f"chapter_{name}")
     for name in CONFIG.report.chapters
-    if f"chapter_{name}" in {known.name for known in workflow.rules}
+    if f"chapter_{name}" in {known.name for known in workflow.rules} and not kinds_lacking(name)
 }
 
 
@@ -34,8 +55,10 @@ def chapter_figures(wildcards):
 
 
 def raw_files(wildcards):
-    """Everything that instruments wrote, and the list of public recordings with their hashes."""
-    return sorted(str(path) for path in Path("raw").rglob("*") if path.is_file()) + [MANIFEST]
+    """What instruments wrote (the index and its logs), the thesis's tables, and the list of public recordings."""
+    fixed = [path for folder in ("thesis", "vehicle") for path in sorted(Path("raw", folder).glob("*"))]
+    logs = [f"{CONFIG.raw}/{row[name]}" for row in SESSIONS for name in ("file", "metadata")]
+    return [str(path) for path in fixed] + [INDEX] * bool(SESSIONS) + logs + [MANIFEST]
 
 
 rule render_chapter:
@@ -48,6 +71,8 @@ rule render_chapter:
     output:
         markdown="results/report/chapters/{chapter}.md",
     params:
+        lacking=kinds_lacking_of,
+        index=INDEX,
         code=code_of("render_chapter"),
     log:
         "results/logs/render_chapter/{chapter}.log",
