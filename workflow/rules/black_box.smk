@@ -28,6 +28,7 @@ rule train_black_box:
     output:
         history="results/black_box/history.csv",
         tested="results/black_box/held_out_samples.csv",
+        scored="results/black_box/held_out_scores.csv",
     params:
         epochs=CONFIG.black_box.epochs,
         rate=CONFIG.black_box.rate,
@@ -75,6 +76,7 @@ rule chapter_black_box:
         notebook="notebooks/black_box.ipynb",
         history=rules.train_black_box.output.history,
         tested=rules.train_black_box.output.tested,
+        held_out=rules.train_black_box.output.scored,
         metrics=rules.compare_black_box.output.metrics,
         predictions=rules.compare_black_box.output.predictions,
         summary=rules.compare_black_box.output.summary,
@@ -85,6 +87,8 @@ rule chapter_black_box:
         comparison="results/report/black_box/comparison.svg",
         coverage="results/report/black_box/coverage.svg",
         scores="results/report/black_box/scores.csv",
+        held_out_table="results/report/black_box/held_out.csv",
+        effects="results/report/black_box/effects.csv",
         statements="results/report/black_box/statements.csv",
     params:
         code=code_of_chapter("black_box"),

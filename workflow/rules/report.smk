@@ -18,6 +18,7 @@ KINDS_OF_CHAPTER = {
     "black_box": ["thrust", "torque", "dynamics"],
 }
 RECORDED = {row["kind"] for row in SESSIONS}
+EMULATED = any(row["source"] == "emulator" for row in SESSIONS)
 
 
 def kinds_lacking(chapter):
@@ -73,6 +74,7 @@ rule render_chapter:
     params:
         lacking=kinds_lacking_of,
         index=INDEX,
+        emulated=EMULATED,
         code=code_of("render_chapter"),
     log:
         "results/logs/render_chapter/{chapter}.log",

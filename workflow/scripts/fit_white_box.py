@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student_t
 
 from rotorid import log, thesis
 from rotorid.io.tables import read_sessions
@@ -43,6 +44,8 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "points": plain.points,
         "thesis": believed,
         "difference": plain.value / believed - 1,
+        "standard_errors_off": (plain.value - believed) / plain.standard_error,
+        "p_value": float(2 * student_t.sf(abs(plain.value - believed) / plain.standard_error, plain.points - 1)),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
     }
 
@@ -76,7 +79,6 @@ def main(
     }
     composed = compose(read_components(components))
     found: dict[str, Any] = {
-        "emulated": _emulated(thrust_tests, torque_tests),
         **coefficients,
         "mass_kg": composed.mass_kg,
         "centre_m": composed.centre_m.tolist(),
@@ -120,12 +122,6 @@ def main(
 def _read(pair: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
     samples, recordings = pair
     return pd.read_parquet(samples), read_sessions(recordings)
-
-
-def _emulated(*tests: Sequence[str]) -> bool:
-    """Whether an emulator wrote any of the tests' recordings."""
-    sources = [source for pair in tests if pair for source in read_sessions(pair[1])["source"]]
-    return "emulator" in sources
 
 
 if __name__ == "__main__":

@@ -9,9 +9,9 @@ from pathlib import Path
 from rotorid import log, prose
 
 
-def main(text: str, files: Mapping[str, str], lacking: Sequence[str], index: str, out: str) -> None:
+def main(text: str, files: Mapping[str, str], lacking: Sequence[str], index: str, emulated: bool, out: str) -> None:
     """Render `text` with the named `files` to the markdown file `out`; `lacking` kinds are not in the `index`."""
-    rendered = prose.not_recorded(text, lacking, index) if lacking else prose.render(text, files)
+    rendered = prose.not_recorded(text, lacking, index) if lacking else prose.render(text, files, emulated)
     Path(out).write_text(rendered, encoding="utf-8")
 
 
@@ -22,5 +22,6 @@ if __name__ == "__main__":
             files={name: path for name, path in snakemake.input.items() if name != "prose"},
             lacking=snakemake.params.lacking,
             index=snakemake.params.index,
+            emulated=snakemake.params.emulated,
             out=snakemake.output.markdown,
         )

@@ -48,8 +48,9 @@ def test_effects_are_recovered():
     table = samples()
     truth = NEUTRAL + [-0.02, 0.03, 0.01, 0, 0.1, -0.05, 0, 0.02, 0.002, -0.001, 0.01, -0.02]
     table[list(OUTPUTS)] = effects_wrench(stand(), table, truth)
-    predict, found = fit_white_box_effects(stand(), table)
+    predict, found, errors = fit_white_box_effects(stand(), table)
     np.testing.assert_allclose(found, truth, atol=1e-6)
+    assert errors.max() < 1e-6
     np.testing.assert_allclose(predict(table), table[list(OUTPUTS)], atol=1e-8)
 
 
