@@ -26,6 +26,7 @@ MADE_OF = {
     "simulated": "Simulated.",
     "public": "Real recordings of other laboratories.",
     "thesis": "Real, printed in the thesis.",
+    "scheme": "Scheme.",
 }
 """What a figure or table is made of, as its caption says first."""
 WIDEST = 40
