@@ -26,7 +26,8 @@ MADE_OF = {
     "simulated": "Simulated.",
     "public": "Real recordings of other laboratories.",
     "thesis": "Real, printed in the thesis.",
-    "scheme": "Scheme.",
+    "mixed": "Real and simulated recordings.",
+    "scheme": "",
 }
 """What a figure or table is made of, as its caption says first."""
 WIDEST = 40
@@ -71,7 +72,8 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
     def captioned(caption: str, kind: str) -> str:
         if kind not in MADE_OF:
             raise ProseError(f"{path}: a figure or table is made of {', '.join(MADE_OF)}, not {kind!r}.")
-        return f"*{MADE_OF['emulated' if emulated and kind == 'campaign' else kind]}* {caption}"
+        made_of = MADE_OF["emulated" if emulated and kind == "campaign" else kind]
+        return f"*{made_of}* {caption}" if made_of else caption
 
     def figure(name: str, caption: str, kind: str, width: str = "100%") -> str:
         if name not in files or Path(files[name]).suffix not in FIGURES:

@@ -217,6 +217,7 @@ def table(
     entries = zip(evaluated, numbers, expected, believed_rest, fitted_rest, strict=True)
     for entry, number, model, believed, fitted in entries:
         row = {
+            "name": entry.name,
             "experiment": number,
             "kind": entry.kind,
             **{f"throttle_{i + 1}": value for i, value in enumerate(entry.throttle)},
