@@ -32,7 +32,6 @@ QUOTED = {
     "improved": "results/grey_box/inertias.json",
     "black_box": "results/black_box/summary.json",
     "held_out": "results/black_box/held_out_scores.csv",
-    "examples": "results/examples/state.json",
     "proof": f"{CONFIG.proof.tables}/state.json",
     "proof_rows": f"{CONFIG.proof.tables}/summary.csv",
 }
