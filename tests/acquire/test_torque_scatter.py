@@ -27,6 +27,6 @@ def test_the_sensor_reads_nothing_of_other_channels_as_a_moment_about_z() -> Non
 
 @pytest.mark.slow
 def test_other_noise_moves_the_torque_coefficient_to_either_side_by_as_much(tmp_path: Path) -> None:
-    """The campaign's own tests give 0.09 % too much; the same tests with the noise of another seed as much too little."""
+    """The campaign's own tests give 0.09 % too much, the same tests with the noise of another seed 0.1 % too little."""
     assert 5e-4 < deviation(tmp_path / "own", SEED) < 1.5e-3
     assert -1.5e-3 < deviation(tmp_path / "other", SEED + 3) < -5e-4
