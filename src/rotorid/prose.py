@@ -173,12 +173,32 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     widths = [
         max(3, word, *(min(len(line[place]), WIDEST) for line in cells)) for place, word in enumerate(longest_words)
     ]
+    attributes = f" widths={shares_of(headings, cells)}" if too_wide(headings, cells) else ""
     rules = [
         ":" + "-" * width if form in ("text", "symbol") else "-" * width + ":"
         for width, form in zip(widths, forms, strict=True)
     ]
     lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
-    return "\n".join(lines) + f"\n\n: {caption} {{#{label}}}\n"
+    return "\n".join(lines) + f"\n\n: {caption} {{#{label}{attributes}}}\n"
+
+
+LINE = 96
+"""About so many characters of a table fit on a line of the page."""
+
+
+def too_wide(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
+    """Whether a row would not fit on a line, so that the columns need shares of it."""
+    longest = [max(len(entry) for entry in column) for column in zip(headings, *cells, strict=True)]
+    return sum(longest) + 3 * len(longest) > LINE and max(longest) > WIDEST
+
+
+def shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
+    """Shares of the line for each column, `0.20,0.80`: by its longest text up to a limit, never less than a word."""
+    wanted = []
+    for column in zip(headings, *cells, strict=True):
+        word = max(len(word) for entry in column for word in entry.split() or [""])
+        wanted.append(max(word + 3, min(max(len(entry) for entry in column), WIDEST), 7))
+    return ",".join(f"{width / sum(wanted):.3f}" for width in wanted)
 
 
 def _row(cells: Sequence[str]) -> str:

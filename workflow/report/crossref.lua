@@ -42,8 +42,8 @@ local function first_sentence(inlines)
     if not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
       started = true
       out:insert(inline)
-      if inline.t == "Str" and inline.text:match("[.:;]$") then
-        out[#out] = pandoc.Str((inline.text:gsub("[.:;]$", "")))
+      if inline.t == "Str" and inline.text:match("[.;]$") and not inline.text:match("eqs?%.$") then
+        out[#out] = pandoc.Str((inline.text:gsub("[.;]$", "")))
         break
       end
     end
@@ -103,6 +103,15 @@ local count = {
     return number_caption(figure, "Figure", assign(figure.identifier, "fig")), false
   end,
   Table = function(element)
+    local shares = element.attributes.widths or element.attr.attributes.widths
+    if shares then
+      local column = 0
+      for share in shares:gmatch("[^,]+") do
+        column = column + 1
+        element.colspecs[column] = { element.colspecs[column][1], tonumber(share) }
+      end
+      element.attr.attributes.widths = nil
+    end
     return number_caption(element, "Table", assign(element.identifier, "tbl")), false
   end,
   Para = function(paragraph)

@@ -79,8 +79,9 @@ def main(
     channels, effects, locations, traces = [], [], [], []
     report = read_report(Path(flights))
     state["real_available"], state["real_missing"] = report["available"], report["reason"]
-    sets = {"real": piece(read_set(Path(flights)), **real)} if report["available"] else {}
-    sets |= {name: recorded(case, root) for name, case in cases.items()}
+    sets = {name: recorded(case, root) for name, case in cases.items()}
+    if report["available"]:
+        sets = {"real": piece(read_set(Path(flights)), **real)} | sets
     for name, recordings in sets.items():
         analysis = analysis_of(recordings)
         place = Path(folder) / name
