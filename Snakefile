@@ -20,8 +20,11 @@ include: "workflow/rules/white_box.smk"
 include: "workflow/rules/stand.smk"
 include: "workflow/rules/grey_box.smk"
 include: "workflow/rules/black_box.smk"
+include: "workflow/rules/instruments.smk"
+include: "workflow/rules/appendix.smk"
 include: "workflow/rules/mismatch.smk"
 include: "workflow/rules/proof.smk"
+include: "workflow/rules/examples.smk"
 include: "workflow/rules/report.smk"
 
 

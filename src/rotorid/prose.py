@@ -1,8 +1,9 @@
 """A chapter's text: Jinja2 over pandoc markdown, with every number read from a result file.
 
 A chapter's files are known in its text by the names that its rule gives them. A `.json` file is the object in
-it, a `.csv` file the list of its rows, a figure is placed with `figure("name", "caption")` and a table with
-`table("name", "caption", columns)`. A name that no file gives is an error, so no number goes missing quietly.
+it, a `.csv` file the list of its rows, a figure is placed with `figure("name", "caption", kind="...")` and a table with
+`table("name", "caption", columns, kind="...")`; the kind says what it is made of, one of `MADE_OF`. A name that no file
+gives is an error, so no number goes missing quietly.
 """
 
 from __future__ import annotations
@@ -19,6 +20,16 @@ import jinja2
 from rotorid.errors import InputError
 
 FIGURES = {".svg", ".png"}
+MADE_OF = {
+    "campaign": "Recorded on the instruments.",
+    "emulated": "Emulated instruments.",
+    "simulated": "Simulated.",
+    "public": "Real recordings of other laboratories.",
+    "thesis": "Real, printed in the thesis.",
+    "mixed": "Real and simulated recordings.",
+    "scheme": "",
+}
+"""What a figure or table is made of, as its caption says first."""
 WIDEST = 40
 """A column longer than this many characters gets no more room in a table."""
 
@@ -27,7 +38,7 @@ class ProseError(InputError):
     """A chapter's text that cannot be rendered; says which file, which line and why."""
 
 
-def render(path: str | Path, files: Mapping[str, str]) -> str:
+def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -> str:
     """The chapter's markdown with numbers, figures and tables in place.
 
     Parameters
@@ -36,6 +47,9 @@ def render(path: str | Path, files: Mapping[str, str]) -> str:
         The chapter's text, `notebooks/<chapter>.md`.
     files
         Paths by the names under which the text knows them.
+    emulated
+        Whether emulators wrote the instruments' recordings; the text knows it by this name, and captions of kind
+        `campaign` say it.
 
     Raises
     ------
@@ -55,31 +69,44 @@ def render(path: str | Path, files: Mapping[str, str]) -> str:
     environment.filters.update({form.__name__: _defined(form) for form in (fix, sci, interval, text, percent)})
     known: dict[str, Any] = {name: _read(Path(file)) for name, file in files.items()}
 
-    def figure(name: str, caption: str, width: str = "100%") -> str:
+    def captioned(caption: str, kind: str) -> str:
+        if kind not in MADE_OF:
+            raise ProseError(f"{path}: a figure or table is made of {', '.join(MADE_OF)}, not {kind!r}.")
+        made_of = MADE_OF["emulated" if emulated and kind == "campaign" else kind]
+        return f"*{made_of}* {caption}" if made_of else caption
+
+    def figure(name: str, caption: str, kind: str, width: str = "100%") -> str:
         if name not in files or Path(files[name]).suffix not in FIGURES:
             raise ProseError(f"{path}: there is no figure called {name}.")
         label = f"fig:{path.stem}-{name}".replace("_", "-")
-        return f"![{caption}]({files[name]}){{#{label} width={width}}}"
+        return f"![{captioned(caption, kind)}]({files[name]}){{#{label} width={width}}}"
 
-    def table(name: str, caption: str, columns: Sequence[Sequence[str]]) -> str:
+    def table(name: str, caption: str, columns: Sequence[Sequence[str]], kind: str) -> str:
         rows = known.get(name)
         if not isinstance(rows, list):
             raise ProseError(f"{path}: there is no table called {name}.")
         label = f"tbl:{path.stem}-{name}".replace("_", "-")
         try:
-            return table_of(rows, caption, columns, label)
+            return table_of(rows, captioned(caption, kind), columns, label)
         except KeyError as missing:
             raise ProseError(f"{path}: the table {name} has no column {missing}.") from None
 
     try:
         template = environment.from_string(path.read_text(encoding="utf-8"))
-        return template.render(**known, figure=figure, table=table)
+        return template.render(**known, figure=figure, table=table, emulated=emulated)
     except jinja2.TemplateSyntaxError as error:
         raise ProseError(f"{path}, line {error.lineno}: {error.message}.") from None
     except (jinja2.UndefinedError, TypeError, ValueError) as error:
         if isinstance(error, ProseError):
             raise
         raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
+
+
+def not_recorded(path: str | Path, kinds: Sequence[str], index: str) -> str:
+    """A chapter that cannot be made: its heading, and which kinds of recordings the index does not list."""
+    heading = Path(path).read_text(encoding="utf-8").splitlines()[0]
+    named = " and ".join(filter(None, (", ".join(kinds[:-1]), kinds[-1])))
+    return f"{heading}\n\nThis chapter needs {named} recordings, and `{index}` lists none.\n"
 
 
 def _defined(form: Callable[..., str]) -> Callable[..., str]:
@@ -146,12 +173,32 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     widths = [
         max(3, word, *(min(len(line[place]), WIDEST) for line in cells)) for place, word in enumerate(longest_words)
     ]
+    attributes = f" widths={shares_of(headings, cells)}" if too_wide(headings, cells) else ""
     rules = [
         ":" + "-" * width if form in ("text", "symbol") else "-" * width + ":"
         for width, form in zip(widths, forms, strict=True)
     ]
     lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
-    return "\n".join(lines) + f"\n\n: {caption} {{#{label}}}\n"
+    return "\n".join(lines) + f"\n\n: {caption} {{#{label}{attributes}}}\n"
+
+
+LINE = 96
+"""About so many characters of a table fit on a line of the page."""
+
+
+def too_wide(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
+    """Whether a row would not fit on a line, so that the columns need shares of it."""
+    longest = [max(len(entry) for entry in column) for column in zip(headings, *cells, strict=True)]
+    return sum(longest) + 3 * len(longest) > LINE and max(longest) > WIDEST
+
+
+def shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
+    """Shares of the line for each column, `0.20,0.80`: by its longest text up to a limit, never less than a word."""
+    wanted = []
+    for column in zip(headings, *cells, strict=True):
+        word = max(len(word) for entry in column for word in entry.split() or [""])
+        wanted.append(max(word + 3, min(max(len(entry) for entry in column), WIDEST), 7))
+    return ",".join(f"{width / sum(wanted):.3f}" for width in wanted)
 
 
 def _row(cells: Sequence[str]) -> str:

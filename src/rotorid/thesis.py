@@ -1,5 +1,4 @@
-"""Numbers that the thesis prints in chapter 4 and appendix A.1, for comparison only: nothing is computed with them
-but stand-in data where no logs are at hand."""
+"""Numbers that the thesis prints in chapter 4 and appendix A.1, for comparison only: nothing is computed with them."""
 
 WHITE_BOX = {
     "mass_kg": 0.652,
@@ -20,6 +19,3 @@ GREY_BOX = {
 """Table 4.3."""
 INERTIAL_WEIGHTS = (-1.7592, 0.0076, 4.0810, 401.5602, 388.2557, 218.0455)
 """Appendix A.1.3: w11, w22, w33, w14, w25, w36."""
-LARGEST_THRUST_SPEED_RAD_S = 1 / 5.4669e-4
-LARGEST_TORQUE_SPEED_RAD_S = 1 / 6.3486e-4
-"""Appendix A.1: the scales k_x say up to which speed the tests went."""

@@ -16,7 +16,15 @@ class TypesetError(InputError):
     """The report could not be typeset; carries what pandoc or typst said."""
 
 
-def typst_source(chapters: Sequence[str | Path], title: str, subtitle: str, parts: str | Path, out: str | Path) -> None:
+def typst_source(
+    chapters: Sequence[str | Path],
+    title: str,
+    subtitle: str,
+    parts: str | Path,
+    out: str | Path,
+    left_out: Sequence[str] = (),
+    notice: str = "",
+) -> None:
     """Chapters to one typst document.
 
     Parameters
@@ -29,9 +37,14 @@ def typst_source(chapters: Sequence[str | Path], title: str, subtitle: str, part
         Folder with `report.typ`, `crossref.lua` and `references.bib`.
     out
         Where the typst source goes.
+    left_out
+        Names of chapters that are not in this report: a reference into one of them says so.
+    notice
+        What the title page says of the data.
     """
     template = Path(parts) / "report.typ"
-    _pandoc(chapters, title, subtitle, parts, ["--to=typst", f"--template={template}", f"--output={out}"])
+    options = ["--to=typst", f"--template={template}", f"--output={out}"]
+    _pandoc(chapters, title, subtitle, parts, options, left_out, notice)
 
 
 def pdf(source: str | Path, out: str | Path) -> None:
@@ -44,16 +57,30 @@ def pdf(source: str | Path, out: str | Path) -> None:
         raise TypesetError(f"{source}: typst says: {error}") from None
 
 
-def html(chapters: Sequence[str | Path], title: str, subtitle: str, parts: str | Path, out: str | Path) -> None:
+def html(
+    chapters: Sequence[str | Path],
+    title: str,
+    subtitle: str,
+    parts: str | Path,
+    out: str | Path,
+    left_out: Sequence[str] = (),
+    notice: str = "",
+) -> None:
     """Chapters to one HTML file that holds its figures, style and equations (MathML); see `typst_source`."""
     parts = Path(parts)
     options = ["--to=html5", "--standalone", "--embed-resources", "--mathml", "--toc", "--toc-depth=2"]
     options += ["--number-sections", f"--template={parts / 'report.html'}", f"--css={parts / 'report.css'}"]
-    _pandoc(chapters, title, subtitle, parts, [*options, f"--output={out}"])
+    _pandoc(chapters, title, subtitle, parts, [*options, f"--output={out}"], left_out, notice)
 
 
 def _pandoc(
-    chapters: Sequence[str | Path], title: str, subtitle: str, parts: str | Path, options: Sequence[str]
+    chapters: Sequence[str | Path],
+    title: str,
+    subtitle: str,
+    parts: str | Path,
+    options: Sequence[str],
+    left_out: Sequence[str],
+    notice: str,
 ) -> None:
     import pypandoc
 
@@ -71,6 +98,8 @@ def _pandoc(
         f"--metadata=subtitle:{subtitle}",
         "--metadata=lang:en",
         "--metadata=link-citations:true",
+        "--metadata=left-out:" + ",".join(name.replace("_", "-") for name in left_out),
+        f"--metadata=notice:{notice}",
         "--metadata=reference-section-title:References",
         *options,
     ]

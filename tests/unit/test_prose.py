@@ -36,20 +36,41 @@ def test_a_zero_after_rounding_has_no_sign_and_nothing_is_a_dash() -> None:
 
 
 def test_a_table_has_heading_numbers_caption_and_label(tmp_path: Path, files: dict[str, str]) -> None:
-    text = '{{ table("cells", "Cells.", [("cell", "Cell"), ("a1", "$a_1$", "fix2"), ("note", "Note")]) }}'
+    text = (
+        '{{ table("cells", "Cells.", [("cell", "Cell"), ("a1", "$a_1$", "fix2"), ("note", "Note")], kind="public") }}'
+    )
     assert rendered(tmp_path, text, files).splitlines() == [
         "| Cell | $a_1$ | Note |",
         "| :---- | -----: | :---- |",
         "| 1 | 39.76 | a\\_b |",
         "| 2 | 37.27 | – |",
         "",
-        ": Cells. {#tbl:hover-cells}",
+        ": *Real recordings of other laboratories.* Cells. {#tbl:hover-cells}",
     ]
 
 
 def test_a_figure_has_caption_path_and_label(tmp_path: Path, files: dict[str, str]) -> None:
-    text = rendered(tmp_path, '{{ figure("lines", "All lines.") }}', files)
-    assert text == "![All lines.](results/report/x/lines.svg){#fig:hover-lines width=100%}"
+    text = rendered(tmp_path, '{{ figure("lines", "All lines.", kind="campaign") }}', files)
+    assert (
+        text == "![*Recorded on the instruments.* All lines.](results/report/x/lines.svg){#fig:hover-lines width=100%}"
+    )
+
+
+def test_a_caption_says_first_that_instruments_were_emulated(tmp_path: Path, files: dict[str, str]) -> None:
+    path = tmp_path / "hover.md"
+    path.write_text('{{ figure("lines", "All lines.", kind="campaign") }}{% if emulated %} Emulated.{% endif %}')
+    text = prose.render(path, files, emulated=True)
+    assert text.startswith("![*Emulated instruments.* All lines.]") and text.endswith(" Emulated.")
+    with pytest.raises(prose.ProseError, match="not 'guessed'"):
+        rendered(tmp_path, '{{ figure("lines", "All lines.", kind="guessed") }}', files)
+
+
+def test_a_chapter_without_its_recordings_says_which(tmp_path: Path) -> None:
+    path = tmp_path / "hover.md"
+    path.write_text("# Hover {#sec:hover}\n\n{{ nothing.here }}\n")
+    assert prose.not_recorded(path, ["thrust", "torque"], "mine/sessions.tsv") == (
+        "# Hover {#sec:hover}\n\nThis chapter needs thrust and torque recordings, and `mine/sessions.tsv` lists none.\n"
+    )
 
 
 def test_pandocs_identifiers_are_not_comments(tmp_path: Path, files: dict[str, str]) -> None:
@@ -62,10 +83,10 @@ def test_pandocs_identifiers_are_not_comments(tmp_path: Path, files: dict[str, s
         ("one\n\n{{ fit.c_q | fix(2) }}", r"hover\.md, line 3: .*c_q"),
         ("{{ fat.c_f }}", r"hover\.md, line 1: 'fat' is undefined"),
         ("a\n{{ fit.c_f", r"hover\.md, line 2: "),
-        ('{{ figure("cells", "x") }}', r"there is no figure called cells"),
-        ('{{ table("fit", "x", [("a", "A")]) }}', r"there is no table called fit"),
-        ('{{ table("cells", "x", [("a9", "A")]) }}', r"the table cells has no column 'a9'"),
-        ('{{ table("cells", "x", [("a1", "A", "round2")]) }}', r"round2 is not a form of a number"),
+        ('{{ figure("cells", "x", kind="public") }}', r"there is no figure called cells"),
+        ('{{ table("fit", "x", [("a", "A")], kind="public") }}', r"there is no table called fit"),
+        ('{{ table("cells", "x", [("a9", "A")], kind="public") }}', r"the table cells has no column 'a9'"),
+        ('{{ table("cells", "x", [("a1", "A", "round2")], kind="public") }}', r"round2 is not a form of a number"),
     ],
 )
 def test_what_is_missing_stops_the_report(tmp_path: Path, files: dict[str, str], text: str, message: str) -> None:

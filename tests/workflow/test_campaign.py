@@ -57,8 +57,8 @@ def test_what_a_new_log_and_a_changed_cutoff_rerun(project: Project) -> None:
 
 
 def add_calibration_log(project: Project, rows: list[dict[str, str]]) -> None:
-    """One more recording of the first cell's first weight, as somebody's own log in `raw/local`."""
-    folder = project.root / "raw" / "local"
+    """One more recording of the first cell's first weight, as somebody's own log in a folder of its own."""
+    folder = project.root / "raw" / "mine"
     folder.mkdir()
     first = next(row for row in rows if row["kind"] == "calibration")
     for name in ("file", "metadata"):
@@ -67,5 +67,5 @@ def add_calibration_log(project: Project, rows: list[dict[str, str]]) -> None:
     metadata = folder / "new.yaml"
     content = yaml.safe_load(metadata.read_text())
     metadata.write_text(yaml.safe_dump(content | {"id": "new", "log": "new.rlog.gz"}))
-    row = first | {"id": "new", "file": "local/new.rlog.gz", "metadata": "local/new.yaml"}
+    row = first | {"id": "new", "file": "mine/new.rlog.gz", "metadata": "mine/new.yaml"}
     rewrite_index(project.root / "raw" / "sessions.tsv", [*rows, row])

@@ -9,6 +9,8 @@ local kinds = {
 }
 local chapter, counts, sections = 0, {}, {}
 local numbers = {} -- identifier -> number as text
+local listed = { fig = {}, tbl = {} } -- identifier, number and first sentence of each caption, in reading order
+local left_out = {} -- chapters that are not in this report
 local is_typst = FORMAT:match("typst") ~= nil
 
 local function kind_of(identifier)
@@ -33,11 +35,29 @@ local function with_number(word, number, inlines)
   return out
 end
 
+-- First sentence of a caption, without the words that say what the figure is made of.
+local function first_sentence(inlines)
+  local out, started = pandoc.Inlines({}), false
+  for position, inline in ipairs(inlines) do
+    if not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
+      started = true
+      out:insert(inline)
+      if inline.t == "Str" and inline.text:match("[.;]$") and not inline.text:match("eqs?%.$") then
+        out[#out] = pandoc.Str((inline.text:gsub("[.;]$", "")))
+        break
+      end
+    end
+  end
+  return out
+end
+
 local function number_caption(element, word, number)
   local long = element.caption.long
   if #long == 0 then
     long = pandoc.Blocks({ pandoc.Plain({}) })
   end
+  local kind = word == "Figure" and "fig" or "tbl"
+  table.insert(listed[kind], { element.identifier, number, first_sentence(long[1].content) })
   long[1].content = with_number(word, number, long[1].content)
   element.caption.long = long
   return element
@@ -83,6 +103,15 @@ local count = {
     return number_caption(figure, "Figure", assign(figure.identifier, "fig")), false
   end,
   Table = function(element)
+    local shares = element.attributes.widths or element.attr.attributes.widths
+    if shares then
+      local column = 0
+      for share in shares:gmatch("[^,]+") do
+        column = column + 1
+        element.colspecs[column] = { element.colspecs[column][1], tonumber(share) }
+      end
+      element.attr.attributes.widths = nil
+    end
     return number_caption(element, "Table", assign(element.identifier, "tbl")), false
   end,
   Para = function(paragraph)
@@ -104,6 +133,12 @@ local resolve = {
         return nil
       end
       local number = numbers[citation.id]
+      local chapter_of_it = citation.id:match("^%a+:(.*)$")
+      for _, name in ipairs(left_out) do
+        if not number and chapter_of_it:sub(1, #name) == name then
+          return pandoc.Str("a part that this report leaves out")
+        end
+      end
       if not number then
         error("report: there is nothing called " .. citation.id .. " to refer to.")
       end
@@ -123,6 +158,30 @@ local resolve = {
   end,
 }
 
+-- ::: {#list-of-figures} and ::: {#list-of-tables} become lists with links, in the PDF with page numbers.
+local lists = {
+  Div = function(div)
+    local kind = ({ ["list-of-figures"] = "fig", ["list-of-tables"] = "tbl" })[div.identifier]
+    if not kind then
+      return nil
+    end
+    local lines = pandoc.Blocks({})
+    for _, entry in ipairs(listed[kind]) do
+      local identifier, number, words = table.unpack(entry)
+      local line = pandoc.Inlines({ pandoc.Link({ pandoc.Str(number) }, "#" .. identifier), pandoc.Str("\u{2002}") })
+      line:extend(words)
+      if is_typst and identifier ~= "" then
+        line:insert(pandoc.RawInline("typst", "#h(0.4em)#box(width: 1fr, repeat[.#h(0.3em)])#h(0.4em)#context counter(page).at(<" .. identifier .. ">).first()"))
+      end
+      lines:insert(pandoc.Para(line))
+    end
+    return pandoc.Div(lines, { class = "listing" })
+  end,
+}
+
 function Pandoc(document)
-  return document:walk(count):walk(resolve)
+  for name in pandoc.utils.stringify(document.meta["left-out"] or ""):gmatch("[^,]+") do
+    table.insert(left_out, name)
+  end
+  return document:walk(count):walk(lists):walk(resolve)
 end

@@ -6,13 +6,12 @@ rule prepare_experiments:
     message:
         "Black box: samples of the 48 experiments"
     input:
-        logs=campaign_logs("dynamics"),
+        quadrotor=ingested("dynamics", "quadrotor"),
+        wrench=ingested("dynamics", "wrench"),
         thrust=rules.fit_white_box.output.thrust,
-        vehicle=THESIS_VEHICLE,
     output:
         experiments="results/black_box/experiments.csv",
     params:
-        seed=CONFIG.black_box.seed,
         code=code_of("prepare_experiments"),
     log:
         "results/logs/prepare_experiments.log",
@@ -29,6 +28,7 @@ rule train_black_box:
     output:
         history="results/black_box/history.csv",
         tested="results/black_box/held_out_samples.csv",
+        scored="results/black_box/held_out_scores.csv",
     params:
         epochs=CONFIG.black_box.epochs,
         rate=CONFIG.black_box.rate,
@@ -76,6 +76,7 @@ rule chapter_black_box:
         notebook="notebooks/black_box.ipynb",
         history=rules.train_black_box.output.history,
         tested=rules.train_black_box.output.tested,
+        held_out=rules.train_black_box.output.scored,
         metrics=rules.compare_black_box.output.metrics,
         predictions=rules.compare_black_box.output.predictions,
         summary=rules.compare_black_box.output.summary,
@@ -86,6 +87,8 @@ rule chapter_black_box:
         comparison="results/report/black_box/comparison.svg",
         coverage="results/report/black_box/coverage.svg",
         scores="results/report/black_box/scores.csv",
+        held_out_table="results/report/black_box/held_out.csv",
+        effects="results/report/black_box/effects.csv",
         statements="results/report/black_box/statements.csv",
     params:
         code=code_of_chapter("black_box"),

@@ -163,6 +163,7 @@ rule chapter_grey_box:
         accelerations="results/report/grey_box/accelerations.svg",
         parameters="results/report/grey_box/parameters.csv",
         weights="results/report/grey_box/weights.csv",
+        methods="results/report/grey_box/methods.csv",
     params:
         code=code_of_chapter("grey_box"),
     log:

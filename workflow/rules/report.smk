@@ -9,11 +9,60 @@ for name in CONFIG.report.chapters:
             f"config.yaml: report.chapters names {name}, but there is no notebooks/{name}.md."
         )
 
+# Kinds of recordings that a chapter is made of: where the index lists none of one, a sentence stands in its place.
+ALL_KINDS = ["calibration", "static", "combined", "dynamic", "tensile", "thrust", "torque", "dynamics"]
+KINDS_OF_CHAPTER = {
+    "bench": ["calibration", "static", "combined", "dynamic", "tensile"],
+    "stand": ["thrust", "torque", "dynamics"],
+    "white_box": ["thrust", "torque"],
+    "grey_box": ["thrust", "torque"],
+    "black_box": ["thrust", "torque", "dynamics"],
+    "abstract": ALL_KINDS,
+    "conclusions": ALL_KINDS,
+}
+# Results that a text without a rule of its own quotes.
+QUOTED = {
+    "parameters": "results/white_box/parameters.json",
+    "calibration": "results/calibration/thesis.json",
+    "series": "results/bench/static_series.csv",
+    "reconstruction": "results/bench/reconstruction.json",
+    "speed_law": "results/stand/characteristic.json",
+    "rotor": "results/grey_box/rotor.json",
+    "network": "results/grey_box/inertia_network.json",
+    "improved": "results/grey_box/inertias.json",
+    "black_box": "results/black_box/summary.json",
+    "held_out": "results/black_box/held_out_scores.csv",
+    "proof": f"{CONFIG.proof.tables}/state.json",
+    "proof_rows": f"{CONFIG.proof.tables}/summary.csv",
+}
+QUOTED_BY = {"abstract": QUOTED, "conclusions": QUOTED}
+RECORDED = {row["kind"] for row in SESSIONS}
+LEFT_OUT = sorted({path.stem for path in Path("notebooks").glob("*.md")} - set(CONFIG.report.chapters))
+EMULATED = any(row["source"] == "emulator" for row in SESSIONS)
+NOTICE = (
+    "The recordings of the thesis's instruments are EMULATED in this report. They were made from the thesis's own "
+    "numbers, test the method, and confirm nothing about the thesis's vehicle or bench. Real are the tables quoted "
+    "from the thesis and the recordings of other laboratories; captions say which is which."
+    if EMULATED
+    else "Captions say what each figure and table is made of."
+)
+
+
+def kinds_lacking(chapter):
+    """Kinds of recordings that a chapter needs and the index does not list."""
+    return [kind for kind in KINDS_OF_CHAPTER.get(chapter, []) if kind not in RECORDED]
+
+
+def kinds_lacking_of(wildcards):
+    """The same of the chapter that is rendered."""
+    return kinds_lacking(wildcards.chapter)
+
+
 # A chapter without a rule of its own is text alone.
 CHAPTERS = {
     name: getattr(rules, f"chapter_{name}")
     for name in CONFIG.report.chapters
-    if f"chapter_{name}" in {known.name for known in workflow.rules}
+    if f"chapter_{name}" in {known.name for known in workflow.rules} and not kinds_lacking(name)
 }
 
 
@@ -21,6 +70,8 @@ def chapter_files(wildcards):
     """The files that a chapter's text may use, by name: outputs and single inputs of its rule."""
     chapter = CHAPTERS.get(wildcards.chapter)
     named = {**dict(chapter.input.items()), **dict(chapter.output.items())} if chapter else {}
+    if not kinds_lacking(wildcards.chapter):
+        named |= QUOTED_BY.get(wildcards.chapter, {})
     shown = {".json", ".csv", ".svg", ".png"}
     return {
         name: path for name, path in named.items() if isinstance(path, str) and Path(path).suffix in shown
@@ -34,8 +85,10 @@ def chapter_figures(wildcards):
 
 
 def raw_files(wildcards):
-    """Everything that instruments wrote, and the list of public recordings with their hashes."""
-    return sorted(str(path) for path in Path("raw").rglob("*") if path.is_file()) + [MANIFEST]
+    """What instruments wrote (the index and its logs), the thesis's tables, and the list of public recordings."""
+    fixed = [path for folder in ("thesis", "vehicle") for path in sorted(Path("raw", folder).glob("*"))]
+    logs = [f"{CONFIG.raw}/{row[name]}" for row in SESSIONS for name in ("file", "metadata")]
+    return [str(path) for path in fixed] + [INDEX] * bool(SESSIONS) + logs + [MANIFEST]
 
 
 rule render_chapter:
@@ -48,6 +101,9 @@ rule render_chapter:
     output:
         markdown="results/report/chapters/{chapter}.md",
     params:
+        lacking=kinds_lacking_of,
+        index=INDEX,
+        emulated=EMULATED,
         code=code_of("render_chapter"),
     log:
         "results/logs/render_chapter/{chapter}.log",
@@ -71,6 +127,8 @@ rule typeset_pdf:
     params:
         title=CONFIG.report.title,
         subtitle=CONFIG.report.subtitle,
+        left_out=LEFT_OUT,
+        notice=NOTICE,
         code=code_of("typeset_pdf"),
     log:
         "results/logs/typeset_pdf.log",
@@ -94,6 +152,8 @@ rule build_html:
     params:
         title=CONFIG.report.title,
         subtitle=CONFIG.report.subtitle,
+        left_out=LEFT_OUT,
+        notice=NOTICE,
         code=code_of("build_html"),
     log:
         "results/logs/build_html.log",

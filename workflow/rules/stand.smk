@@ -49,6 +49,7 @@ rule evaluate_stand:
         "Stand: steady wrenches and characteristics"
     input:
         recordings=STAND_SETS["dynamics"],
+        sessions="results/ingest/dynamics/wrench.csv",
         thrust=rules.fit_white_box.output.thrust,
         torque=rules.fit_white_box.output.torque,
         parameters=rules.fit_white_box.output.parameters,

@@ -3,9 +3,9 @@
 THESIS_VEHICLE = "raw/vehicle/thesis.yaml"
 
 
-def campaign_logs(group):
-    """Raw logs of one group of the campaign; none where it was not recorded."""
-    return sorted(str(path) for path in Path("raw/campaign").glob(f"{group}/*.rlog.gz"))
+def ingested_if_recorded(kind, instrument):
+    """Samples and recordings of one kind of test and instrument; nothing where the index lists none."""
+    return ingested(kind, instrument) if logs_of(kind, instrument) else []
 
 
 rule fit_white_box:
@@ -13,8 +13,9 @@ rule fit_white_box:
     message:
         "White box: rotor coefficients and mass properties"
     input:
-        thrust_logs=campaign_logs("thrust"),
-        torque_logs=campaign_logs("torque"),
+        thrust_tests=ingested_if_recorded("thrust", "rotor"),
+        torque_tests=ingested_if_recorded("torque", "rotor"),
+        torque_wrench=ingested_if_recorded("torque", "wrench"),
         components="raw/vehicle/components.csv",
     output:
         thrust="results/white_box/thrust_points.csv",
@@ -22,7 +23,6 @@ rule fit_white_box:
         parameters="results/white_box/parameters.json",
         table="results/white_box/parameters.csv",
     params:
-        seed=CONFIG.simulation.seed,
         code=code_of("fit_white_box"),
     log:
         "results/logs/fit_white_box.log",

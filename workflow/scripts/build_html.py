@@ -12,4 +12,6 @@ if __name__ == "__main__":
             subtitle=snakemake.params.subtitle,
             parts=Path(snakemake.input.template).parent,
             out=snakemake.output.html,
+            left_out=snakemake.params.left_out,
+            notice=snakemake.params.notice,
         )

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student_t
 
 from rotorid import log
 from rotorid.blackbox import models
@@ -80,8 +81,12 @@ def main(
             "worst_r2": float(score["r2"].min()),
             "mean_coverage": float(coverage.mean()),
         }
-    _, effects = models.fit_white_box_effects(vehicle, table)
-    found["effects"] = dict(zip(models.EFFECT_PARAMETERS, effects.tolist(), strict=True))
+    _, effects, errors = models.fit_white_box_effects(vehicle, table)
+    half = student_t.ppf(0.975, found["experiments"] - 1) * errors
+    found["effects"] = {
+        name: {"value": value, "interval_95": [value - width, value + width]}
+        for name, value, width in zip(models.EFFECT_PARAMETERS, effects.tolist(), half.tolist(), strict=True)
+    }
     span = TrainingRange.of(table)
     found["statements"] = [{"asked": name, "says": span.statement(values)} for name, values in ASKED.items()]
     found["inputs"] = list(INPUTS)

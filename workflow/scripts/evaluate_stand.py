@@ -15,6 +15,7 @@ import pandas as pd
 from rotorid import log
 from rotorid.blackbox.experiments import stand_wrench, thrust_of_throttle
 from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.tables import read_sessions
 from rotorid.recordings import read_set
 from rotorid.stand import wrench
 from rotorid.stand.characteristic import PARAMETERS, law, speed_law
@@ -22,6 +23,7 @@ from rotorid.stand.characteristic import PARAMETERS, law, speed_law
 
 def main(
     recordings: str,
+    sessions: str,
     thrust: str,
     torque: str,
     parameters: str,
@@ -30,9 +32,16 @@ def main(
     characteristic: str,
     curve_of_throttle: str,
 ) -> None:
-    """Write the experiments (CSV), the weight (JSON), the characteristics (JSON) and speed by throttle (CSV)."""
+    """Write the experiments (CSV), the weight (JSON), the characteristics (JSON) and speed by throttle (CSV).
+
+    `sessions` is the table of the sensor's recordings: it gives each run's number in table A.1.
+    """
     stand = read_set(Path(recordings))
-    evaluated = [wrench.evaluate(run, EXPERIMENTS[int(run.name.split("-")[1])].frequency_hz) for run in stand.runs]
+    number_of = read_sessions(sessions).set_index("group")["experiment"].astype(int)
+    numbers = [int(number_of[run.name]) for run in stand.runs]
+    evaluated = [
+        wrench.evaluate(run, EXPERIMENTS[number].frequency_hz) for run, number in zip(stand.runs, numbers, strict=True)
+    ]
     points = pd.read_csv(thrust)
     curve = thrust_of_throttle(points)
     forces = np.array([wrench.mean_thrust(run, entry, curve) for run, entry in zip(stand.runs, evaluated, strict=True)])
@@ -45,7 +54,7 @@ def main(
         wrench.weights(evaluated, mass, centre, vehicle.gravity_m_s2)
         for mass, centre in ((vehicle.mass_kg, believed), (found.mass_kg, found.centre_m))
     ]
-    table = wrench.table(evaluated, expected, *at_rest)
+    table = wrench.table(evaluated, numbers, expected, *at_rest)
     table.to_csv(experiments, index=False, float_format="%.9g")
     Path(weight).write_text(
         json.dumps(wrench.weight_as_dict(found, vehicle.mass_kg, believed, table), indent=1) + "\n",
@@ -67,6 +76,7 @@ if __name__ == "__main__":
     with log.to(snakemake.log[0]):
         main(
             recordings=snakemake.input.recordings,
+            sessions=snakemake.input.sessions,
             thrust=snakemake.input.thrust,
             torque=snakemake.input.torque,
             parameters=snakemake.input.parameters,

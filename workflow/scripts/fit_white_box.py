@@ -1,6 +1,6 @@
 """White box: rotor coefficients from the rotor tests, mass properties from the component table.
 
-- Steady points of the thrust and torque tests from the campaign's raw logs; without logs, stand-in points.
+- Steady points of the thrust and torque tests; a coefficient whose tests were not recorded is left out.
 - C_F and C_Q through the origin (thesis eqs 4.25, 4.26) with intervals, and with the noise of the speed considered.
 - Mass, centre of mass and inertia from the components by parallel axes.
 """
@@ -8,12 +8,15 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student_t
 
 from rotorid import log, thesis
-from rotorid.rotor.campaign import generated_points, thrust_points, torque_points
+from rotorid.io.tables import read_sessions
+from rotorid.rotor.campaign import COLUMNS, thrust_points, torque_points
 from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
 from rotorid.vehicle.mass_properties import compose, read_components
 
@@ -41,37 +44,42 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "points": plain.points,
         "thesis": believed,
         "difference": plain.value / believed - 1,
+        "standard_errors_off": (plain.value - believed) / plain.standard_error,
+        "p_value": float(2 * student_t.sf(abs(plain.value - believed) / plain.standard_error, plain.points - 1)),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
     }
 
 
 def main(
-    thrust_logs: Sequence[str],
-    torque_logs: Sequence[str],
+    thrust_tests: Sequence[str],
+    torque_tests: Sequence[str],
+    torque_wrench: Sequence[str],
     components: str,
-    seed: int,
     thrust: str,
     torque: str,
     parameters: str,
     table: str,
 ) -> None:
-    """Write the points (CSV), the parameters (JSON) and the comparison with table 4.1 (CSV)."""
-    if thrust_logs and torque_logs:
-        lift = thrust_points(thrust_logs)
-        rotor = [path for path in torque_logs if "-rotor." in path]
-        twist = torque_points([(path, path.replace("-rotor.", "-wrench.")) for path in rotor])
-    else:
-        rng = np.random.default_rng(seed)
-        c_f, c_q = thesis.WHITE_BOX["thrust_coefficient_n_s2"], thesis.WHITE_BOX["torque_coefficient_n_m_s2"]
-        lift = generated_points(c_f, thesis.LARGEST_THRUST_SPEED_RAD_S, 50, 0.01, rng)
-        twist = generated_points(c_q, thesis.LARGEST_TORQUE_SPEED_RAD_S, 20, 2e-4, rng)
+    """Write the points (CSV), the parameters (JSON) and the comparison with table 4.1 (CSV).
+
+    Tests come as (samples, recordings), or empty where none was recorded.
+    """
+    nothing = pd.DataFrame(columns=list(COLUMNS))
+    lift = thrust_points(*_read(thrust_tests)) if thrust_tests else nothing
+    twist = torque_points(_read(torque_tests), _read(torque_wrench)) if torque_tests and torque_wrench else nothing
     lift.to_csv(thrust, index=False)
     twist.to_csv(torque, index=False)
+    coefficients = {
+        key: coefficient(points, thesis.WHITE_BOX[believed], least)
+        for key, points, believed, least in (
+            ("c_f", lift, "thrust_coefficient_n_s2", LEAST_FORCE_SD_N),
+            ("c_q", twist, "torque_coefficient_n_m_s2", LEAST_TORQUE_SD_N_M),
+        )
+        if len(points)
+    }
     composed = compose(read_components(components))
-    found = {
-        "source": "campaign" if thrust_logs and torque_logs else "generated",
-        "c_f": coefficient(lift, thesis.WHITE_BOX["thrust_coefficient_n_s2"], LEAST_FORCE_SD_N),
-        "c_q": coefficient(twist, thesis.WHITE_BOX["torque_coefficient_n_m_s2"], LEAST_TORQUE_SD_N_M),
+    found: dict[str, Any] = {
+        **coefficients,
         "mass_kg": composed.mass_kg,
         "centre_m": composed.centre_m.tolist(),
         "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(composed.inertia_kg_m2).tolist(), strict=True)),
@@ -92,7 +100,8 @@ def main(
             "difference_percent": 100 * fit["difference"],
             "how": "least squares through the origin",
         }
-        for name, unit, fit in (("C_F", "N s²", found["c_f"]), ("C_Q", "N m s²", found["c_q"]))
+        for name, unit, fit in (("C_F", "N s²", found.get("c_f")), ("C_Q", "N m s²", found.get("c_q")))
+        if fit
     ]
     for axis in ("xx", "yy", "zz"):
         believed = thesis.WHITE_BOX[f"inertia_{axis}_kg_m2"]
@@ -110,13 +119,18 @@ def main(
     pd.DataFrame(rows).to_csv(table, index=False)
 
 
+def _read(pair: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    samples, recordings = pair
+    return pd.read_parquet(samples), read_sessions(recordings)
+
+
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
         main(
-            thrust_logs=list(snakemake.input.get("thrust_logs", [])),
-            torque_logs=list(snakemake.input.get("torque_logs", [])),
+            thrust_tests=snakemake.input.thrust_tests,
+            torque_tests=snakemake.input.torque_tests,
+            torque_wrench=snakemake.input.torque_wrench,
             components=snakemake.input.components,
-            seed=snakemake.params.seed,
             thrust=snakemake.output.thrust,
             torque=snakemake.output.torque,
             parameters=snakemake.output.parameters,

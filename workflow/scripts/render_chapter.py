@@ -1,14 +1,18 @@
-"""Put numbers, figures and tables into a chapter's text."""
+"""Put numbers, figures and tables into a chapter's text.
 
-from collections.abc import Mapping
+- A chapter whose kinds of recordings the index does not list becomes its heading and a sentence that says so.
+"""
+
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rotorid import log, prose
 
 
-def main(text: str, files: Mapping[str, str], out: str) -> None:
-    """Render `text` with the named `files` to the markdown file `out`."""
-    Path(out).write_text(prose.render(text, files), encoding="utf-8")
+def main(text: str, files: Mapping[str, str], lacking: Sequence[str], index: str, emulated: bool, out: str) -> None:
+    """Render `text` with the named `files` to the markdown file `out`; `lacking` kinds are not in the `index`."""
+    rendered = prose.not_recorded(text, lacking, index) if lacking else prose.render(text, files, emulated)
+    Path(out).write_text(rendered, encoding="utf-8")
 
 
 if __name__ == "__main__":
@@ -16,5 +20,8 @@ if __name__ == "__main__":
         main(
             text=snakemake.input.prose,
             files={name: path for name, path in snakemake.input.items() if name != "prose"},
+            lacking=snakemake.params.lacking,
+            index=snakemake.params.index,
+            emulated=snakemake.params.emulated,
             out=snakemake.output.markdown,
         )

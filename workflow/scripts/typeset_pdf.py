@@ -6,9 +6,18 @@ from pathlib import Path
 from rotorid import log, typeset
 
 
-def main(chapters: Sequence[str], title: str, subtitle: str, parts: str, source: str, pdf: str) -> None:
+def main(
+    chapters: Sequence[str],
+    title: str,
+    subtitle: str,
+    parts: str,
+    source: str,
+    pdf: str,
+    left_out: Sequence[str],
+    notice: str,
+) -> None:
     """Write the typst document `source` and the PDF made of it."""
-    typeset.typst_source(chapters, title, subtitle, parts, source)
+    typeset.typst_source(chapters, title, subtitle, parts, source, left_out, notice)
     typeset.pdf(source, pdf)
 
 
@@ -21,4 +30,6 @@ if __name__ == "__main__":
             parts=str(Path(snakemake.input.template).parent),
             source=snakemake.output.source,
             pdf=snakemake.output.pdf,
+            left_out=snakemake.params.left_out,
+            notice=snakemake.params.notice,
         )

@@ -7,16 +7,13 @@ its vertical force with their total thrust. The reading at rest is taken off, wh
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 from scipy.interpolate import PchipInterpolator
 
 from rotorid.errors import InputError
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.logs import read_log
+from rotorid.io.tables import by_recording
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.mixer import wrench_matrix
 
@@ -30,8 +27,10 @@ LARGEST_SHIFT_S = 1.0
 
 def thrust_of_throttle(points: pd.DataFrame):
     """Thrust (N) as a monotone curve of throttle through the thrust tests and the origin."""
-    throttle = np.append(0.0, points["throttle"].to_numpy())
-    thrust = np.maximum.accumulate(np.append(0.0, points["value"].to_numpy()))
+    # Tests at one throttle count as one point; throttles are sent in steps far wider than this rounding.
+    by_throttle = points.groupby(points["throttle"].round(6))["value"].mean()
+    throttle = np.append(0.0, by_throttle.index.to_numpy())
+    thrust = np.maximum.accumulate(np.append(0.0, by_throttle.to_numpy()))
     return PchipInterpolator(throttle, thrust, extrapolate=True)
 
 
@@ -89,14 +88,31 @@ def _shift(grid, total, when, lift) -> float:
     return float(shifts[int(np.argmax(scores))])
 
 
-def read_experiments(pairs: Iterable[tuple[int, str | Path, str | Path]], curve) -> pd.DataFrame:
-    """Samples of all experiments from (number, quadrotor log, wrench log)."""
+def read_experiments(
+    quadrotor: tuple[pd.DataFrame, pd.DataFrame], wrench: tuple[pd.DataFrame, pd.DataFrame], curve
+) -> pd.DataFrame:
+    """Samples of all experiments, columns `COLUMNS`, by number and then by time.
+
+    `quadrotor` and `wrench` are (samples, recordings) of `rotorid.io.tables`; recordings of one group are one
+    experiment. A number of table A.1 that was recorded more than once has the samples of every recording. Raises
+    InputError for a recording without a number of table A.1 or without the sensor's.
+    """
+    commands, felt = (by_recording(samples[samples["quality"] == 0]) for samples, _ in (quadrotor, wrench))
+    sensors = {row.group: row for row in wrench[1].itertuples()}
     parts = []
-    for number, quadrotor, wrench in pairs:
-        tables = [read_log(path).table for path in (quadrotor, wrench)]
-        tables = [t[t["quality"] == 0] for t in tables]
-        parts.append(samples_of(number, *tables, curve))
-    return pd.concat(parts, ignore_index=True)
+    for sent in quadrotor[1].sort_values("experiment", kind="stable").itertuples():
+        if sent.group not in sensors:
+            raise InputError(f"{sent.id}: an experiment without a recording of the wrench sensor in its group")
+        read = sensors[sent.group]
+        if pd.isna(sent.experiment) or int(sent.experiment) not in EXPERIMENTS:
+            raise InputError(f"{sent.id}: its metadata give no number of table A.1 (1 to {len(EXPERIMENTS)})")
+        # Each recording's times count from its own beginning.
+        reading = felt[read.id].assign(
+            host_time_s=felt[read.id]["host_time_s"] + (read.host_start_s - sent.host_start_s)
+        )
+        parts.append(samples_of(int(sent.experiment), commands[sent.id], reading, curve))
+    table = pd.concat(parts, ignore_index=True)
+    return table.assign(sample=table.groupby("experiment").cumcount() + 1)
 
 
 def stand_wrench(vehicle: Vehicle, forces_n: np.ndarray, roll_rad: np.ndarray, pitch_rad: np.ndarray) -> np.ndarray:
@@ -119,27 +135,3 @@ def _tilt(roll: np.ndarray, pitch: np.ndarray) -> np.ndarray:
     from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 
     return rotation_from_quaternion(quaternion_from_euler(np.stack([roll, pitch, 0 * roll], axis=-1)))
-
-
-def generated_experiments(
-    vehicle: Vehicle, curve, noise_n: float, noise_n_m: float, rng: np.random.Generator
-) -> pd.DataFrame:
-    """Stand-in samples where no logs are at hand: the white box of `vehicle` with noise, by table A.1."""
-    rows = []
-    for number, e in EXPERIMENTS.items():
-        if e.signal == "trapezoidal":
-            throttles = np.repeat(np.array([e.maxima]), PLATEAU_BLOCKS, axis=0)
-        else:
-            share = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(SINE_BLOCKS) + 0.5) / SINE_BLOCKS)
-            throttles = share[:, None] * np.array(e.maxima)
-        for sample, throttle in enumerate(throttles, 1):
-            rows.append(
-                [number, sample, *np.clip(curve(throttle), 0, None), np.radians(e.roll_deg), np.radians(e.pitch_deg)]
-            )
-    table = pd.DataFrame(rows, columns=list(COLUMNS[:8]))
-    wrench = stand_wrench(
-        vehicle, table[list(INPUTS[:4])].to_numpy(), table["roll_rad"].to_numpy(), table["pitch_rad"].to_numpy()
-    )
-    sigma = np.array([noise_n] * 3 + [noise_n_m] * 3)
-    table[list(OUTPUTS)] = wrench + rng.normal(size=wrench.shape) * sigma
-    return table

@@ -181,12 +181,21 @@ def effects_wrench(vehicle: Vehicle, table: pd.DataFrame, values: np.ndarray) ->
     return np.concatenate([np.einsum("nij,nj->ni", turn, v) for v in (force, moment)], axis=1)
 
 
-def fit_white_box_effects(vehicle: Vehicle, table: pd.DataFrame) -> tuple[Predict, np.ndarray]:
-    """Effects by least squares, each output weighted by the scatter that the plain white box leaves in it."""
+def fit_white_box_effects(vehicle: Vehicle, table: pd.DataFrame) -> tuple[Predict, np.ndarray, np.ndarray]:
+    """Effects by least squares: model, `EFFECT_PARAMETERS` and their standard errors, shape (12,) each.
+
+    Forces are weighted by 0.1 N and moments by 0.001 N m, the sensor's resolution. The errors hold for residuals that
+    the samples of one experiment share (cluster-robust over experiments); what the model itself lacks they do not know.
+    """
     measured = table[list(OUTPUTS)].to_numpy()
     neutral = np.concatenate([np.ones(8), np.zeros(4)])
     sigma = np.repeat([0.1, 0.001], 3)
     found = least_squares(
         lambda v: ((effects_wrench(vehicle, table, v) - measured) / sigma).ravel(), neutral, x_scale=0.01
     )
-    return lambda other: effects_wrench(vehicle, other, found.x), found.x
+    rows = np.repeat(table["experiment"].to_numpy(), len(OUTPUTS))
+    scores = np.array([found.jac[rows == number].T @ found.fun[rows == number] for number in np.unique(rows)])
+    inverse = np.linalg.inv(found.jac.T @ found.jac)
+    factor = len(scores) / (len(scores) - 1)
+    errors = np.sqrt(np.diag(factor * inverse @ (scores.T @ scores) @ inverse))
+    return lambda other: effects_wrench(vehicle, other, found.x), found.x, errors

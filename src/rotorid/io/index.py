@@ -12,6 +12,9 @@ COLUMNS = (
     "infill_percent specimen repeat started source ended samples missing file metadata"
 ).split()
 
+LOCAL = "local"
+"""Folder for recordings that no index takes unasked."""
+
 
 def index_row(session: Session, metadata: Path, raw: Path) -> dict[str, str]:
     """A row of the index; paths are relative to `raw`, what is not known is empty."""
@@ -24,12 +27,13 @@ def index_row(session: Session, metadata: Path, raw: Path) -> dict[str, str]:
 def write_index(raw: Path) -> list[dict[str, str]]:
     """Find all recordings below `raw`, in the order of their time, and write the index.
 
-    Files that are no session metadata (tables, vehicle files) are passed over. Raises SessionError for a
-    session file that is damaged.
+    What lies in `raw/local`, where the recorders write by default, is left out: first tries are no part of a campaign.
+    Such a folder has an index of its own, by `write_index(raw / "local")`. Files that are no session metadata (tables,
+    vehicle files) are passed over. Raises SessionError for a session file that is damaged.
     """
     rows = []
     for path in sorted(raw.rglob("*.yaml")):
-        if _is_session(path):
+        if path.relative_to(raw).parts[0] != LOCAL and _is_session(path):
             rows.append(index_row(read_session(path), path, raw))
     rows.sort(key=lambda row: (row["started"], row["id"]))
     with open(raw / "sessions.tsv", "w", encoding="utf-8", newline="") as file:

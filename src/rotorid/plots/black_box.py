@@ -92,3 +92,44 @@ def coverage(predictions: pd.DataFrame, metrics: pd.DataFrame, model: str, name:
     for axis in axes[:, 0]:
         axis.set_ylabel("predicted")
     return fig
+
+
+def held_out_rows(scores: pd.DataFrame) -> pd.DataFrame:
+    """Scores of the held-out samples as a table's rows: symbol, unit, RMSE, spread there and over all samples, R².
+
+    Moments in mN m.
+    """
+    rows = []
+    for row in scores.itertuples():
+        label, unit = OUTPUTS[row.output]
+        scale, unit = (1000.0, "mN m") if unit == "N m" else (1.0, "N")
+        sizes = {"rmse": scale * row.rmse, "spread": scale * row.spread, "spread_all": scale * row.spread_all}
+        rows.append({"output": label.strip("$"), "unit": unit, **sizes, "r2": row.r2})
+    return pd.DataFrame(rows)
+
+
+EFFECTS = {
+    **{f"thrust_factor_{i}": (f"thrust of rotor {i}", "believed", 1.0) for i in (1, 2, 3, 4)},
+    **{f"torque_factor_{i}": (f"torque of rotor {i}", "believed", 1.0) for i in (1, 2, 3, 4)},
+    "sensor_origin_x_m": ("sensor origin, x", "mm", 1000.0),
+    "sensor_origin_y_m": ("sensor origin, y", "mm", 1000.0),
+    "mount_roll_rad": ("mount, roll", "mrad", 1000.0),
+    "mount_pitch_rad": ("mount, pitch", "mrad", 1000.0),
+}
+
+
+def effect_rows(effects: dict) -> pd.DataFrame:
+    """The fitted effects with their intervals as a table's rows."""
+    rows = []
+    for name, (words, unit, scale) in EFFECTS.items():
+        low, high = effects[name]["interval_95"]
+        rows.append(
+            {
+                "effect": words,
+                "unit": unit,
+                "value": scale * effects[name]["value"],
+                "low_95": scale * low,
+                "high_95": scale * high,
+            }
+        )
+    return pd.DataFrame(rows)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from rotorid.plots import style
 
@@ -232,4 +233,59 @@ def gains(labels: Sequence[str], before, refitted, after) -> Figure:
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("error / sensors' noise (1: nothing left to gain)")
     ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.1)
+    return fig
+
+
+CHANNELS = {
+    **{f"force_{axis}": (f"$F_{axis}$", "N") for axis in "xyz"},
+    **{f"moment_{axis}": (f"$M_{axis}$", "N m") for axis in "xyz"},
+}
+
+
+def errors_over_time(traces: pd.DataFrame, channels: Sequence[str], located: pd.DataFrame) -> Figure:
+    """Measured minus simulated over time, believed and improved vehicle, one channel a row; tinted: located.
+
+    `traces` has `time_s channel run before after` of one run, `located` `run channel start_s stop_s`.
+    """
+    fig, axes = style.figure(0.4 + 1.15 * len(channels), len(channels), 1, sharex=True, squeeze=False)
+    for axis, channel in zip(axes[:, 0], channels, strict=True):
+        part = traces[traces["channel"] == channel]
+        here = located[(located["channel"] == channel) & located["run"].isin(part["run"])]
+        for row in here.itertuples():
+            axis.axvspan(row.start_s, row.stop_s, color=SHADE, lw=0, zorder=0)
+        axis.plot(part["time_s"], part["before"], color=style.COLOUR["before"], lw=0.8, label="as believed")
+        axis.plot(part["time_s"], part["after"], color=style.COLOUR["after"], lw=0.8, label="improved")
+        label, unit = CHANNELS[channel]
+        axis.set_ylabel(f"{label} ({unit})")
+    axes[-1, 0].set_xlabel("time (s)")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    return fig
+
+
+def errors_by_channel(channels: pd.DataFrame) -> Figure:
+    """Held-out error of each channel over the sensors' noise: as believed, values refitted, with the effects.
+
+    `channels` has `channel before refitted after noise_floor`.
+    """
+    fig, axis = style.figure(2.6)
+    places = np.arange(len(channels))
+    for shift, stage, name in (
+        (-0.2, "before", "as believed"),
+        (0.0, "refitted", "values refitted"),
+        (0.2, "after", "improved"),
+    ):
+        axis.plot(
+            places + shift,
+            channels[stage] / channels["noise_floor"],
+            "o",
+            color=style.COLOUR[stage],
+            label=name,
+            markersize=5,
+        )
+    axis.axhline(1, color=style.COLOUR["noise"], lw=1, ls="--")
+    axis.text(len(channels) - 0.45, 1.0, "noise", color=style.COLOUR["noise"], va="bottom", ha="right", fontsize=8.5)
+    axis.set_yscale("log")
+    axis.set_xticks(places, [CHANNELS[name][0] for name in channels["channel"]])
+    axis.set_ylabel("error / sensors' noise")
+    fig.legend(loc="outside upper right", ncols=3)
     return fig

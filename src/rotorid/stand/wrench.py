@@ -201,17 +201,24 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
 
 
 def table(
-    evaluated: list[Evaluated], expected: np.ndarray, believed_rest: np.ndarray, fitted_rest: np.ndarray
+    evaluated: list[Evaluated],
+    numbers: list[int],
+    expected: np.ndarray,
+    believed_rest: np.ndarray,
+    fitted_rest: np.ndarray,
 ) -> pd.DataFrame:
     """One row an experiment: throttles, attitude, voltage, mean wrench with its interval, the model's, rest, drift.
 
-    `expected` is the believed vehicle's wrench at these throttles without weight, `believed_rest` and `fitted_rest`
-    that of the weight with the believed and the fitted centre of mass, shape (n, 6) each.
+    `numbers` are the experiments' numbers in table A.1, `expected` is the believed vehicle's wrench at these throttles
+    without weight, `believed_rest` and `fitted_rest` that of the weight with the believed and the fitted centre of
+    mass, shape (n, 6) each.
     """
     rows = []
-    for entry, model, believed, fitted in zip(evaluated, expected, believed_rest, fitted_rest, strict=True):
+    entries = zip(evaluated, numbers, expected, believed_rest, fitted_rest, strict=True)
+    for entry, number, model, believed, fitted in entries:
         row = {
-            "experiment": int(entry.name.split("-")[1]),
+            "name": entry.name,
+            "experiment": number,
             "kind": entry.kind,
             **{f"throttle_{i + 1}": value for i, value in enumerate(entry.throttle)},
             "roll_deg": np.degrees(entry.roll_rad),

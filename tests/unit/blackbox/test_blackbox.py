@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from rotorid.blackbox.compare import TrainingRange, conformal_coverage, conformal_half_width, folds, scores
-from rotorid.blackbox.experiments import INPUTS, OUTPUTS, generated_experiments, samples_of, stand_wrench
+from rotorid.blackbox.experiments import INPUTS, OUTPUTS, read_experiments, samples_of, stand_wrench, thrust_of_throttle
 from rotorid.blackbox.models import (
     effects_wrench,
     fit_linear,
@@ -12,6 +12,7 @@ from rotorid.blackbox.models import (
     fit_white_box_effects,
     white_box,
 )
+from tests.unit.blackbox.samples import generated_experiments
 from tests.unit.vehicle.thesis import D, thesis_vehicle
 
 NEUTRAL = np.concatenate([np.ones(8), np.zeros(4)])
@@ -47,8 +48,9 @@ def test_effects_are_recovered():
     table = samples()
     truth = NEUTRAL + [-0.02, 0.03, 0.01, 0, 0.1, -0.05, 0, 0.02, 0.002, -0.001, 0.01, -0.02]
     table[list(OUTPUTS)] = effects_wrench(stand(), table, truth)
-    predict, found = fit_white_box_effects(stand(), table)
+    predict, found, errors = fit_white_box_effects(stand(), table)
     np.testing.assert_allclose(found, truth, atol=1e-6)
+    assert errors.max() < 1e-6
     np.testing.assert_allclose(predict(table), table[list(OUTPUTS)], atol=1e-8)
 
 
@@ -124,3 +126,23 @@ def test_samples_align_two_clocks():
     found = samples_of(1, quadrotor, wrench, curve)
     np.testing.assert_allclose(found["force_z_n"], -4 * curve(0.1), rtol=2e-3)
     np.testing.assert_allclose(found[list(INPUTS[:4])], curve(0.1), rtol=1e-3)
+    check_repeats(quadrotor, wrench, found)
+
+
+def check_repeats(quadrotor: pd.DataFrame, wrench: pd.DataFrame, once: pd.DataFrame) -> None:
+    """An experiment recorded twice gives the samples of both, under names of any form."""
+    tables = []
+    for device, table in (("q", quadrotor), ("w", wrench)):
+        samples = pd.concat([table.assign(id=f"{device}{n}", quality=0) for n in (1, 2)], ignore_index=True)
+        recordings = pd.DataFrame(
+            {"id": [f"{device}1", f"{device}2"], "group": ["mine", "yours"], "experiment": 1, "host_start_s": 5.0}
+        )
+        tables.append((samples, recordings))
+    found = read_experiments(*tables, curve)
+    assert len(found) == 2 * len(once)
+    assert found["sample"].tolist() == list(range(1, len(found) + 1))
+
+
+def test_two_thrust_tests_at_one_throttle_count_as_one() -> None:
+    points = pd.DataFrame({"throttle": [0.1, 0.2, 0.2], "value": [1.0, 2.0, 4.0]})
+    assert thrust_of_throttle(points)(0.2) == pytest.approx(3.0)

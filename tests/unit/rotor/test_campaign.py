@@ -1,19 +1,60 @@
+"""Steady points of rotor tests, from tables made by hand."""
+
 import numpy as np
+import pandas as pd
 import pytest
 
-from rotorid.rotor.campaign import COLUMNS, generated_points
-from rotorid.rotor.coefficients import Points, fit_coefficient
+from rotorid.errors import InputError
+from rotorid.rotor.campaign import COLUMNS, thrust_points, torque_points
+
+STEP_S = 0.02
 
 
-def test_generated_points_have_the_stated_coefficient():
-    fits = []
-    for seed in range(20):
-        points = generated_points(1.3877e-6, 1829.2, 50, 0.01, np.random.default_rng(seed))
-        run = [Points("a", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
-        fits.append(fit_coefficient(run, offset=False).value)
-    # One fit has a standard error of 0.06 %, the mean of twenty 0.014 %.
-    assert np.mean(fits) == pytest.approx(1.3877e-6, rel=4e-4)
-    assert list(points.columns) == list(COLUMNS)
-    assert points["throttle"].tolist()[:2] == [0.01, 0.02] and points["throttle"].iloc[-1] == 0.5
-    torque = generated_points(1.8558e-8, 1575.2, 20, 1e-5, np.random.default_rng(0))
-    assert torque["throttle"].iloc[0] == 0.02 and torque["throttle"].iloc[-1] == 0.4
+def drive(name: str, throttle: float, speed_rpm: float, thrust_n: float = 0.0) -> pd.DataFrame:
+    """A tester's samples: two seconds of rest, four of throttle, two of rest; its zero reads 0.5 N."""
+    time = np.arange(0, 8, STEP_S)
+    on = (time >= 2) & (time < 6)
+    return pd.DataFrame(
+        {
+            "id": name,
+            "host_time_s": time,
+            "quality": 0,
+            "throttle": np.where(on, throttle, 0.0),
+            "speed_rpm": np.where(on, speed_rpm, 0.0),
+            "thrust_n": 0.5 + np.where(on, thrust_n, 0.0),
+            "battery_voltage_v": 15.5,
+        }
+    )
+
+
+def rows(*names: str, groups: list[str], start_s: float = 0.0) -> pd.DataFrame:
+    return pd.DataFrame({"id": names, "group": groups, "host_start_s": start_s})
+
+
+def test_a_thrust_point_is_the_steady_mean_less_the_rest() -> None:
+    tests = [drive("b", 0.2, 9000.0, 3.0), drive("a", 0.1, 6000.0, 1.2)]
+    found = thrust_points(pd.concat(tests, ignore_index=True), rows("b", "a", groups=["b", "a"]))
+    assert list(found.columns) == list(COLUMNS)
+    assert found["test"].tolist() == ["a", "b"]  # by throttle
+    np.testing.assert_allclose(found["value"], [1.2, 3.0])
+    np.testing.assert_allclose(found["speed_rad_s"], np.array([6000, 9000]) * np.pi / 30)
+
+
+def test_a_torque_point_pairs_the_instruments_by_group_and_by_the_hosts_clock() -> None:
+    """The sensor's recording began 1.5 s before the tester's, so its own times are 1.5 s ahead."""
+    sensor_time = np.arange(0, 10, STEP_S)
+    on = (sensor_time >= 3.5) & (sensor_time < 7.5)
+    reading = pd.DataFrame(
+        {"id": "w", "host_time_s": sensor_time, "quality": 0, "moment_z_n_m": 0.01 - np.where(on, 0.03, 0.0)}
+    )
+    rotor = (drive("r", 0.2, 9000.0), rows("r", groups=["one"], start_s=101.5))
+    found = torque_points(rotor, (reading, rows("w", groups=["one"], start_s=100.0)))
+    assert found["test"].tolist() == ["one"]
+    assert found["value"][0] == pytest.approx(0.03)
+    with pytest.raises(InputError, match="without a recording of the wrench sensor"):
+        torque_points(rotor, (reading, rows("w", groups=["another"])))
+
+
+def test_a_motor_that_never_ran_is_named() -> None:
+    with pytest.raises(InputError, match="idle: the motor never ran"):
+        thrust_points(drive("idle", 0.0, 0.0), rows("idle", groups=["idle"]))

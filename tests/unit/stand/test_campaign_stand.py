@@ -27,13 +27,14 @@ def truth() -> dict:
 
 @pytest.fixture(scope="module")
 def thrust() -> pd.DataFrame:
-    return thrust_points(sorted((CAMPAIGN / "thrust").glob("*.rlog.gz")))
+    return thrust_points(*read_tables(sorted((CAMPAIGN / "thrust").glob("*.rlog.gz"))))
 
 
 @pytest.fixture(scope="module")
 def torque() -> pd.DataFrame:
-    drives = sorted((CAMPAIGN / "torque").glob("*-rotor.rlog.gz"))
-    return torque_points([(path, path.with_name(path.name.replace("-rotor", "-wrench"))) for path in drives])
+    return torque_points(
+        *(read_tables(sorted((CAMPAIGN / "torque").glob(f"*-{device}.rlog.gz"))) for device in ("rotor", "wrench"))
+    )
 
 
 def coefficient(points: pd.DataFrame):

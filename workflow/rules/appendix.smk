@@ -1,0 +1,30 @@
+"""Tables of the report's appendix."""
+
+APPENDIX_SECTIONS = ["filter", "bench", "stand", "rotor", "residuals", "simulation", "grey_box", "black_box"]
+
+
+rule chapter_appendix:
+    """Settings, controller, excitation of the experiments, what was read."""
+    message:
+        "Chapter appendix: tables"
+    input:
+        lock="requirements.lock",
+        weights="raw/thesis/table_2_6.csv",
+        readings="raw/thesis/table_2_7.csv",
+        geometry=BENCH_GEOMETRY,
+        vehicle=THESIS_VEHICLE,
+        components="raw/vehicle/components.csv",
+        public=MANIFEST,
+    output:
+        gains="results/report/appendix/gains.csv",
+        references="results/report/appendix/references.csv",
+        experiments="results/report/appendix/experiments.csv",
+        settings="results/report/appendix/settings.csv",
+        hashes="results/report/appendix/hashes.csv",
+    params:
+        config={name: getattr(CONFIG, name).model_dump() for name in APPENDIX_SECTIONS},
+        code=code_of("tabulate_appendix"),
+    log:
+        "results/logs/chapter_appendix.log",
+    script:
+        "../scripts/tabulate_appendix.py"

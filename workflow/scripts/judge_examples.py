@@ -1,0 +1,125 @@
+"""Four worked examples for the mismatch chapter, judged in this run.
+
+- A piece of two real flights, one of them held out; and, recorded by simulators that share no code with the library, a
+  bench, a flight with nothing wrong and a flight with a cause outside the catalogue.
+- What the verdicts say, and the error over time that the first leaves on the flight held out.
+"""
+
+import json
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from rotorid import log
+from rotorid.importers.report import read_report
+from rotorid.mismatch.deliver import analysis_of, write_files
+from rotorid.recordings import RecordingSet, Run, read_set
+
+SHOWN_HZ = 50.0
+INSTRUMENT = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+
+
+def piece(recordings: RecordingSet, flights: Sequence[str], start_s: float, stop_s: float, every: int) -> RecordingSet:
+    """A stretch of some flights, thinned; the last of them is held out."""
+    runs = []
+    for name in flights:
+        table = recordings.run(name).table
+        since = table["time_s"] - table["time_s"].iloc[0]
+        runs.append(Run(name, table[since.between(start_s, stop_s)].iloc[::every].reset_index(drop=True)))
+    return RecordingSet(recordings.name, recordings.vehicle, tuple(runs), (flights[-1],))
+
+
+def recorded(case: str, root: str) -> RecordingSet:
+    """A set recorded by the simulators of `tests/concealed`; the answer is thrown away."""
+    sys.path.insert(0, root)
+    from tests.concealed import build, cases
+
+    wanted = {known.name: known for known in cases.all_cases()}[case]
+    with tempfile.TemporaryDirectory() as folder:
+        answer = build.build(wanted, Path(folder) / "sets", Path(folder) / "answers")
+        return read_set(Path(folder) / "sets" / answer.stem)
+
+
+def rows_of(example: str, verdict: Mapping[str, Any]) -> tuple[list[dict], list[dict], list[dict]]:
+    """Channels, effects and locations of a verdict as rows of tables."""
+    channels = []
+    for name, channel in verdict["channels"].items():
+        for split, errors in channel["rmse"].items():
+            channels.append(
+                {"example": example, "channel": name, "split": split, "unit": channel["unit"], **(errors or {})}
+                | {"noise_floor": channel["noise_floor"]}
+            )
+    effects = []
+    for effect in verdict["effects"]:
+        common = {"example": example, "effect": effect["id"], "status": effect["status"]}
+        common["alternatives"] = " or ".join(effect["alternatives"])
+        for parameter in effect["parameters"] or [
+            {"symbol": "", "value": None, "unit": "", "interval_95": [None, None]}
+        ]:
+            low, high = parameter["interval_95"] or (None, None)
+            figures = {"symbol": parameter["symbol"], "value": parameter["value"], "unit": parameter["unit"]}
+            effects.append(common | figures | {"low_95": low, "high_95": high})
+    locations = [
+        {"example": example, **{name: place[name] for name in ("run", "channel", "start_s", "stop_s")}}
+        for place in verdict["locations"]
+    ]
+    return channels, effects, locations
+
+
+def main(
+    flights: str, real: Mapping[str, Any], cases: Mapping[str, str], root: str, out: Mapping[str, str], folder: str
+) -> None:
+    """Judge the examples and write their state (JSON) and tables (CSV); each verdict's own files go to `folder`."""
+    state: dict[str, Any] = {"examples": {}}
+    channels, effects, locations, traces = [], [], [], []
+    report = read_report(Path(flights))
+    state["real_available"], state["real_missing"] = report["available"], report["reason"]
+    sets = {name: recorded(case, root) for name, case in cases.items()}
+    if report["available"]:
+        sets = {"real": piece(read_set(Path(flights)), **real)} | sets
+    for name, recordings in sets.items():
+        analysis = analysis_of(recordings)
+        place = Path(folder) / name
+        files = [place / file for file in ("verdict.json", "report.html", "improved_vehicle.yaml")]
+        verdict = json.loads(write_files(analysis, *files).text())
+        state["examples"][name] = {
+            "verdict": verdict["verdict"].replace("_", " "),
+            "sentence": verdict["sentence"],
+            "runs": len(recordings.runs),
+            "seconds": float(sum(run.time_s[-1] - run.time_s[0] for run in recordings.runs)),
+            "values": [
+                {"name": key, **{part: value[part] for part in ("believed", "refitted")}}
+                for key, value in verdict["parameters"].items()
+            ],
+            "unexplained_share": (verdict.get("unexplained") or {}).get("share"),
+        }
+        for whole, part in zip((channels, effects, locations), rows_of(name, verdict), strict=True):
+            whole += part
+        held_out = verdict["runs"]["held_out"]
+        for trace in analysis.traces:
+            if trace.run in held_out[:1] and trace.channel in INSTRUMENT:
+                step = max(round(1 / SHOWN_HZ / float(np.median(np.diff(trace.time_s)))), 1)
+                shown = {"time_s": trace.time_s, "before": trace.before, "after": trace.after}
+                frame = pd.DataFrame(shown).iloc[::step]
+                traces.append(frame.assign(example=name, run=trace.run, channel=trace.channel))
+    Path(out["state"]).write_text(json.dumps(state, indent=1) + "\n", encoding="utf-8")
+    for name, rows in (("channels", channels), ("effects", effects), ("locations", locations)):
+        pd.DataFrame(rows).to_csv(out[name], index=False, float_format="%.6g")
+    pd.concat(traces).to_csv(out["traces"], index=False, float_format="%.5g")
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            flights=snakemake.input.flights,
+            real=dict(snakemake.params.real),
+            cases=dict(snakemake.params.cases),
+            root=str(Path.cwd()),
+            out=dict(snakemake.output.items()),
+            folder=snakemake.params.folder,
+        )
