@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import checking, effects, exporting, importing, starting, simulating, verdicts
+from rotorid.cli import checking, effects, exporting, importing, simulating, starting, verdicts
 
 app = typer.Typer(
     no_args_is_help=True,

@@ -34,8 +34,9 @@ class Made:
 
 def import_logs(
     logs: Annotated[list[Path], typer.Argument(help="Logs of one vehicle: PX4 .ulg, Crazyflie uSD, CSV, Parquet, …")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the set; default: the first log's name.")]
-    = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder of the set; default: the first log's name.")
+    ] = None,
     mass_kg: MassKg = None,
     like: Like = None,
     vehicle: VehicleFile = None,
@@ -131,9 +132,7 @@ def make_set(
                 f"{logs[0]}: nothing tells what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
                 f"{', '.join(templates.names())} and --mass-kg"
             )
-        proposal = propose(
-            folder.name, list(runs.values()), found[0].known, templates.read(name), name, mass_kg
-        )
+        proposal = propose(folder.name, list(runs.values()), found[0].known, templates.read(name), name, mass_kg)
         text, remarks = proposal.text, proposal.remarks
         if there.is_file() and there.read_text(encoding="utf-8") != text:
             raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")

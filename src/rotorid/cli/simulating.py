@@ -65,7 +65,7 @@ def fly(vehicle, folder: Path, seconds: float, flights: int, seed: int) -> Path:
 
         def wanted(t: float, phase=phase) -> np.ndarray:
             swing = np.sin(np.array([0.9, 0.7, 0.5]) * t + phase) + 0.5 * np.sin(np.array([3.1, 3.7, 1.3]) * t)
-            return np.array([0.25, 0.25, 0.4]) * swing
+            return np.array([0.25, 0.25, 0.4]) * (swing + 0.3 * np.sin(np.array([9.1, 11.3, 7.1]) * t + phase[::-1]))
 
         pilot = AttitudePid(vehicle, AttitudeReference("swings", weight / 0.96, wanted), gains, 0.02)
         trace = simulate_as_stated(vehicle, pilot, seconds, 0.002)

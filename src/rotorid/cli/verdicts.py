@@ -18,8 +18,9 @@ FIXED_S, PER_SAMPLE_S, MOST_SAMPLES = 5.0, 8e-4, 300_000
 
 def verdict(
     paths: Annotated[list[Path], typer.Argument(help="A recording set (folder with vehicle.yaml), or logs.")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results; default NAME-verdict.")]
-    = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for the results; default NAME-verdict.")
+    ] = None,
     mass_kg: MassKg = None,
     like: Like = None,
     vehicle: VehicleFile = None,
@@ -57,7 +58,9 @@ def verdict(
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)
             return
         typer.echo(text)
-        typer.echo(f"{target / 'report.html'} (and verdict.json, improved_vehicle.yaml), {time.monotonic() - start:.0f} s")
+        typer.echo(
+            f"{target / 'report.html'} (and verdict.json, improved_vehicle.yaml), {time.monotonic() - start:.0f} s"
+        )
 
 
 def deliver_set(folder: Path, target: Path, quiet: bool) -> str:

@@ -11,7 +11,6 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.importers import crazyflie, neurobem, px4_ulog, rcbenchmark
 from rotorid.importers.clean import true_stretches
-from rotorid.importers.crazyflie_usd import read_usd_log
 from rotorid.importers.known import Known, px4_vehicle
 from rotorid.importers.mapping import Mapping, read_by_mapping
 from rotorid.importers.report import Fault

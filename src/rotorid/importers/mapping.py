@@ -214,7 +214,9 @@ def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> np.ndarray
         bad = values[name].isna() & raw[name].notna()
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
-            raise InputError(f"{where}, line {row + 2}, column {name}: expected a number, found {raw[name].iloc[row]!r}")
+            raise InputError(
+                f"{where}, line {row + 2}, column {name}: expected a number, found {raw[name].iloc[row]!r}"
+            )
     return values.to_numpy(float)
 
 
@@ -324,7 +326,9 @@ def _rotors(names, taken, patterns) -> list[str] | None:
     for pattern in patterns:
         found = {}
         for name in names:
-            match = re.fullmatch(rf"(?:{pattern})_?m?(\d)(?:_(?:rpm|us|rad_s))?", _plain(name)) if name not in taken else 0
+            match = (
+                re.fullmatch(rf"(?:{pattern})_?m?(\d)(?:_(?:rpm|us|rad_s))?", _plain(name)) if name not in taken else 0
+            )
             if match:
                 found.setdefault(int(match.group(match.lastindex)), name)
         numbers = sorted(found)
@@ -406,7 +410,9 @@ def as_text(mapping: Mapping, doubts: list[str], source: str) -> str:
         if name == "attitude":
             content["form"] = channel.form
         content = {k: list(v) if isinstance(v, tuple) else v for k, v in content.items()}
-        lines.append(f"  {name}: {yaml.safe_dump(content, default_flow_style=True, width=10**6, sort_keys=False).strip()}")
+        lines.append(
+            f"  {name}: {yaml.safe_dump(content, default_flow_style=True, width=10**6, sort_keys=False).strip()}"
+        )
     kept = yaml.safe_dump(list(mapping.keep), default_flow_style=True, width=10**6).strip()
     lines.append(f"keep: {kept}   # other columns, kept as candidates for what an error depends on")
     return "\n".join(lines) + "\n"

@@ -201,5 +201,3 @@ def _specific_lift(table: pd.DataFrame, time_s: np.ndarray) -> np.ndarray:
         if len(size):
             lift = np.where(np.interp(time_s, rates[c.TIME], size) < CALM_RAD_S, lift, np.nan)
     return lift
-
-

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.errors import InputError
 from rotorid.importers import crazyflie
 from rotorid.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.importers.neurobem import read_neurobem
@@ -24,7 +23,6 @@ from rotorid.importers.rcbenchmark import read_rcbenchmark
 from rotorid.importers.report import Fault, ImportReport
 from rotorid.importers.vicon_csv import read_vicon_csv
 from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
-from rotorid.recordings import columns as c
 
 Runs = dict[str, tuple[pd.DataFrame, list[Fault]]]
 
