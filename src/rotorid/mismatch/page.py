@@ -217,7 +217,8 @@ def runs_text(verdict: Verdict) -> str:
     held, training = verdict.runs.held_out, verdict.runs.training
     if set(held) == set(training):
         return f"one run, {training[0]}; its last third held out"
-    return f"{len(training)} runs to fit, {len(held)} held out ({', '.join(held)})"
+    fitted = "1 run" if len(training) == 1 else f"{len(training)} runs"
+    return f"{fitted} to fit, {len(held)} held out ({', '.join(held)})"
 
 
 def where_text(verdict: Verdict) -> list[str]:
