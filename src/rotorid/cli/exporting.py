@@ -23,12 +23,17 @@ def export(
     """
     with one_sentence():
         from rotorid.exports import export_vehicle
+        from rotorid.exports.flown import try_out
         from rotorid.recordings import read_vehicle
 
-        exported = export_vehicle(read_vehicle(vehicle_file), to)
+        vehicle = read_vehicle(vehicle_file)
+        exported = export_vehicle(vehicle, to)
         path = out or Path(exported.file_name)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(exported.text, encoding="utf-8")
         typer.echo(f"{path}: written for {to}")
         for sentence in exported.left_out:
             typer.echo(f"  - not expressed: {sentence}")
+        flown = try_out(vehicle, to, exported)
+        if flown:
+            typer.echo(f"  {flown}")
