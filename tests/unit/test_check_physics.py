@@ -1,4 +1,4 @@
-"""What `check` calls wrong: each mistake is made in a sound flight and must be named; the sound flight raises nothing."""
+"""What `check` calls wrong: each mistake made in a sound flight is named; the sound flight raises nothing."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -100,7 +100,7 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
         return True
     if name == "com_offset" and form == "moment":
         values["places"] = values["places"] - np.array([p["r_x"], p["r_y"], 0.0])
-        return True
+        return "taken as rotors that sit elsewhere, so that their drag acts there, too"
     if name == "inertia_products":
         j = values["inertia"].copy()
         for (a, b), key in (((0, 1), "J_xy"), ((0, 2), "J_xz"), ((1, 2), "J_yz")):

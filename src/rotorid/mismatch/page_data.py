@@ -1,7 +1,7 @@
 """The numbers behind the page's figures, small enough to stand in the page.
 
-Series are stored as 16-bit integers times a scale, base64: the page reads them without a library. A long run is thinned to
-every k-th row, and the page says so.
+Series are stored as 16-bit integers times a scale, base64: the page reads them without a library. A long run is thinned
+to every k-th row, and the page says so.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _series(run: str, channel: str, traces: Sequence[Trace], every: int) -> dict
 
 
 def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[Trace]]) -> dict:
-    """Size of the error by blocks of half a second beside what was flown: variables and, by channel, before and after."""
+    """Size of the error by half seconds beside what was flown: variables and, by channel, before and after."""
     variables = sorted({v for known in analysis.regimes.values() for v in known if v != "time_s"})
     channels = list(dict.fromkeys(c for _, c in by_pair))
     rows: dict[str, dict[str, list[np.ndarray]]] = {}

@@ -1,8 +1,9 @@
 """What in a flight cannot be right, by physics that every multirotor obeys.
 
 Thrust carries the weight, the accelerometer feels the thrust and not gravity, the gyroscope is the derivative of the
-attitude, rotors on the left roll the vehicle to the right. Each doubt is one sentence with the numbers that raised it and
-what most often causes them. Nothing is corrected here; limits are wide, since the believed vehicle may be wrong, too.
+attitude, rotors on the left roll the vehicle to the right. Each doubt is one sentence with the numbers that raised it
+and what most often causes them. Nothing is corrected here; limits are wide, since the believed vehicle may be wrong,
+too.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ AGREES, CONTRADICTS = 0.5, -0.3
 SLOW_S, LATEST_STEPS, LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
 SURE_Z, ALIKE, RIDGE = 6.0, 5.0, 0.02
-"""Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, as a share of the regressors."""
+"""Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, a share of the regressors."""
 RPM = 2 * np.pi / 60
 DEGREE = np.pi / 180
 LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
@@ -134,8 +135,8 @@ def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle):
         yield f"the accelerometer's median is {size:.3g}, expected about 9.8 m/s²: it is in multiples of g"
     elif size <= 0.5:
         yield (
-            f"the accelerometer's median is {size:.3g} m/s², expected about 9.8: gravity was added back, but a specific "
-            "force holds none"
+            f"the accelerometer's median is {size:.3g} m/s², expected about 9.8: gravity was added back, but a "
+            "specific force holds none"
         )
     elif -middle[2] < 0.7 * size:
         axis = "xyz"[int(np.argmax(np.abs(middle)))]
@@ -189,8 +190,8 @@ def _gyroscope(run: Run, clock: np.ndarray):
         name = f"angular_velocity_{axis}_rad_s"
         if r < CONTRADICTS:
             yield (
-                f"{name} turns against the attitude (correlation {r:.2f}): body axes of gyroscope and attitude differ, or "
-                "the quaternion is the inverse one"
+                f"{name} turns against the attitude (correlation {r:.2f}): body axes of gyroscope and attitude differ, "
+                "or the quaternion is the inverse one"
             )
         elif r > AGREES and 0.5 < scale * DEGREE < 2:
             yield f"{name} is {scale:.3g} times the derivative of the attitude: it is in degrees per second"
@@ -215,8 +216,8 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle):
                     yield f"velocity_{axis}_m_s goes against the derivative of position_{axis}_m (correlation {r:.2f})"
                 elif r < 0.2:
                     yield (
-                        f"velocity_{axis}_m_s does not follow position_{axis}_m (correlation {r:.2f}): one of them is in "
-                        "body axes, or axes are exchanged"
+                        f"velocity_{axis}_m_s does not follow position_{axis}_m (correlation {r:.2f}): one of them is "
+                        "in body axes, or axes are exchanged"
                     )
     if attitude is None or force is None:
         return
@@ -236,8 +237,8 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle):
             r = _correlation(world[:, k], change[:, k])
             if r < CONTRADICTS:
                 yield (
-                    f"the velocity along {axis} changes against the tilt of the thrust (correlation {r:.2f}): world axes "
-                    "of attitude and velocity differ"
+                    f"the velocity along {axis} changes against the tilt of the thrust (correlation {r:.2f}): world "
+                    "axes of attitude and velocity differ"
                 )
 
 
@@ -297,8 +298,8 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle):
     seats = ", ".join(f"{i + 1} {_seat(np.array([found[1, i], -found[0, i]]))}" for i in sure)
     rotors = f"rotor {wrong[0]} does" if len(wrong) == 1 else f"rotors {', '.join(map(str, wrong))} do"
     yield (
-        f"{rotors} not turn the vehicle as the stated places say; by roll and pitch they sit: {seats}: look at the order "
-        "of the rotors, or at the signs of the body axes"
+        f"{rotors} not turn the vehicle as the stated places say; by roll and pitch they sit: {seats}: look at the "
+        "order of the rotors, or at the signs of the body axes"
     )
 
 
@@ -353,7 +354,8 @@ def _amount(recordings: RecordingSet):
                 rates.append(known.sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
         if rates and min(rates) < LEAST_RATE_HZ[name]:
             yield (
-                f"The {name} come at {min(rates):.3g} Hz, {LEAST_RATE_HZ[name]:g} Hz and more are better: {costs[name]}."
+                f"The {name} come at {min(rates):.3g} Hz, {LEAST_RATE_HZ[name]:g} Hz and more are better: "
+                f"{costs[name]}."
             )
 
 
