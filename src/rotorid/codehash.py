@@ -6,7 +6,8 @@ docstrings and layout change nothing.
 
 What a file reaches: every `import` in it, wherever it stands (also inside functions), and each name given to
 `importlib.import_module` as a constant; a module that uses `pkgutil` to find its siblings reaches its whole
-package.
+package. A module that reads files shipped with the package (`importlib.resources`) has
+those in its folder and below as part of its code.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 PACKAGE = "rotorid"
+RESOURCES = "importlib.resources"
 
 
 class Code:
@@ -62,7 +64,8 @@ class Code:
         path = self.root / script
         if not path.is_file():
             raise FileNotFoundError(f"code_of: there is no file {path}.")
-        files = (path, *self.reached_modules(path))
+        modules = self.reached_modules(path)
+        files = (path, *modules, *self._read_by(modules))
         digests = [f"{file.name} {self._facts_of(file).digest}" for file in files]
         return hashlib.sha256("\n".join(digests).encode()).hexdigest()[:16]
 
@@ -76,6 +79,12 @@ class Code:
             found |= new
             waiting += new
         return sorted(found)
+
+    def _read_by(self, modules: list[Path]) -> list[Path]:
+        """Files that are no code but shipped beside a module that reads such files (`importlib.resources`), sorted."""
+        folders = {m.parent for m in modules if RESOURCES in self._facts_of(m).names}
+        beside = (p for folder in folders for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
+        return sorted(p for p in beside if p.suffix not in (".py", ".pyc"))
 
     def remember(self) -> None:
         """Write the memory, whole or not at all, where it is wanted and something is new."""
@@ -102,6 +111,9 @@ class Code:
             if known and known["stamp"] == stamp:
                 self._facts[path] = _Facts(**known)
             else:
+                if path.suffix not in (".py", ".ipynb"):
+                    self._facts[path] = _Facts(stamp, hashlib.sha256(path.read_bytes()).hexdigest(), [])
+                    return self._facts[path]
                 tree = _parse(path)
                 names = sorted(set(_imported_names(tree, _package_of(path, self._source))))
                 digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()
@@ -141,7 +153,7 @@ def _imported_names(tree: ast.Module, package: str) -> Iterator[str]:
             continue
         if "pkgutil" in names and package:
             yield f"{package}.*"
-        yield from (name for name in names if name.split(".")[0] == PACKAGE)
+        yield from (name for name in names if name.split(".")[0] == PACKAGE or name == RESOURCES)
 
 
 def _from_names(node: ast.ImportFrom, package: str) -> list[str]:

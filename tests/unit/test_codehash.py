@@ -141,3 +141,17 @@ def test_a_spoilt_memory_is_made_anew(project: Path, tmp_path: Path) -> None:
     assert code.of("workflow/scripts/fit.py") == Code(project).of("workflow/scripts/fit.py")
     code.remember()
     assert json.loads(memory.read_text())["files"]
+
+
+def test_a_file_shipped_beside_a_module_that_reads_such_files_counts(project: Path) -> None:
+    reader = project / "src/rotorid/page/__init__.py"
+    reader.parent.mkdir()
+    reader.write_text("from importlib.resources import files\n")
+    style = project / "src/rotorid/page/files/page.css"
+    style.parent.mkdir()
+    style.write_text("a")
+    (project / "workflow/scripts/show.py").write_text("import rotorid.page\n")
+    before, other = Code(project).of("workflow/scripts/show.py"), Code(project).of("workflow/scripts/fit.py")
+    style.write_text("b")
+    assert Code(project).of("workflow/scripts/show.py") != before
+    assert Code(project).of("workflow/scripts/fit.py") == other

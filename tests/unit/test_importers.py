@@ -11,7 +11,7 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
-from rotorid.importers import clean, crazyflie, frames, px4_ulog
+from rotorid.importers import clean, crazyflie, frames, known, px4_ulog
 from rotorid.importers.crazyflie_usd import decode_usd_log, read_usd_log
 from rotorid.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.importers.neurobem import USED, read_neurobem
@@ -511,7 +511,8 @@ def test_a_px4_log_is_laid_out_on_the_fastest_inertial_clock(tmp_path: Path) -> 
             }
         )
     )
-    table, faults = px4_ulog.read_px4_ulog(path)
+    converted = px4_ulog.convert(px4_ulog.open_log(path), 4)
+    table, faults = converted.table, converted.faults
     assert table["time_s"].tolist() == pytest.approx(np.arange(50) * 0.004)
     assert table[list(c.ANGULAR_VELOCITY)].iloc[0].tolist() == pytest.approx([0.1, 0.2, 0.3])
     assert table["throttle_3"].tolist() == [0.75] * 50
@@ -521,23 +522,139 @@ def test_a_px4_log_is_laid_out_on_the_fastest_inertial_clock(tmp_path: Path) -> 
     assert "1 stretches, 0.02 s in all" in faults[0].found
 
 
+def px4(parameters=None, **topics) -> px4_ulog.Px4Log:
+    """A log of topics given as one instance or a list of instances."""
+    instances = {k: v if isinstance(v, list) else [v] for k, v in topics.items()}
+    return px4_ulog.Px4Log(instances, parameters or {})
+
+
+def gyro(count: int = 5, step_us: int = 1000) -> dict:
+    return {"timestamp": np.arange(count) * step_us, **{f"gyro_rad[{i}]": np.ones(count) for i in range(3)}}
+
+
+def outputs(*pulses: float, count: int = 5) -> dict:
+    return {"timestamp": np.arange(count) * 1000, **{f"output[{i}]": np.full(count, p) for i, p in enumerate(pulses)}}
+
+
 def test_px4_rotor_speeds_and_messages(tmp_path: Path) -> None:
     time = np.arange(5) * 1000
-    data = {
-        "sensor_combined": {"timestamp": time, **{f"gyro_rad[{i}]": np.ones(5) for i in range(3)}},
-        "esc_status": {"timestamp": time, "esc[0].esc_rpm": np.full(5, 6000.0)},
-        "actuator_outputs": {"timestamp": time, "output[0]": np.full(5, 1500.0)},
-    }
-    table, faults = px4_ulog.convert(data, rotors=1)
-    assert table["rotor_speed_1_rad_s"].tolist() == pytest.approx([200 * np.pi] * 5)
-    assert table["throttle_1"].tolist() == [0.5] * 5
-    assert faults == []
-    del data["actuator_outputs"]
-    assert kinds(px4_ulog.convert(data, rotors=1)[1]) == ["no_command"]
+    speeds = {"timestamp": time, "esc[0].esc_rpm": np.full(5, 6000.0)}
+    log = px4(sensor_combined=gyro(), esc_status=speeds, actuator_outputs=outputs(1500.0))
+    converted = px4_ulog.convert(log, rotors=1)
+    assert converted.table["rotor_speed_1_rad_s"].tolist() == pytest.approx([200 * np.pi] * 5)
+    assert converted.table["throttle_1"].tolist() == [0.5] * 5
+    assert kinds(converted.faults) == ["unit"]
+    assert kinds(px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=speeds), 1).faults) == ["no_command"]
     with pytest.raises(InputError, match="to take the clock from"):
-        px4_ulog.convert({"battery_status": {"timestamp": time}}, rotors=1)
+        px4_ulog.convert(px4(battery_status={"timestamp": time}), rotors=1)
     (tmp_path / "x.ulg").write_bytes(b"nothing")
     with pytest.raises(InputError, match="not a ULog file"):
-        px4_ulog.read_px4_ulog(tmp_path / "x.ulg")
+        px4_ulog.open_log(tmp_path / "x.ulg")
     with pytest.raises(InputError, match="file is missing"):
-        px4_ulog.read_px4_ulog(tmp_path / "none.ulg")
+        px4_ulog.open_log(tmp_path / "none.ulg")
+
+
+def test_px4_pulses_take_the_range_of_their_own_output() -> None:
+    parameters = {"PWM_MAIN_MIN": 1075, "PWM_MAIN_MAX": 1950, "PWM_MAIN_MIN2": 1000, "PWM_MAIN_MAX1": -1}
+    log = px4(parameters, sensor_combined=gyro(), actuator_outputs=outputs(1512.5, 1475.0, 900.0))
+    converted = px4_ulog.convert(log, rotors=3)
+    table = converted.table
+    assert table[["throttle_1", "throttle_2", "throttle_3"]].iloc[0].tolist() == pytest.approx([0.5, 0.5, 0.0])
+    assert kinds(converted.faults) == ["range"]
+
+
+def test_px4_motors_are_found_by_the_function_of_an_output() -> None:
+    parameters = {"PWM_MAIN_FUNC1": 102, "PWM_MAIN_FUNC2": 101, "PWM_MAIN_MIN": 1000, "PWM_MAIN_MAX": 2000}
+    log = px4(parameters, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
+    table = px4_ulog.convert(log, rotors=2).table
+    assert table[["throttle_1", "throttle_2"]].iloc[0].tolist() == [0.75, 0.25]
+    silent = px4({"PWM_MAIN_FUNC1": 201}, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
+    assert kinds(px4_ulog.convert(silent, rotors=2).faults) == ["no_command"]
+
+
+def test_px4_takes_the_instance_whose_outputs_move() -> None:
+    moving = outputs(1500.0, 1500.0)
+    moving["output[0]"], moving["output[1]"] = np.linspace(1000, 2000, 5), np.linspace(2000, 1000, 5)
+    log = px4(sensor_combined=gyro(), actuator_outputs=[outputs(1000.0, 1500.0), moving])
+    converted = px4_ulog.convert(log, rotors=2)
+    assert converted.table["throttle_1"].tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+    assert "instances" in kinds(converted.faults)
+
+
+def test_px4_thrusts_become_signals_by_the_thrust_model() -> None:
+    motors = {"timestamp": np.arange(5) * 1000, "control[0]": np.full(5, 0.3 * 0.5**2 + 0.7 * 0.5)}
+    table = px4_ulog.convert(px4({"THR_MDL_FAC": 0.3}, sensor_combined=gyro(), actuator_motors=motors), 1).table
+    assert table["throttle_1"].tolist() == pytest.approx([0.5] * 5)
+
+
+def test_px4_speeds_follow_their_function_and_an_offline_controller_is_missing() -> None:
+    esc = {
+        "timestamp": np.arange(5) * 1000,
+        "esc_online_flags": np.array([3, 3, 1, 3, 3]),
+        "esc[0].esc_rpm": np.full(5, -6000),
+        "esc[0].actuator_function": np.full(5, 102),
+        "esc[1].esc_rpm": np.full(5, 3000),
+        "esc[1].actuator_function": np.full(5, 101),
+    }
+    table = px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=esc), 2).table
+    assert table["rotor_speed_2_rad_s"].iloc[0] == pytest.approx(200 * np.pi)
+    assert table["rotor_speed_1_rad_s"].isna().tolist() == [False, False, True, False, False]
+
+
+def test_px4_invalid_positions_heights_and_currents_are_missing() -> None:
+    place = {
+        "timestamp": np.arange(5) * 1000,
+        **{name: np.arange(5.0) for name in ("x", "y", "z", "vx", "vy", "vz", "dist_bottom")},
+        "xy_valid": np.array([0, 0, 1, 1, 1]),
+        "z_valid": np.ones(5),
+        "v_xy_valid": np.zeros(5),
+        "v_z_valid": np.ones(5),
+        "dist_bottom_valid": np.ones(5),
+        "dist_bottom_sensor_bitfield": np.zeros(5),
+    }
+    battery = {"timestamp": np.arange(5) * 1000, "voltage_v": np.full(5, 16.0), "current_a": np.full(5, -1.0)}
+    second = {**battery, "voltage_v": np.full(5, 24.0), "current_a": np.full(5, 3.0)}
+    log = px4(sensor_combined=gyro(), vehicle_local_position=place, battery_status=[battery, second])
+    converted = px4_ulog.convert(log, 1)
+    table = converted.table
+    assert table["position_x_m"].isna().tolist() == [True, True, False, False, False]
+    assert table["position_z_m"].tolist() == [0, 1, 2, 3, 4]
+    assert not {"velocity_x_m_s", "velocity_y_m_s", "height_m", "battery_current_a"} & set(table.columns)
+    assert table["battery_2_voltage_v"].tolist() == [24.0] * 5
+    assert {"invalid", "not_measured", "instances"} <= set(kinds(converted.faults))
+
+
+def px4_flight(**more) -> px4_ulog.Px4Log:
+    """A log of 20 s that is in the air from 5 to 15 s."""
+    count = 2001
+    land = {"timestamp": np.array([0, 5, 15]) * 10**6, "landed": np.array([1, 0, 1])}
+    status = {"timestamp": np.array([0]), "arming_state": np.array([2])}
+    return px4(sensor_combined=gyro(count, 10_000), vehicle_land_detected=land, vehicle_status=status, **more)
+
+
+def test_px4_only_the_part_in_the_air_is_flown_and_a_jump_of_the_estimator_ends_it() -> None:
+    flying = px4_ulog.convert(px4_flight(), 1).flying
+    time_s = np.arange(2001) * 0.01
+    assert (time_s[flying].min(), time_s[flying].max()) == (5.0, pytest.approx(14.99))
+    jump = {
+        "timestamp": np.arange(21) * 10**6,
+        **{name: np.zeros(21) for name in ("x", "y", "z", "vx", "vy", "vz")},
+        "vxy_reset_counter": (np.arange(21) >= 10).astype(int),
+    }
+    converted = px4_ulog.convert(px4_flight(vehicle_local_position=jump), 1)
+    assert len(clean.true_stretches(converted.flying, time_s, 1.0)) == 2
+    assert "estimator_reset" in kinds(converted.faults)
+
+
+def test_px4_rotors_and_torque_come_from_control_allocation() -> None:
+    parameters = {"CA_ROTOR_COUNT": 2, "MAV_TYPE": 2}
+    for i, (x, y, km) in enumerate([(0.1, 0.2, 0.05), (-0.1, -0.2, -0.03)]):
+        parameters |= {f"CA_ROTOR{i}_PX": x, f"CA_ROTOR{i}_PY": y, f"CA_ROTOR{i}_PZ": 0.0, f"CA_ROTOR{i}_KM": km}
+    assert px4_ulog.rotor_count(px4(parameters)) == 2
+    found, faults = known.px4_vehicle(parameters, 2)
+    assert [(r.x_m, r.y_m, r.spin) for r in found.rotors] == [(0.1, 0.2, "ccw"), (-0.1, -0.2, "cw")]
+    assert found.torque_over_thrust_m == pytest.approx(0.04)
+    assert faults == []
+    assert known.px4_vehicle({}, 4)[0].rotors is None
+    with pytest.raises(InputError, match="VTOL"):
+        px4_ulog.rotor_count(px4({"MAV_TYPE": 22}))

@@ -8,12 +8,15 @@ multiples of 9.81 m/s², motors fractions of 65,536.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.importers.crazyflie_usd import read_usd_log
 from rotorid.importers.frames import continuous, half_turn_about_x, quaternion_to_frd_ned
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
@@ -142,3 +145,34 @@ def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.D
         groups["state estimate"] = [*c.POSITION, *c.VELOCITY]
     run, held = blank_held(run, groups)
     return run, faults + gaps + held
+
+
+def flights(
+    path: Path, prefix: str | None = None, stretches: list[tuple[float, float]] | None = None
+) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    """Every flight of a uSD log by name (`prefix`, default the file's), and the faults of log and flights.
+
+    `stretches` (start and stop, s) in place of what is found to be in the air. InputError where the log holds no
+    event `fixedFrequency` or the vehicle never flies.
+    """
+    path = Path(path)
+    prefix = prefix or path.name.split(".")[0]
+    tables, faults = read_usd_log(path)
+    if "fixedFrequency" not in tables:
+        raise InputError(f"{path}: no event fixedFrequency in this log, found {', '.join(tables) or 'none'}")
+    table, more = convert(tables["fixedFrequency"])
+    missing = [name for name in THROTTLES if name not in table]
+    if missing and not stretches:
+        raise InputError(f"{path}: motor.m1 to motor.m4 are not logged, so that nothing tells when the vehicle flies")
+    stretches = stretches or in_the_air(table)
+    if not stretches:
+        raise InputError(f"{path}: the vehicle never flies for 4 s in this log")
+    runs: dict[str, pd.DataFrame] = {}
+    faults = [*faults, *more]
+    for number, (start, stop) in enumerate(stretches):
+        run, found = flight_run(table, start, stop)
+        label = prefix if len(stretches) == 1 else f"{prefix}_{number + 1}"
+        flown = Fault("cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0)
+        runs[label] = run
+        faults += [f.in_run(label) for f in (flown, *found)]
+    return runs, faults

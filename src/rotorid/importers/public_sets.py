@@ -15,9 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.errors import InputError
 from rotorid.importers import crazyflie
-from rotorid.importers.crazyflie_usd import read_usd_log
 from rotorid.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.importers.neurobem import read_neurobem
 from rotorid.importers.obtain import Obtained
@@ -25,7 +23,6 @@ from rotorid.importers.rcbenchmark import read_rcbenchmark
 from rotorid.importers.report import Fault, ImportReport
 from rotorid.importers.vicon_csv import read_vicon_csv
 from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
-from rotorid.recordings import columns as c
 
 Runs = dict[str, tuple[pd.DataFrame, list[Fault]]]
 
@@ -59,20 +56,9 @@ def _neurobem(path: Path, name: str) -> Runs:
 
 
 def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> Runs:
-    tables, faults = read_usd_log(path)
-    if "fixedFrequency" not in tables:
-        raise InputError(f"{path}: no event fixedFrequency in this log, found {', '.join(tables) or 'none'}")
-    table, more = crazyflie.convert(tables["fixedFrequency"])
-    stretches = stretches or crazyflie.in_the_air(table)
-    if not stretches:
-        raise InputError(f"{path}: the vehicle never flies for 4 s in this log")
-    runs: Runs = {}
-    for number, (start, stop) in enumerate(stretches):
-        run, found = crazyflie.flight_run(table, start, stop)
-        label = prefix if len(stretches) == 1 else f"{prefix}_{number + 1}"
-        flown = Fault("cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0)
-        runs[label] = (run, [*faults, *more, flown, *found])
-    return runs
+    """Flights of a uSD log, each with the faults of the whole log and its own."""
+    tables, faults = crazyflie.flights(path, prefix, stretches)
+    return {run: (table, [f for f in faults if f.run in ("", run)]) for run, table in tables.items()}
 
 
 def _imrc_brushless(path: Path, name: str) -> Runs:

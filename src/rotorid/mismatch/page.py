@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import base64
 import html
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
 from jinja2 import Environment
 from markupsafe import Markup
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.findings import Analysis, Finding, Trace
+from rotorid.mismatch.findings import Analysis, Finding
+from rotorid.mismatch.headline import errors_of, headline, tiles
 from rotorid.mismatch.improve import form_of
-from rotorid.mismatch.locate import REGIME_BLOCK_S
-from rotorid.mismatch.page_template import CSS, PAGE
-from rotorid.mismatch.shares import fitted_part
+from rotorid.mismatch.page_data import page_data
 from rotorid.mismatch.verdict import (
     Channel,
     EffectVerdict,
@@ -53,45 +55,97 @@ NARROWEST = 0.03
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def make_page(analysis: Analysis, verdict: Verdict, forward_notes: Sequence[str] = ()) -> str:
-    """The page's HTML."""
+@cache
+def page_file(name: str) -> str:
+    """A file of the page: template, style, script, library."""
+    return files("rotorid.mismatch").joinpath("page_files", name).read_text(encoding="utf-8")
+
+
+def make_page(
+    analysis: Analysis,
+    verdict: Verdict,
+    forward_notes: Sequence[str] = (),
+    ledger: Sequence[Mapping] = (),
+) -> str:
+    """The page's HTML. `ledger` holds the rules that decided something, each with a `sentence`."""
     main = main_channel(analysis, verdict.locations, verdict.channels)
     environment = Environment(autoescape=True, trim_blocks=False)
     environment.globals.update(figure=figure_html, ranges=ranges_html)
     shown, more = shown_locations(verdict.locations)
     known = {e.id for e in verdict.effects} | {n.id for n in verdict.not_testable}
     silent = [effect_words(i) for i in catalogue() if i not in known]
-    page = environment.from_string(PAGE).render(
-        css=Markup(CSS),
+    data = page_data(analysis, verdict, main)
+    data["regimes"]["first"] = first_variable(verdict, main, data["regimes"]["variables"])
+    claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
+    page = environment.from_string(page_file("page.html")).render(
+        css=Markup(page_file("uPlot.min.css") + page_file("page.css")),
+        library=Markup(page_file("uPlot.iife.min.js")),
+        script=Markup(page_file("page.js")),
+        data=embedded(data),
+        has_figure=bool(data["traces"]),
+        has_regimes=bool(data["regimes"]["channels"]),
         set=verdict.set,
         runs=runs_text(verdict),
         word=WORDS[verdict.verdict],
         word_class=verdict.verdict,
+        headline=pretty(headline(verdict, main)),
+        tiles=[
+            {"heading": t.heading, "large": pretty(t.large), "small": pretty(t.small)} for t in tiles(verdict, main)
+        ],
         sentence=pretty(verdict.sentence),
-        hero=hero(analysis, verdict, main),
         where_text=where_text(verdict),
         strip=strip(analysis, verdict),
-        regime=regime_figure(analysis, verdict, main),
         locations=[location_row(loc) for loc in shown],
         more_locations=more,
         what_text=what_text(verdict),
-        effects=[
-            effect_block(e, f)
-            for e, f in zip(verdict.effects, analysis.findings, strict=True)
-            if e.status in ("established", "ambiguous")
-        ],
+        effects=[effect_block(e, finding_of(e, analysis)) for e in claimed],
+        suggested=[effect_block(e, finding_of(e, analysis)) for e in verdict.effects if e.status == "suggested"],
         values=[value_range(name, *v) for name, v in analysis.values.items()],
         better_text=better_text(verdict),
-        gains=gains_figure(verdict),
+        forward_text=forward_text(verdict),
         table=error_table(verdict.channels),
         rest=rest_text(verdict),
         ruled_out=[ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
         silent=listed(silent),
         not_testable=[{"name": capital(effect_words(n.id)), "reason": n.reason} for n in verdict.not_testable],
         next=next_text(verdict),
+        ledger=[ledger_row(row) for row in ledger],
         notes=notes(analysis, forward_notes),
     )
     return spoken(page, analysis)
+
+
+def embedded(data: Mapping) -> Markup:
+    """Data as JSON that cannot end the script element that holds it, whatever names are in it."""
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+def by_share(effects: Sequence[EffectVerdict]) -> list[EffectVerdict]:
+    """The effects with the largest share of the gain first; in their order where no share is stated."""
+    return sorted(effects, key=lambda e: -(getattr(e, "share", None) or 0.0))
+
+
+def finding_of(effect: EffectVerdict, analysis: Analysis) -> Finding:
+    """The finding behind an effect of the verdict."""
+    same = [f for f in analysis.findings if f.id == effect.id]
+    return next((f for f in same if f.status == effect.status), same[0])
+
+
+def first_variable(verdict: Verdict, main: str, known: Mapping[str, str]) -> str:
+    """The variable that the regime figure opens with: the one that separates the mismatch best."""
+    regimes = [(loc.channel, loc.regime.variable) for loc in verdict.locations if loc.regime is not None]
+    ordered = [v for c, v in regimes if c == main] + [v for _, v in regimes]
+    return next((v for v in ordered if v in known), next(iter(known), ""))
+
+
+def ledger_row(row: Mapping) -> Markup:
+    """A rule of the ledger: its name, what it decided on and its sentence, with its numbers."""
+    head = " ".join(str(row[k]) for k in ("rule", "on", "subject", "id") if row.get(k))
+    numbers = row.get("numbers") or {}
+    said = ", ".join(f"{k} {number(v, 3) if isinstance(v, float) else v}" for k, v in dict(numbers).items())
+    tail = f" ({said})" if said else ""
+    return Markup("<strong>{}</strong> {}{}").format(head, pretty(str(row.get("sentence", ""))), tail)
 
 
 def pretty(text: str) -> Markup:
@@ -163,58 +217,8 @@ def runs_text(verdict: Verdict) -> str:
     held, training = verdict.runs.held_out, verdict.runs.training
     if set(held) == set(training):
         return f"one run, {training[0]}; its last third held out"
-    return f"{len(training)} runs to fit, {len(held)} held out ({', '.join(held)})"
-
-
-def _traces(analysis: Analysis, channel: str, run: str | None = None) -> list[Trace]:
-    return [t for t in analysis.traces if t.channel == channel and run in (None, t.run)]
-
-
-def _joined(traces: Sequence[Trace], name: str) -> np.ndarray:
-    return np.concatenate([getattr(t, name) for t in traces])
-
-
-def hero(analysis: Analysis, verdict: Verdict, main: str) -> tuple[str, str, str] | None:
-    """Before and after of the main channel on the held-out run in which most is located."""
-    from rotorid.plots import mismatch as plots
-
-    if not main or not _traces(analysis, main):
-        return None
-    part = fitted_part(analysis)
-    traces = _traces(analysis, main)
-    held = [t for t in traces if np.any(part(t.run, t.time_s) < 0)] or traces
-
-    def removed(trace):
-        return float(np.nanmean(trace.before**2) - np.nanmean(trace.after**2))
-
-    run = max(held, key=removed).run
-    chosen = _traces(analysis, main, run)
-    where = [(loc.start_s, loc.stop_s) for loc in verdict.locations if (loc.run, loc.channel) == (run, main)]
-    channel = verdict.channels[main]
-    picture = plots.svg(
-        plots.before_and_after(
-            _joined(chosen, "time_s"),
-            _joined(chosen, "before"),
-            _joined(chosen, "after"),
-            channel.noise_floor,
-            f"{channel_words(main)}, {run}",
-            channel.unit,
-            where if len(where) > 1 or verdict_is_partial(where, chosen) else (),
-        )
-    )
-    kind = "a flight not used for fitting" if run in verdict.runs.held_out else "a flight that was fitted"
-    caption = (
-        f"Measured minus simulated {channel_words(main)} on {run}, {kind}. Faint: every sample; strong: mean over "
-        "half a second; grey: two sigma of the sensors' own noise"
-    )
-    caption += "; tinted: where the mismatch was located." if where else "."
-    return picture, f"error of the {channel_words(main)} before and after", caption
-
-
-def verdict_is_partial(where, chosen: Sequence[Trace]) -> bool:
-    """Whether intervals leave a visible part of a run untouched."""
-    total = sum(float(t.time_s[-1] - t.time_s[0]) for t in chosen)
-    return bool(where) and sum(b - a for a, b in where) < 0.9 * total
+    fitted = "1 run" if len(training) == 1 else f"{len(training)} runs"
+    return f"{fitted} to fit, {len(held)} held out ({', '.join(held)})"
 
 
 def where_text(verdict: Verdict) -> list[str]:
@@ -279,47 +283,6 @@ def blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
     return values[: count * per].reshape(count, per).mean(axis=1)
 
 
-def regime_figure(analysis: Analysis, verdict: Verdict, main: str) -> tuple[str, str, str] | None:
-    """Size of the error against the variable that separates it best."""
-    from rotorid.plots import mismatch as plots
-
-    regimes = [(loc.channel, loc.regime) for loc in verdict.locations if loc.regime is not None]
-    if not regimes:
-        return None
-    channel, regime = next(((c, r) for c, r in regimes if c == main), regimes[0])
-    values, before, after = [], [], []
-    for trace in _traces(analysis, channel):
-        known = analysis.regimes.get(trace.run, {})
-        if regime.variable not in known:
-            continue
-        per = max(2, int(round(REGIME_BLOCK_S / float(np.median(np.diff(trace.time_s))))))
-        count = len(trace.time_s) // per
-        on_trace = np.interp(trace.time_s, known["time_s"], known[regime.variable])
-        values.append(blocks(on_trace, per, count))
-        before.append(np.sqrt(blocks(trace.before**2, per, count)))
-        after.append(np.sqrt(blocks(trace.after**2, per, count)))
-    if not values:
-        return None
-    name, unit = regime_words(regime.variable)
-    shape = verdict.channels[channel]
-    picture = plots.svg(
-        plots.against_regime(
-            np.concatenate(values),
-            np.concatenate(before),
-            np.concatenate(after),
-            shape.noise_floor,
-            f"{name} ({unit})" if unit else name,
-            f"error, {channel_words(channel)} ({shape.unit})",
-            (regime.low, regime.high),
-        )
-    )
-    caption = (
-        f"Size of the error of the {channel_words(channel)} against {name}; a dot is half a second of flight, lines "
-        "are root mean squares by bin; tinted: the range in which the mismatch lies."
-    )
-    return picture, f"error against {name}", caption
-
-
 def shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str]:
     """The locations with most of the energy, in their order, and a word on the others."""
     if len(locations) <= MOST_LOCATIONS:
@@ -363,6 +326,7 @@ def what_text(verdict: Verdict) -> list[str]:
 def effect_block(e: EffectVerdict, finding: Finding) -> dict:
     """One effect at work: name, equation, parameters on their plausible ranges, how sure, what else it could be."""
     effect = catalogue().get(e.id)
+    share = getattr(e, "share", None)
     form = form_of(finding)
     bounds = {p.symbol: p for p in form.parameters} if form else {}
     notes = [capital(sure(e.p_value)) + "." if e.p_value is not None else ""]
@@ -404,6 +368,8 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
             for p in e.parameters
         ],
         "notes": [n for n in notes if n],
+        "share": None if share is None else f"{100 * share:.0f} %",
+        "share_width": "" if share is None else f"{60 * min(max(share, 0.0), 1.0):.1f}%",
     }
 
 
@@ -464,30 +430,6 @@ def better_text(verdict: Verdict) -> str:
     )
 
 
-def gains_figure(verdict: Verdict) -> tuple[str, str, str] | None:
-    """Errors of every channel in units of its noise."""
-    from rotorid.plots import mismatch as plots
-
-    rows = {n: c for n, c in verdict.channels.items() if c.noise_floor}
-    if not rows:
-        return None
-    held = any(c.rmse.held_out.after is not None for c in rows.values())
-
-    def ratio(stage):
-        picked = [getattr(c.rmse.held_out if held else c.rmse.training, stage) for c in rows.values()]
-        return [
-            np.nan if v is None or v <= 0 else v / c.noise_floor for v, c in zip(picked, rows.values(), strict=True)
-        ]
-
-    labels = [
-        channel_words(n).removesuffix(" after half a second") + (" ½ s" if n in FORWARD_WORDS else "") for n in rows
-    ]
-    picture = plots.svg(plots.gains(labels, ratio("before"), ratio("refitted"), ratio("after")))
-    kind = "held-out" if held else "fitted"
-    caption = f"Error on {kind} flight beside the sensors' noise; ½ s: simulation run forward for half a second."
-    return picture, "error over noise by channel", caption
-
-
 def error_table(channels: Mapping[str, Channel]) -> list[dict]:
     """Rows of errors, inverse dynamics and simulation run forward apart."""
     groups = []
@@ -500,6 +442,7 @@ def error_table(channels: Mapping[str, Channel]) -> list[dict]:
                 "name": channel_words(c).removesuffix(" after half a second"),
                 "unit": unit_text(channels[c].unit),
                 "noise": cell(channels[c].noise_floor),
+                "bars": bars(channels[c]),
                 "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in ("before", "refitted", "after")],
                 "training": [cell(getattr(channels[c].rmse.training, s)) for s in ("before", "refitted", "after")],
             }
@@ -508,6 +451,53 @@ def error_table(channels: Mapping[str, Channel]) -> list[dict]:
         if rows:
             groups.append({"name": name, "rows": rows})
     return groups
+
+
+FARTHEST = 100.0
+"""Error over noise at which the bar of the table of errors ends."""
+
+
+def bars(channel: Channel) -> Markup:
+    """Errors as believed (open) and improved (full) beside the noise (line), on a logarithmic scale."""
+    errors, _ = errors_of(channel)
+    if not channel.noise_floor or errors.before is None or errors.after is None:
+        return Markup("")
+
+    def at(value: float) -> float:
+        ratio = min(max(value / channel.noise_floor, 0.5), FARTHEST)
+        return 6 + 100 * math.log(ratio / 0.5) / math.log(FARTHEST / 0.5)
+
+    return Markup(
+        '<svg viewBox="0 0 112 14" role="img" aria-label="{}">'
+        '<line x1="{n:.1f}" x2="{n:.1f}" y1="1" y2="13" stroke="currentColor" stroke-dasharray="2 2" opacity=".6"/>'
+        '<line x1="{a:.1f}" x2="{b:.1f}" y1="7" y2="7" stroke="currentColor" opacity=".3"/>'
+        '<circle cx="{b:.1f}" cy="7" r="4" fill="none" stroke="var(--before)" stroke-width="2"/>'
+        '<circle cx="{a:.1f}" cy="7" r="4" fill="var(--after)"/></svg>'
+    ).format(
+        f"{number(errors.before / channel.noise_floor)} times the noise before, "
+        f"{number(errors.after / channel.noise_floor)} after",
+        n=at(channel.noise_floor),
+        a=at(errors.after),
+        b=at(errors.before),
+    )
+
+
+def forward_text(verdict: Verdict) -> list[str]:
+    """The simulation run forward in words: how far it drifts off within half a second."""
+    parts = []
+    for name, words in (("position", "the position"), ("velocity", "the velocity"), ("attitude", "the attitude"),
+                        ("angular_velocity", "the body rates")):  # fmt: skip
+        if name not in verdict.channels:
+            continue
+        channel = verdict.channels[name]
+        errors, _ = errors_of(channel)
+        if errors.before is not None and errors.after is not None:
+            parts.append(f"{words} {number(errors.after)} {channel.unit} (believed: {number(errors.before)})")
+    if not parts:
+        return []
+    return [
+        pretty(f"Started from a recorded state and run for half a second, the improved vehicle misses {listed(parts)}.")
+    ]
 
 
 def cell(value: float | None) -> str | Markup:
@@ -537,6 +527,15 @@ def ruled_out(e: EffectVerdict) -> Markup:
 def next_text(verdict: Verdict) -> str:
     plan = verdict.next_experiment
     if not plan.manoeuvre:
+        open_questions = [e for e in verdict.effects if e.status in ("ambiguous", "suggested")]
+        wanted = [catalogue()[i] for e in open_questions for i in (e.id, *e.alternatives) if i in catalogue()]
+        flown = next((w.separating_manoeuvre for w in wanted if w.separating_manoeuvre), "")
+        if flown:
+            return f"{capital(flown).rstrip('.')}. It bears on {listed([effect_words(e.id) for e in open_questions])}."
+        if verdict.unexplained.share > 0.15:
+            depends = [regime_words(v)[0] for v in verdict.unexplained.depends_on]
+            over = f" over {listed(depends)}" if depends else " over the range in which the error is large"
+            return f"What is left has no name yet: repeat the flight with slow sweeps{over}, one at a time."
         if verdict.verdict == "no_mismatch":
             return "Nothing is open. Faster, higher or rougher flight would show whether the model holds there too."
         return "Nothing is left to tell apart."

@@ -13,6 +13,7 @@ import numpy as np
 
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import read_set
+from rotorid.recordings.physics import doubts, near_names
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.sufficient import sufficient
 
@@ -48,6 +49,8 @@ class SetCheck:
     other_columns: tuple[str, ...]
     lacks: tuple[str, ...]
     """One sentence for each thing that is missing: what it is and what cannot be tested without it."""
+    doubts: tuple[str, ...] = ()
+    """One sentence for each thing that cannot be right, with the numbers that raised it."""
 
     def as_dict(self) -> dict:
         return asdict(self)
@@ -151,6 +154,7 @@ def check_set(recordings: RecordingSet) -> SetCheck:
         columns=tuple(name for name in columns if c.is_known(name)),
         other_columns=tuple(name for name in columns if not c.is_known(name)),
         lacks=tuple(lacks),
+        doubts=(*near_names(recordings), *(doubts(recordings) if vehicle.kind == "flight" else ())),
     )
 
 
@@ -172,6 +176,8 @@ def as_text(check: SetCheck) -> str:
     lines += ["", "Columns: " + ", ".join(check.columns)]
     if check.other_columns:
         lines.append("Kept as regime variables: " + ", ".join(check.other_columns))
+    if check.doubts:
+        lines += ["", "Looks wrong:", *(f"- {sentence}" for sentence in check.doubts)]
     lines.append("")
     lines += [f"- {sentence}" for sentence in check.lacks] or ["Nothing that the contract knows is missing."]
     return "\n".join(lines) + "\n"

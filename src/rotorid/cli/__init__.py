@@ -1,0 +1,52 @@
+"""Command line for people: from a log file to an answer. One module a command."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated
+
+import typer
+
+from rotorid.cli import checking, effects, exporting, importing, simulating, starting, verdicts
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    help="From a flight log to what your model leaves out.",
+    epilog=(
+        "The usual way:\n\n"
+        "`rotorid import flight.ulg --mass-kg 1.52 -o flights`  a recording set of your logs\n\n"
+        "`rotorid check flights`  what is in it, what it lacks, what looks wrong\n\n"
+        "`rotorid verdict flights`  what the believed vehicle leaves out, and a better one\n\n"
+        "Exit codes: 0 done, whatever the verdict says; 1 something in your files must be mended (one sentence says "
+        "what); 2 the command itself was not understood."
+    ),
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        try:
+            typer.echo(f"rotorid {version('rotorid')}")
+        except PackageNotFoundError:
+            typer.echo("rotorid (not installed)")
+        raise typer.Exit()
+
+
+@app.callback()
+def main(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    """From a flight log to what your model leaves out."""
+
+
+app.command("verdict")(verdicts.verdict)
+app.command("import")(importing.import_logs)
+app.command("init")(starting.init)
+app.command("check")(checking.check)
+app.command("simulate")(simulating.simulate)
+app.command("export")(exporting.export)
+app.command("effects")(effects.effects)

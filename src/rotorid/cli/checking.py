@@ -1,0 +1,42 @@
+"""`rotorid check`: what a recording set holds, what it lacks and what looks wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.errors import InputError
+
+
+def check(
+    folder: Annotated[Path, typer.Argument(help="A recording set, or a folder of sets.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")] = False,
+) -> None:
+    """Say what a recording set contains, its rates and gaps, what it lacks and what cannot be right.
+
+    Example: `rotorid check flights`
+    """
+    from rotorid.recordings import list_sets
+    from rotorid.recordings.check import as_text, check_folder
+
+    is_set = (folder / "vehicle.yaml").is_file()
+    folders = [folder] if is_set else [folder / name for name in list_sets(folder)] or [folder]
+    failed = False
+    results = []
+    for number, path in enumerate(folders):
+        try:
+            result = check_folder(path)
+        except InputError as error:
+            typer.echo(f"rotorid: {error}", err=True)
+            failed = True
+            continue
+        results.append(result.as_dict())
+        if not as_json:
+            typer.echo(("\n" if number else "") + as_text(result), nl=False)
+    if as_json:
+        typer.echo(json.dumps(results, indent=1))
+    if failed:
+        raise typer.Exit(1)

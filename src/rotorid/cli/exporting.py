@@ -1,0 +1,39 @@
+"""`rotorid export`: the identified vehicle in the forms that other tools know."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.console import one_sentence
+
+
+def export(
+    vehicle_file: Annotated[Path, typer.Argument(metavar="VEHICLE", help="vehicle.yaml or improved_vehicle.yaml.")],
+    to: Annotated[str, typer.Option("--to", help="rotorpy, mjcf or px4.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write; default by the form.")] = None,
+) -> None:
+    """Write the vehicle, with its effects as far as the form knows them, for another tool.
+
+    What the form cannot express is named, on the screen and in the file.
+
+    Example: `rotorid export flights-verdict/improved_vehicle.yaml --to rotorpy`
+    """
+    with one_sentence():
+        from rotorid.exports import export_vehicle
+        from rotorid.exports.flown import try_out
+        from rotorid.recordings import read_vehicle
+
+        vehicle = read_vehicle(vehicle_file)
+        exported = export_vehicle(vehicle, to)
+        path = out or Path(exported.file_name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(exported.text, encoding="utf-8")
+        typer.echo(f"{path}: written for {to}")
+        for sentence in exported.left_out:
+            typer.echo(f"  - not expressed: {sentence}")
+        flown = try_out(vehicle, to, exported)
+        if flown:
+            typer.echo(f"  {flown}")

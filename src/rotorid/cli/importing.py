@@ -1,0 +1,187 @@
+"""`rotorid import`: logs of flight controllers and tables of one's own as a recording set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.console import one_sentence
+from rotorid.errors import InputError
+
+Like = Annotated[
+    str | None,
+    typer.Option("--like", help="Template vehicle for what the log does not say; `rotorid init --list` lists them."),
+]
+MassKg = Annotated[float | None, typer.Option("--mass-kg", help="Mass of the vehicle as flown, with battery, kg.")]
+VehicleFile = Annotated[
+    Path | None, typer.Option("--vehicle", help="A vehicle.yaml to take as it is, in place of a proposal.")
+]
+MappingFile = Annotated[Path | None, typer.Option("--mapping", help="What the columns of a CSV or Parquet file are.")]
+
+
+@dataclass(frozen=True)
+class Made:
+    """A recording set that was made of logs, and what a person should know of it."""
+
+    folder: Path
+    remarks: tuple[str, ...]
+    faults: tuple[str, ...]
+    kept_vehicle: bool = False
+
+
+def import_logs(
+    logs: Annotated[list[Path], typer.Argument(help="Logs of one vehicle: PX4 .ulg, Crazyflie uSD, CSV, Parquet, …")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder of the set; default: the first log's name.")
+    ] = None,
+    mass_kg: MassKg = None,
+    like: Like = None,
+    vehicle: VehicleFile = None,
+    mapping: MappingFile = None,
+    write_mapping: Annotated[
+        Path | None, typer.Option(help="Look at a CSV or Parquet file, write what its columns seem to be, and stop.")
+    ] = None,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Write runs as CSV in place of Parquet.")] = False,
+) -> None:
+    """Turn logs of one vehicle into a recording set: a folder with a run a flight and a `vehicle.yaml`.
+
+    Only the part in the air is kept. What the logs do not say of the vehicle is proposed and marked as a proposal.
+
+    Examples:
+
+    `rotorid import log_1.ulg log_2.ulg --mass-kg 1.52 -o flights`
+
+    `rotorid import flight.csv --write-mapping mapping.yaml`, then
+    `rotorid import flight.csv --mapping mapping.yaml --like five-inch --mass-kg 0.7`
+    """
+    with one_sentence():
+        if write_mapping is not None:
+            _write_mapping(logs, write_mapping)
+            return
+        made = make_set(logs, out or Path(_stem(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
+        typer.echo(f"{made.folder}: {_runs(made.folder)}")
+        tell(made)
+        typer.echo(f"Next: look through {made.folder / 'vehicle.yaml'}, then `rotorid verdict {made.folder}`")
+
+
+def _write_mapping(logs: list[Path], target: Path) -> None:
+    from rotorid.importers.logfile import format_of
+    from rotorid.importers.mapping import as_text, guess, read_columns
+
+    if target.exists():
+        raise InputError(f"{target} is there already; choose another name")
+    if format_of(logs[0]) not in ("csv", "parquet"):
+        raise InputError(f"{logs[0]}: its columns are known, no mapping is needed")
+    mapping, doubts = guess(read_columns(logs[0]))
+    target.write_text(as_text(mapping, doubts, logs[0].name), encoding="utf-8")
+    typer.echo(f"{target}: {len(mapping.channels)} channels recognised ({', '.join(mapping.channels)})")
+    for doubt in doubts:
+        typer.echo(f"  - {doubt}")
+    typer.echo(f"Next: look through it, then `rotorid import {logs[0]} --mapping {target} --like NAME --mass-kg KG`")
+
+
+def make_set(
+    logs: list[Path],
+    folder: Path,
+    mass_kg: float | None = None,
+    like: str | None = None,
+    vehicle_file: Path | None = None,
+    mapping_file: Path | None = None,
+    as_csv: bool = False,
+) -> Made:
+    """Write the set `folder` of logs of one vehicle; a `vehicle.yaml` that is there already stays."""
+    from rotorid import templates
+    from rotorid.importers.logfile import TEMPLATES, read_log
+    from rotorid.importers.mapping import read_mapping
+    from rotorid.importers.obtain import sha256
+    from rotorid.importers.propose import propose
+    from rotorid.importers.report import ImportReport
+    from rotorid.recordings import read_vehicle
+
+    mapping = read_mapping(mapping_file) if mapping_file else None
+    found = [read_log(path, mapping) for path in logs]
+    kinds = {f.kind for f in found}
+    if len(kinds) > 1:
+        raise InputError(f"the logs are of different kinds ({', '.join(sorted(kinds))}); import each kind by itself")
+    runs: dict[str, object] = {}
+    for path, imported in zip(logs, found, strict=True):
+        for name, table in imported.runs.items():
+            if name in runs:
+                raise InputError(f"{path}: another log has a run called {name}, too; rename one of the files")
+            runs[name] = table
+    there = folder / "vehicle.yaml"
+    remarks: tuple[str, ...] = ()
+    kept = False
+    if vehicle_file is not None:
+        read_vehicle(vehicle_file)
+        text = vehicle_file.read_text(encoding="utf-8")
+    elif there.is_file() and mass_kg is None and like is None:
+        read_vehicle(there)
+        text, kept = there.read_text(encoding="utf-8"), True
+    else:
+        if kinds != {"flight"}:
+            raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
+        name = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
+        if found[0].format == "neurobem":
+            name = like or "neurobem"
+        if name is None:
+            raise InputError(
+                f"{logs[0]}: nothing tells what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
+                f"{', '.join(templates.names())} and --mass-kg"
+            )
+        proposal = propose(folder.name, list(runs.values()), found[0].known, templates.read(name), name, mass_kg)
+        text, remarks = proposal.text, proposal.remarks
+        if there.is_file() and there.read_text(encoding="utf-8") != text:
+            raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
+    folder.mkdir(parents=True, exist_ok=True)
+    if not kept:
+        there.write_text(text, encoding="utf-8")
+    for name, table in runs.items():
+        if as_csv:
+            table.to_csv(folder / f"{name}.csv", index=False)
+        else:
+            table.to_parquet(folder / f"{name}.parquet", index=False)
+    faults = tuple(dict.fromkeys(f for i in found for f in i.faults))
+    ImportReport(
+        folder.name,
+        True,
+        source=", ".join(path.name for path in logs),
+        licence="",
+        citation="",
+        files={path.name: sha256(path) for path in logs},
+        axes=found[0].axes,
+        faults=faults,
+        notes=remarks,
+    ).write(folder)
+    return Made(folder, remarks, tuple(f.sentence for f in faults), kept)
+
+
+def tell(made: Made) -> None:
+    """Print what was found in the logs and what is only proposed."""
+    if made.faults:
+        typer.echo("Found in the logs:")
+        for sentence in made.faults:
+            typer.echo(f"  - {sentence}")
+    if made.kept_vehicle:
+        typer.echo(f"{made.folder / 'vehicle.yaml'} was there and stays as it is.")
+    if made.remarks:
+        typer.echo("Proposed, not measured (marked PROPOSED in vehicle.yaml):")
+        for remark in made.remarks:
+            typer.echo(f"  - {remark}")
+
+
+def _stem(path: Path) -> str:
+    return path.name.split(".")[0] or "flights"
+
+
+def _runs(folder: Path) -> str:
+    from rotorid.recordings import read_set
+    from rotorid.recordings.check import check_run
+
+    checks = [check_run(run) for run in read_set(folder).runs]
+    total = sum(run.duration_s for run in checks)
+    word = "run" if len(checks) == 1 else "runs"
+    return f"{len(checks)} {word}, {total:.0f} s, {', '.join(run.name for run in checks)}"

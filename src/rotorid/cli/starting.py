@@ -1,0 +1,57 @@
+"""`rotorid init`: a commented `vehicle.yaml` to start from."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.console import one_sentence
+from rotorid.cli.importing import MassKg
+from rotorid.errors import InputError
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(help="Folder of the recording set to be.")] = Path("."),
+    like: Annotated[str | None, typer.Option("--like", help="Template vehicle; asked for where it is missing.")] = None,
+    mass_kg: MassKg = None,
+    name: Annotated[str | None, typer.Option(help="What the vehicle is called.")] = None,
+    listing: Annotated[bool, typer.Option("--list", help="List the template vehicles and leave.")] = False,
+) -> None:
+    """Write a commented `vehicle.yaml` from a template vehicle.
+
+    Example: `rotorid init flights --like five-inch --mass-kg 0.71`
+    """
+    from rotorid import templates
+
+    with one_sentence():
+        if listing:
+            for known in templates.names():
+                vehicle = templates.read(known)
+                typer.echo(f"{known:24} {vehicle.name}, {vehicle.mass_kg:g} kg")
+            return
+        path = folder / "vehicle.yaml"
+        if path.exists():
+            raise InputError(f"{path} is there already; nothing was written")
+        if like is None:
+            if not sys.stdin.isatty():
+                raise InputError(f"give --like with one of {', '.join(templates.names())}")
+            like = typer.prompt(f"Which vehicle is closest ({', '.join(templates.names())})")
+            name = name or typer.prompt("What is it called", default=templates.read(like).name)
+            mass_kg = mass_kg or typer.prompt("Mass as flown, kg", default=templates.read(like).mass_kg, type=float)
+        text = templates.text(like)
+        if mass_kg is not None:
+            if not mass_kg > 0:
+                raise InputError(f"--mass-kg is {mass_kg:g}, expected more than 0")
+            text = re.sub(r"(?m)^mass_kg:.*$", f"mass_kg: {mass_kg:g}   # as you stated it", text)
+        if name is not None:
+            text = re.sub(r"(?m)^name:.*$", lambda _: f'name: "{name}"', text)
+        folder.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        typer.echo(
+            f"{path}: written from template {like}. Put runs (CSV or Parquet, columns as in the recording contract) "
+            f"beside it, then `rotorid check {folder}`"
+        )

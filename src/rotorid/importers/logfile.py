@@ -1,0 +1,148 @@
+"""Any log that rotorid knows, told by its first bytes, as flights in contract columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid.errors import InputError
+from rotorid.importers import crazyflie, neurobem, px4_ulog, rcbenchmark
+from rotorid.importers.clean import true_stretches
+from rotorid.importers.known import Known, px4_vehicle
+from rotorid.importers.mapping import Mapping, read_by_mapping
+from rotorid.importers.report import Fault
+from rotorid.recordings import columns as c
+
+SHORTEST_FLIGHT_S = 4.0
+AFTER_TAKE_OFF_S = 1.0
+BEFORE_LANDING_S = 0.5
+
+NOT_YET = (
+    (b"H Product:Blackbox", "a Betaflight or INAV blackbox log", "blackbox_decode"),
+    (b"\xa3\x95", "an ArduPilot DataFlash log", "mavlogdump.py --format csv"),
+    (b"#ROSBAG V2.0", "a ROS 1 bag", "rostopic echo -p"),
+    (b"\x89MCAP0", "an MCAP file", "the export of Foxglove or PlotJuggler"),
+    (b"SQLite format 3", "a ROS 2 bag", "the export of Foxglove or PlotJuggler"),
+)
+"""Formats that are recognised but not read: first bytes, name, what makes a CSV of them."""
+TEMPLATES = {"px4": "x500", "crazyflie": "crazyflie-2.1"}
+"""Template vehicle that stands in for what a log of an autopilot does not say."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Flights of one log by name, in contract columns, with what was found on the way."""
+
+    format: str
+    runs: dict[str, pd.DataFrame]
+    faults: tuple[Fault, ...]
+    axes: str
+    known: Known = Known("")
+    kind: str = "flight"
+
+
+def format_of(path: Path) -> str:
+    """`px4`, `crazyflie`, `neurobem`, `rcbenchmark`, `csv` or `parquet`; InputError for what is none of them."""
+    try:
+        with open(path, "rb") as file:
+            head = file.read(4096)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: expected a log, found a folder") from None
+    if not head:
+        raise InputError(f"{path}: the file is empty")
+    if head.startswith(b"ULog\x01\x12\x35"):
+        return "px4"
+    if head[0] == 0xBC:
+        return "crazyflie"
+    if head.startswith(b"PAR1"):
+        return "parquet"
+    for start, name, way in NOT_YET:
+        if head.startswith(start):
+            raise InputError(
+                f"{path}: this is {name}, which rotorid does not read yet; turn it into CSV ({way}), then "
+                "`rotorid import FILE.csv`"
+            )
+    if path.suffix.lower() == ".mat":
+        return "neurobem"
+    text = head.decode("utf-8", errors="replace")
+    if "\0" in text:
+        raise InputError(
+            f"{path}: not a log that rotorid knows (PX4 ULog, Crazyflie uSD, NeuroBEM .mat, RCbenchmark CSV, any CSV, "
+            "Parquet); its first bytes are " + head[:8].hex(" ")
+        )
+    return "rcbenchmark" if "ESC signal" in text and "Thrust" in text else "csv"
+
+
+def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
+    """Every flight in a log; InputError in one sentence where the file holds none."""
+    path = Path(path)
+    kind = format_of(path)
+    if kind == "px4":
+        return _px4(path)
+    if kind == "crazyflie":
+        return _crazyflie(path)
+    if kind == "neurobem":
+        table, faults = neurobem.read_neurobem(path)
+        return Imported(kind, {path.stem: table}, tuple(faults), "NeuroBEM's, turned into FRD and NED")
+    if kind == "rcbenchmark":
+        table, faults = rcbenchmark.read_rcbenchmark(path)
+        axes = "thrust along -z of the body"
+        return Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
+    table, faults, axes = read_by_mapping(path, mapping)
+    return Imported(kind, {_stem(path): table}, tuple(faults), axes)
+
+
+def _stem(path: Path) -> str:
+    return path.name.removesuffix(".gz").rsplit(".", 1)[0]
+
+
+def _px4(path: Path) -> Imported:
+    log = px4_ulog.open_log(path)
+    try:
+        rotors = px4_ulog.rotor_count(log)
+        converted = px4_ulog.convert(log, rotors)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    time_s = converted.table[c.TIME].to_numpy(float)
+    margin = AFTER_TAKE_OFF_S + BEFORE_LANDING_S
+    flights = true_stretches(converted.flying, time_s, SHORTEST_FLIGHT_S + margin)
+    if not flights:
+        raise InputError(f"{path}: {_why_no_flight(converted, time_s)}")
+    known, faults = px4_vehicle(log.parameters, rotors)
+    runs, cuts = {}, []
+    for number, (start, stop) in enumerate(flights, 1):
+        name = path.stem if len(flights) == 1 else f"{path.stem}_{number}"
+        first, last = start + AFTER_TAKE_OFF_S, stop - BEFORE_LANDING_S
+        inside = (time_s >= first) & (time_s <= last)
+        table = converted.table[inside].reset_index(drop=True)
+        table[c.TIME] -= table[c.TIME].iloc[0]
+        runs[name] = table.dropna(axis=1, how="all")
+        found = f"in the air from {start:.2f} to {stop:.2f} s of {time_s[-1]:.0f} s"
+        cuts.append(Fault("cut", c.TIME, found, f"{first:.2f} to {last:.2f} s kept", int((~inside).sum()), name))
+    axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
+    return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known)
+
+
+def _why_no_flight(converted: px4_ulog.Converted, time_s: np.ndarray) -> str:
+    """Why nothing of a log is kept, in words."""
+    longest = max((b - a for a, b in true_stretches(converted.flying, time_s, 0.0)), default=0.0)
+    if longest > 0:
+        return (
+            f"the longest stretch in the air is {longest:.1f} s, at least {SHORTEST_FLIGHT_S:g} s beyond take-off and "
+            "landing are needed"
+        )
+    throttles = [n for n in converted.table.columns if n.startswith("throttle_")]
+    if throttles and not (converted.table[throttles] > 0.05).any().any():
+        return f"the vehicle never flies in this log of {time_s[-1]:.0f} s: no motor is ever driven"
+    return f"the vehicle is never armed and in the air in this log of {time_s[-1]:.0f} s"
+
+
+def _crazyflie(path: Path) -> Imported:
+    runs, faults = crazyflie.flights(path)
+    axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
+    return Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"))

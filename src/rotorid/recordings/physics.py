@@ -1,0 +1,374 @@
+"""What in a flight cannot be right, by physics that every multirotor obeys.
+
+Thrust carries the weight, the accelerometer feels the thrust and not gravity, the gyroscope is the derivative of the
+attitude, rotors on the left roll the vehicle to the right. Each doubt is one sentence with the numbers that raised it
+and what most often causes them. Nothing is corrected here; limits are wide, since the believed vehicle may be wrong,
+too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rotorid.recordings import columns as c
+from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.vehicle import Vehicle
+
+STEP_S = 0.02
+"""Step of the common clock; what is compared is slower than some hertz."""
+SMOOTH_S = 0.1
+LONGEST_GAP_S = 0.25
+WEIGHT_RATIO = (0.7, 1.4)
+"""Thrust over mass times specific force, outside of which no belief within its trust can be."""
+LEAST_TURNING_RAD_S = 0.05
+"""Spread of a body rate below which nothing can be said of it."""
+AGREES, CONTRADICTS = 0.5, -0.3
+"""Correlations: above, two signals agree; below, one of them is turned round."""
+SLOW_S, LATEST_STEPS, LEAST_EXPLAINED = 0.5, 4, 0.4
+"""Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
+SURE_Z, ALIKE, RIDGE = 6.0, 5.0, 0.02
+"""Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, a share of the regressors."""
+RPM = 2 * np.pi / 60
+DEGREE = np.pi / 180
+LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
+LEAST_TIME_S = 20.0
+AT_REST = 0.2
+"""Share of the median rotor speed below which a rotor counts as at rest."""
+
+
+def doubts(recordings: RecordingSet) -> tuple[str, ...]:
+    """Sentences on what cannot be right in a set of kind `flight`, the gravest first; empty where all agrees."""
+    vehicle = recordings.vehicle
+    found: list[str] = []
+    for run in recordings.runs:
+        clock = _clock(run)
+        if clock is None:
+            continue
+        for sentence in (
+            *_accelerometer(run, clock, vehicle),
+            *_weight(run, clock, vehicle),
+            *_gyroscope(run, clock),
+            *_world(run, clock, vehicle),
+            *_rotors(run, clock, vehicle),
+            *_throttle(run, vehicle),
+            *_rest(run, vehicle),
+        ):
+            found.append(f"{run.name}: {sentence}")
+    return (*_once(found), *_amount(recordings))
+
+
+def _once(found: list[str]) -> list[str]:
+    """Doubts that every run repeats told once."""
+    seen: dict[str, list[str]] = {}
+    for text in found:
+        run, _, sentence = text.partition(": ")
+        seen.setdefault(sentence.split("(")[0], []).append(text)
+    return [texts[0] + (f" The same in {len(texts) - 1} more." if len(texts) > 1 else "") for texts in seen.values()]
+
+
+# Common clock -------------------------------------------------------------------------------------
+
+
+def _clock(run: Run) -> np.ndarray | None:
+    duration = float(run.time_s[-1] - run.time_s[0])
+    return np.arange(run.time_s[0], run.time_s[-1], STEP_S) if duration > 2.0 else None
+
+
+def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = SMOOTH_S) -> np.ndarray | None:
+    """Columns as means over `smooth_s` on the common clock, (n, k), NaN in gaps; None where one is missing."""
+    if not run.has(*names):
+        return None
+    values = run.array(names)
+    known = np.isfinite(values).all(axis=1)
+    if known.sum() < 10:
+        return None
+    time, values = run.time_s[known], values[known]
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    first = np.searchsorted(time, clock - smooth_s / 2)
+    last = np.searchsorted(time, clock + smooth_s / 2)
+    count = last - first
+    mean = (total[last] - total[first]) / np.maximum(count, 1)[:, None]
+    line = np.column_stack([np.interp(clock, time, column) for column in values.T])
+    near = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
+    gap = time[near] - time[near - 1]
+    out = np.where((count > 0)[:, None], mean, line)
+    out[(gap > LONGEST_GAP_S) & (count == 0)] = np.nan
+    return out
+
+
+def _speeds(run: Run, clock: np.ndarray, vehicle: Vehicle, smooth_s: float = SMOOTH_S) -> np.ndarray | None:
+    """Rotor speeds (n, rotors), rad/s: measured, else commanded, else throttle times the upper limit."""
+    for kind in ("rotor_speed", "rotor_command"):
+        values = _on(run, clock, c.rotor_columns(kind, vehicle.rotor_count), smooth_s)
+        if values is not None:
+            return values
+    throttle = _on(run, clock, c.rotor_columns("throttle", vehicle.rotor_count), smooth_s)
+    if throttle is None or vehicle.rotor_speed_limits_rad_s is None:
+        return None
+    return throttle * vehicle.rotor_speed_limits_rad_s[1]
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    known = np.isfinite(a) & np.isfinite(b)
+    a, b = a[known], b[known]
+    if len(a) < 50 or a.std() == 0 or b.std() == 0:
+        return float("nan")
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+# Doubts -------------------------------------------------------------------------------------------
+
+
+def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle):
+    force = _on(run, clock, c.SPECIFIC_FORCE)
+    if force is None:
+        return
+    middle = np.nanmedian(force, axis=0)
+    size = float(np.linalg.norm(middle))
+    if middle[2] > 0.5 * size and size > 0.5:
+        yield (
+            f"specific_force_z_m_s2 is positive in flight (median {middle[2]:.3g}), expected about -9.8: the body axes "
+            "are forward-left-up, or the sign is turned"
+        )
+    elif size < 2.0 and size > 0.5:
+        yield f"the accelerometer's median is {size:.3g}, expected about 9.8 m/s²: it is in multiples of g"
+    elif size <= 0.5:
+        yield (
+            f"the accelerometer's median is {size:.3g} m/s², expected about 9.8: gravity was added back, but a "
+            "specific force holds none"
+        )
+    elif -middle[2] < 0.7 * size:
+        axis = "xyz"[int(np.argmax(np.abs(middle)))]
+        yield f"the accelerometer feels the thrust along {axis}, not along -z: its axes are not the body's"
+
+
+def _weight(run: Run, clock: np.ndarray, vehicle: Vehicle):
+    speeds = _speeds(run, clock, vehicle)
+    if speeds is None:
+        return
+    thrust = (vehicle.thrust_coefficients_n_s2() * speeds**2).sum(axis=1)
+    force = _on(run, clock, c.SPECIFIC_FORCE)
+    lift = vehicle.gravity_m_s2 if force is None else -np.nanmedian(force[:, 2])
+    if not lift > 5.0:
+        return
+    ratio = float(np.nanmedian(thrust)) / (vehicle.mass_kg * lift)
+    if WEIGHT_RATIO[0] <= ratio <= WEIGHT_RATIO[1]:
+        return
+    cause = "mass, thrust coefficient or the unit of the rotor speeds is wrong"
+    if 0.7 < ratio * RPM**2 < 1.4:
+        cause = "the rotor speeds are in revolutions per minute"
+    elif 0.7 < ratio * (2 * np.pi) ** 2 < 1.4:
+        cause = "the rotor speeds are in revolutions per second"
+    elif 0.7 < ratio / 1000 < 1.4 or 0.7 < ratio * 1000 < 1.4:
+        cause = "the mass is in grams"
+    yield f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force): {cause}"
+
+
+def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
+    """Body rates (n, 3), rad/s, of quaternions (n, 4), scalar first, on the common clock; NaN at gaps and ends."""
+    out = np.full((len(attitude), 3), np.nan)
+    norm = np.linalg.norm(attitude, axis=1)
+    known = np.isfinite(norm) & (norm > 0.1)
+    both = known[:-2] & known[2:]
+    first, last = attitude[:-2][both], attitude[2:][both]
+    turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
+    out[1:-1][both] = turn.as_rotvec() / (2 * STEP_S)
+    return out
+
+
+def _gyroscope(run: Run, clock: np.ndarray):
+    gyro, attitude = _on(run, clock, c.ANGULAR_VELOCITY), _on(run, clock, c.QUATERNION)
+    if gyro is None or attitude is None:
+        return
+    derived = _rates_of_attitude(attitude)
+    for axis, k in (("x", 0), ("y", 1), ("z", 2)):
+        if not np.nanstd(derived[:, k]) > LEAST_TURNING_RAD_S:
+            continue
+        r = _correlation(gyro[:, k], derived[:, k])
+        scale = float(np.nanstd(gyro[:, k]) / np.nanstd(derived[:, k]))
+        name = f"angular_velocity_{axis}_rad_s"
+        if r < CONTRADICTS:
+            yield (
+                f"{name} turns against the attitude (correlation {r:.2f}): body axes of gyroscope and attitude differ, "
+                "or the quaternion is the inverse one"
+            )
+        elif r > AGREES and 0.5 < scale * DEGREE < 2:
+            yield f"{name} is {scale:.3g} times the derivative of the attitude: it is in degrees per second"
+        elif r > AGREES and not 0.5 < scale < 2:
+            yield f"{name} is {scale:.3g} times the derivative of the attitude"
+        elif np.isfinite(r) and r < 0.2:
+            others = [abs(_correlation(gyro[:, k], derived[:, j])) for j in range(3)]
+            best = int(np.nanargmax(others))
+            if others[best] > 0.6 and best != k:
+                yield f"{name} follows the attitude about {'xyz'[best]}, not about {axis}: the axes are exchanged"
+
+
+def _world(run: Run, clock: np.ndarray, vehicle: Vehicle):
+    attitude, force = _on(run, clock, c.QUATERNION), _on(run, clock, c.SPECIFIC_FORCE)
+    velocity, position = _on(run, clock, c.VELOCITY), _on(run, clock, c.POSITION)
+    if velocity is not None and position is not None:
+        derived = np.gradient(position, STEP_S, axis=0)
+        for k, axis in enumerate("xyz"):
+            if np.nanstd(velocity[:, k]) > 0.2:
+                r = _correlation(velocity[:, k], derived[:, k])
+                if r < CONTRADICTS:
+                    yield f"velocity_{axis}_m_s goes against the derivative of position_{axis}_m (correlation {r:.2f})"
+                elif r < 0.2:
+                    yield (
+                        f"velocity_{axis}_m_s does not follow position_{axis}_m (correlation {r:.2f}): one of them is "
+                        "in body axes, or axes are exchanged"
+                    )
+    if attitude is None or force is None:
+        return
+    known = np.isfinite(attitude).all(axis=1) & np.isfinite(force).all(axis=1)
+    known &= np.linalg.norm(np.nan_to_num(attitude), axis=1) > 0.1
+    if known.sum() < 50:
+        return
+    turn = Rotation.from_quat(attitude[known][:, [1, 2, 3, 0]])
+    world = turn.apply(force[known])
+    if np.median(world[:, 2]) > 5.0 and np.median(force[known][:, 2]) < 0:
+        yield "turned into the world, the accelerometer points down: the attitude refers to axes with z up"
+    if velocity is None:
+        return
+    change = np.gradient(velocity, STEP_S, axis=0)[known]
+    for k, axis in enumerate("xy"):
+        if np.nanstd(world[:, k]) > 0.5 and np.nanstd(change[:, k]) > 0.5:
+            r = _correlation(world[:, k], change[:, k])
+            if r < CONTRADICTS:
+                yield (
+                    f"the velocity along {axis} changes against the tilt of the thrust (correlation {r:.2f}): world "
+                    "axes of attitude and velocity differ"
+                )
+
+
+def _band(values: np.ndarray) -> np.ndarray:
+    """What is faster than `SLOW_S`: the values less their mean over it, (n, k)."""
+    width = int(SLOW_S / STEP_S)
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    index = np.arange(len(values))
+    first, last = np.maximum(index - width // 2, 0), np.minimum(index + width // 2 + 1, len(values))
+    return values - (total[last] - total[first]) / (last - first)[:, None]
+
+
+def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
+    """Sign of what each rotor does to roll and pitch, (2, rotors), by a regression of the turning on squared speeds.
+
+    The lag of the motors that explains most is taken. 0 where a rotor's part is not sure; None where the rotors explain
+    too little.
+    """
+    known = np.isfinite(speeds).all(axis=1) & np.isfinite(gyro).all(axis=1)
+    if known.mean() < 0.8:
+        return None
+    clean = [np.where(known[:, None], x, np.nanmean(x, axis=0)) for x in (speeds**2, gyro)]
+    push, turning = _band(clean[0] / clean[0].mean()), np.gradient(_band(clean[1]), STEP_S, axis=0)[:, :2]
+    # All rotors together turn nothing: what they share is left out, and a mixture hardly flown is held small (ridge).
+    push = push - push.mean(axis=1, keepdims=True)
+    held = RIDGE * np.trace(push.T @ push) / push.shape[1] * np.eye(push.shape[1])
+    best: tuple[float, np.ndarray] | None = None
+    for late in range(LATEST_STEPS + 1):
+        x, y = push[: len(push) - late], turning[late:]
+        inverse = np.linalg.inv(x.T @ x + held)
+        fit = inverse @ x.T @ y
+        rest = y - x @ fit
+        explained = float((1 - (rest**2).sum(axis=0) / (y**2).sum(axis=0)).min())
+        if best is None or explained > best[0]:
+            # Neighbours are alike over a few samples: errors by as many fewer.
+            spread = np.sqrt(np.diag(inverse @ x.T @ x @ inverse)[:, None] * rest.var(axis=0) * ALIKE)
+            best = explained, np.where(np.abs(fit) > SURE_Z * spread, np.sign(fit), 0.0).T
+    return best[1] if best is not None and best[0] > LEAST_EXPLAINED else None
+
+
+def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle):
+    """Whether each rotor turns the vehicle as its place says; if not, where it seems to sit."""
+    speeds, gyro = _speeds(run, clock, vehicle, 2 * STEP_S), _on(run, clock, c.ANGULAR_VELOCITY, 2 * STEP_S)
+    if speeds is None or gyro is None or vehicle.rotor_count < 3:
+        return
+    if not (np.nanstd(gyro[:, :2], axis=0) > LEAST_TURNING_RAD_S).all():
+        return
+    found = _pushes(speeds, gyro)
+    if found is None or (np.abs(found).sum(axis=1) < vehicle.rotor_count - 1).any():
+        return
+    places = vehicle.rotor_positions_m()
+    stated = np.array([-np.sign(places[:, 1]), np.sign(places[:, 0])])
+    wrong = [i + 1 for i in range(vehicle.rotor_count) if (found[:, i] * stated[:, i] < 0).any()]
+    if not wrong:
+        return
+    sure = [i for i in range(vehicle.rotor_count) if found[:, i].all()]
+    seats = ", ".join(f"{i + 1} {_seat(np.array([found[1, i], -found[0, i]]))}" for i in sure)
+    rotors = f"rotor {wrong[0]} does" if len(wrong) == 1 else f"rotors {', '.join(map(str, wrong))} do"
+    yield (
+        f"{rotors} not turn the vehicle as the stated places say; by roll and pitch they sit: {seats}: look at the "
+        "order of the rotors, or at the signs of the body axes"
+    )
+
+
+def _seat(place: np.ndarray) -> str:
+    return f"{'front' if place[0] > 0 else 'rear'} {'right' if place[1] > 0 else 'left'}"
+
+
+def _throttle(run: Run, vehicle: Vehicle):
+    names = [n for n in c.rotor_columns("throttle", vehicle.rotor_count) if run.has(n)]
+    if not names:
+        return
+    values = run.array(tuple(names))
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if low < -0.01 or high > 1.01:
+        how = "µs (1000 to 2000)" if 800 < high < 2500 else "percent" if 2 < high <= 100 else "another range"
+        yield f"throttle runs from {low:.4g} to {high:.4g}, expected 0 to 1: it is in {how}"
+
+
+def _rest(run: Run, vehicle: Vehicle):
+    kinds = [k for k in ("rotor_speed", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))]
+    if not kinds:
+        return
+    values = run.array(c.rotor_columns(kinds[0], vehicle.rotor_count))
+    mean = values[np.isfinite(values).all(axis=1)].mean(axis=1)
+    at_rest = float((mean < AT_REST * np.median(mean[mean > 0])).mean()) if (mean > 0).any() else 1.0
+    if at_rest > 0.02:
+        yield f"all rotors are at rest in {at_rest:.0%} of the samples: keep only the part in the air"
+
+
+def _amount(recordings: RecordingSet):
+    """Doubts about how much there is and how often it was sampled."""
+    total = sum(float(r.time_s[-1] - r.time_s[0]) for r in recordings.runs)
+    if total < LEAST_TIME_S:
+        yield f"Only {total:.0f} s are recorded: intervals will be wide; {LEAST_TIME_S:g} s and more are better."
+    groups = {
+        "rotor speeds": c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count),
+        "body rates": c.ANGULAR_VELOCITY,
+        "accelerometer": c.SPECIFIC_FORCE,
+        "attitude": c.QUATERNION,
+    }
+    costs = {
+        "rotor speeds": "a lag of the motors, of some 50 ms, cannot be told from a delay",
+        "body rates": "moments are known only below a few hertz",
+        "accelerometer": "forces are known only below a few hertz",
+        "attitude": "wind and drag are known only below a few hertz",
+    }
+    for name, columns in groups.items():
+        rates = []
+        for run in recordings.runs:
+            if run.has(*columns):
+                known = np.isfinite(run.array(columns)).all(axis=1)
+                rates.append(known.sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
+        if rates and min(rates) < LEAST_RATE_HZ[name]:
+            yield (
+                f"The {name} come at {min(rates):.3g} Hz, {LEAST_RATE_HZ[name]:g} Hz and more are better: "
+                f"{costs[name]}."
+            )
+
+
+def near_names(recordings: RecordingSet) -> tuple[str, ...]:
+    """Columns that are kept without a meaning but are nearly one that has a meaning."""
+    from difflib import get_close_matches
+
+    count = max(recordings.vehicle.rotor_count, 1)
+    known = [*c.FIXED, *(n for k in ("rotor_speed", "rotor_command", "throttle") for n in c.rotor_columns(k, count))]
+    there = {n for run in recordings.runs for n in run.table.columns}
+    out = []
+    for name in sorted(there - set(known)):
+        near = [n for n in get_close_matches(name, known, 1, 0.85) if n not in there]
+        if near and not c.is_known(name):
+            out.append(f"Column {name} is not known; did you mean {near[0]}?")
+    return tuple(out)

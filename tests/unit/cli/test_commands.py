@@ -1,0 +1,175 @@
+"""The commands as a person types them: what they write, what they say of bad input, and their exit codes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from rotorid import templates
+from rotorid.cli import app
+from rotorid.cli.simulating import fly
+from rotorid.mismatch.deliver import deliver
+from rotorid.recordings import read_set, read_vehicle
+
+
+def run(*words: str):
+    return CliRunner().invoke(app, [str(w) for w in words])
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory) -> Path:
+    """Two short flights of a thesis quadrotor as a recording set."""
+    return fly(templates.read("thesis"), tmp_path_factory.mktemp("sets") / "flights", 6.0, 2, 1)
+
+
+def test_version_and_help_teach() -> None:
+    assert run("--version").output.startswith("rotorid ")
+    assert "rotorid import flight.ulg" in run("--help").output
+    assert run("verdit").exit_code == 2
+
+
+@pytest.mark.parametrize("name", templates.names())
+def test_every_template_is_a_vehicle_and_init_writes_it(tmp_path: Path, name: str) -> None:
+    done = run("init", tmp_path / "set", "--like", name, "--mass-kg", "0.9", "--name", "mine")
+    assert done.exit_code == 0, done.output
+    vehicle = read_vehicle(tmp_path / "set" / "vehicle.yaml")
+    assert (vehicle.mass_kg, vehicle.name) == (0.9, "mine")
+    again = run("init", tmp_path / "set", "--like", name)
+    assert again.exit_code == 1 and "is there already" in again.output
+
+
+def test_the_thesis_template_is_the_file_of_the_project() -> None:
+    own = Path(__file__).parents[3] / "raw" / "vehicle" / "thesis.yaml"
+    assert templates.text("thesis") == own.read_text()
+
+
+def test_a_misspelt_template_or_effect_names_the_nearest(tmp_path: Path) -> None:
+    done = run("init", tmp_path, "--like", "x5000")
+    assert done.exit_code == 1 and "did you mean x500?" in done.output
+    done = run("effects", "rotor_drog")
+    assert done.exit_code == 1 and "did you mean rotor_drag?" in done.output
+
+
+def test_effects_as_json() -> None:
+    assert json.loads(run("effects", "--json").output)["rotor_drag"]["name"] == "rotor drag"
+
+
+@pytest.mark.slow
+def test_a_verdict_has_the_bytes_of_the_workflow_and_a_mismatch_is_no_error(flights: Path, tmp_path: Path) -> None:
+    done = run("verdict", flights, "-o", tmp_path / "out", "--json", "-q")
+    assert done.exit_code == 0, done.output
+    names = ("verdict.json", "report.html", "improved_vehicle.yaml")
+    deliver(read_set(flights), *(tmp_path / "flow" / n for n in names), progress=lambda text: None)
+    for name in names:
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "flow" / name).read_bytes()
+    assert json.loads(done.stdout)["set"] == "flights"
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda p: None, "no such file"),
+        (lambda p: p.mkdir(), "no vehicle.yaml and no log in it"),
+        (lambda p: p.write_bytes(b""), "the file is empty"),
+        (lambda p: p.write_bytes(b"\x7fELF\0\0\0\0" * 8), "not a log that rotorid knows"),
+        (lambda p: p.write_bytes(b"\xa3\x95" * 80), "ArduPilot DataFlash"),
+        (lambda p: p.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8)), "to take the clock from"),
+        (lambda p: p.write_text("a,b\n1,2\n3,4\n"), "--write-mapping"),
+    ],
+)
+def test_a_wrong_file_gets_one_sentence(tmp_path: Path, make, said: str) -> None:
+    path = tmp_path / "thing"
+    make(path)
+    done = run("verdict", path, "-o", tmp_path / "out")
+    assert done.exit_code == 1
+    assert said in done.output
+    assert len(done.output.strip().splitlines()) == 1
+    assert "Traceback" not in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_with_a_misnamed_vehicle_says_so(tmp_path: Path) -> None:
+    (tmp_path / "Vehicle.yml").write_text("name: x\n")
+    assert "is Vehicle.yml meant to be it?" in run("verdict", tmp_path).output
+
+
+def own_csv(tmp_path: Path, flights: Path) -> Path:
+    """The first flight in other units, axes and names: g, degrees, FLU, ENU, xyzw, rpm."""
+    table = read_set(flights).runs[0].table
+    flu = np.array([1.0, -1.0, -1.0])
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_quat(table[[f"quaternion_{a}" for a in "xyzw"]].to_numpy())
+    enu = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
+    quaternion = (enu * turn * Rotation.from_matrix(np.diag(flu))).as_quat()
+    force = table[[f"specific_force_{a}_m_s2" for a in "xyz"]].to_numpy() * flu / 9.80665
+    rates = np.degrees(table[[f"angular_velocity_{a}_rad_s" for a in "xyz"]].to_numpy() * flu)
+    velocity = table[[f"velocity_{a}_m_s" for a in "xyz"]].to_numpy() @ enu.as_matrix().T
+    speeds = table[[f"rotor_speed_{i}_rad_s" for i in range(1, 5)]].to_numpy() * 60 / (2 * np.pi)
+    columns = {"timestamp_us": (table["time_s"] * 1e6 + 5e9).round()}
+    for names, values in (
+        ("acc_x acc_y acc_z", force),
+        ("gyro_x_deg_s gyro_y_deg_s gyro_z_deg_s", rates),
+        ("qx qy qz qw", quaternion),
+        ("vx vy vz", velocity),
+        ("rpm1 rpm2 rpm3 rpm4", speeds),
+    ):
+        columns |= dict(zip(names.split(), values.T, strict=True))
+    path = tmp_path / "own.csv"
+    pd.DataFrame({**columns, "sunshine": 1.0}).to_csv(path, index=False)
+    return path
+
+
+def test_a_csv_of_ones_own_comes_back_by_the_proposed_mapping(tmp_path: Path, flights: Path) -> None:
+    path, mapping = own_csv(tmp_path, flights), tmp_path / "mapping.yaml"
+    proposed = run("import", path, "--write-mapping", mapping)
+    assert proposed.exit_code == 0, proposed.output
+    assert "body: flu" in mapping.read_text() and "world: enu" in mapping.read_text()
+    words = ("import", path, "--mapping", mapping, "--like", "thesis", "--mass-kg", "0.652", "-o", tmp_path / "set")
+    done = run(*words)
+    assert done.exit_code == 0, done.output
+    made, sound = read_set(tmp_path / "set").runs[0].table, read_set(flights).runs[0].table
+    for name in sound.columns.intersection(made.columns).drop("time_s"):
+        values = made[name] * np.sign(made["quaternion_w"] * sound["quaternion_w"]) if "quat" in name else made[name]
+        np.testing.assert_allclose(values, sound[name], atol=1e-4, rtol=1e-4, err_msg=name)
+    assert {"rotor_speed_4_rad_s", "velocity_z_m_s", "sunshine"} <= set(made.columns)
+    vehicle = read_vehicle(tmp_path / "set" / "vehicle.yaml")
+    # The flights were made with C_F = 1.3877e-6: hover finds it again.
+    assert vehicle.thrust_coefficient_n_s2 == pytest.approx(1.3877e-6, rel=0.01)
+
+
+def test_a_mapping_that_does_not_fit_is_told(tmp_path: Path, flights: Path) -> None:
+    path, mapping = own_csv(tmp_path, flights), tmp_path / "mapping.yaml"
+    run("import", path, "--write-mapping", mapping)
+    text = mapping.read_text()
+    for old, new, said in (
+        ("acc_x", "acx", "wants column 'acx', which is not there; did you mean acc_x?"),
+        ("specific_force:", "specific_fource:", "no such channel; did you mean specific_force?"),
+        ("unit: rpm", "unit: rps", "unit 'rps', expected one of rad/s, rpm, hz"),
+        ("body: flu", "body: lfu", "body"),
+    ):
+        mapping.write_text(text.replace(old, new, 1) if old != "acc_x" else text.replace("acc_x", "acx"))
+        done = run("import", path, "--mapping", mapping, "--like", "thesis", "-o", tmp_path / "set")
+        assert done.exit_code == 1 and said in done.output, done.output
+        assert not (tmp_path / "set").exists()
+
+
+def test_import_keeps_a_vehicle_that_is_there(tmp_path: Path, flights: Path) -> None:
+    source = tmp_path / "flight.csv"
+    read_set(flights).runs[0].table.to_csv(source, index=False)
+    out = tmp_path / "set"
+    assert run("init", out, "--like", "thesis", "--name", "mine").exit_code == 0
+    done = run("import", source, "-o", out)
+    assert done.exit_code == 0 and "stays as it is" in done.output
+    assert read_vehicle(out / "vehicle.yaml").name == "mine"
+    done = run("import", source, "-o", out, "--like", "x500", "--mass-kg", "2")
+    assert done.exit_code == 1 and "would change" in done.output
+    assert read_vehicle(out / "vehicle.yaml").name == "mine"
+
+
+def test_simulate_refuses_to_overwrite(tmp_path: Path, flights: Path) -> None:
+    done = run("simulate", flights / "vehicle.yaml", "-o", flights)
+    assert done.exit_code == 1 and "is there already" in done.output

@@ -1,0 +1,103 @@
+"""What `check` calls wrong: each mistake made in a sound flight is named; the sound flight raises nothing."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotorid import templates
+from rotorid.cli.simulating import fly
+from rotorid.recordings import RecordingSet, Run, read_set
+from rotorid.recordings import columns as c
+from rotorid.recordings.physics import doubts, near_names
+
+RPM = 60 / (2 * np.pi)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory) -> RecordingSet:
+    return read_set(fly(templates.read("neurobem"), tmp_path_factory.mktemp("sets") / "sound", 24.0, 1, 3))
+
+
+def changed(recordings: RecordingSet, change) -> RecordingSet:
+    runs = []
+    for run in recordings.runs:
+        table = run.table.copy()
+        change(table)
+        runs.append(Run(run.name, table))
+    return replace(recordings, runs=tuple(runs))
+
+
+def test_a_sound_flight_raises_no_doubt(flown) -> None:
+    assert doubts(flown) == ()
+
+
+def times(names, factor):
+    def change(table):
+        table[list(names)] = table[list(names)] * factor
+
+    return change
+
+
+def exchange(a: str, b: str):
+    def change(table):
+        table[[a, b]] = table[[b, a]].to_numpy()
+
+    return change
+
+
+SPEEDS = c.rotor_columns("rotor_speed", 4)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (times(c.SPECIFIC_FORCE[1:], -1), "forward-left-up"),
+        (times(c.SPECIFIC_FORCE, 1 / 9.81), "multiples of g"),
+        (times(SPEEDS, RPM), "revolutions per minute"),
+        (times(c.ANGULAR_VELOCITY, 180 / np.pi), "degrees per second"),
+        (times(c.ANGULAR_VELOCITY[1:2], -1), "angular_velocity_y_rad_s turns against the attitude"),
+        (exchange(*c.ANGULAR_VELOCITY[:2]), "axes are exchanged"),
+        (exchange(SPEEDS[0], SPEEDS[1]), "order of the rotors"),
+        (times(c.VELOCITY[1:2], -1), "velocity_y_m_s goes against the derivative of position_y_m"),
+        (times(c.QUATERNION[1:], -1), "turns against the attitude"),
+    ],
+)
+def test_each_mistake_is_named(flown, change, said) -> None:
+    found = doubts(changed(flown, change))
+    assert any(said in sentence for sentence in found), found
+
+
+def test_a_throttle_in_microseconds_and_a_rest_are_named(flown) -> None:
+    def pulses(table):
+        for i in range(1, 5):
+            table[f"throttle_{i}"] = 1000 + table[f"rotor_speed_{i}_rad_s"] / 2.5
+        table.loc[:500, list(SPEEDS)] = 0.0
+
+    found = " ".join(doubts(changed(flown, pulses)))
+    assert "it is in µs" in found
+    assert "all rotors are at rest in 8% of the samples" in found
+
+
+def test_few_and_rare_samples_are_named(flown) -> None:
+    def rare(table):
+        table.loc[table.index % 100 != 0, list(SPEEDS)] = np.nan
+
+    thin = changed(flown, rare)
+    cut = replace(thin, runs=tuple(Run(r.name, r.table.iloc[:3000]) for r in thin.runs))
+    found = " ".join(doubts(cut))
+    assert "Only 12 s are recorded" in found
+    assert "rotor speeds come at 2.5" in found
+
+
+def test_a_nearly_right_name_is_named(flown) -> None:
+    misspelt = changed(flown, lambda t: t.insert(1, "velocity_x_ms", t.pop("velocity_x_m_s")))
+    assert near_names(misspelt) == ("Column velocity_x_ms is not known; did you mean velocity_x_m_s?",)
+
+
+def test_the_text_shows_doubts(flown, tmp_path: Path) -> None:
+    from rotorid.recordings.check import as_text, check_set
+
+    text = as_text(check_set(changed(flown, times(c.SPECIFIC_FORCE, 1 / 9.81))))
+    assert "Looks wrong:" in text and "multiples of g" in text
