@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -55,6 +56,12 @@ def ports() -> None:
 def bench(
     port: Port,
     test: Annotated[str, typer.Option(help="stream, calibrate, static or dynamic")] = "stream",
+    wait_s: Annotated[float, typer.Option(help="longest wait for the load, and for a steady reading, s")] = (
+        procedures.WAIT_S
+    ),
+    tolerance: Annotated[
+        float | None, typer.Option(help="steady: no channel moves by more, V (jr3: N); default 2e-7 (0.5)")
+    ] = None,
     samples: Annotated[int | None, typer.Option(help="how many; default: 400, 50, 1500, or until Ctrl-C")] = None,
     rate: Annotated[float | None, typer.Option(help="samples a second, for stream")] = None,
     cell: Annotated[int | None, typer.Option(help="cell that is calibrated, 1–6")] = None,
@@ -71,6 +78,8 @@ def bench(
 ) -> None:
     """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
     instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
+    if tolerance is not None:
+        rule = replace(rule, tolerance=tolerance)
     kind = {"calibrate": "calibration", "stream": "free"}.get(test, test)
     setup = Setup(kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=operator)
 
@@ -79,9 +88,9 @@ def bench(
         if test == "calibrate":
             procedures.calibrate_cell(recorder, prompt, samples or 400)
         elif test == "static":
-            procedures.static_test(recorder, prompt, samples or 50, rule)
+            procedures.static_test(recorder, prompt, samples or 50, rule, wait_s)
         elif test == "dynamic":
-            procedures.dynamic_test(recorder, prompt, samples or 1500, rule)
+            procedures.dynamic_test(recorder, prompt, samples or 1500, rule, wait_s)
         elif test == "stream":
             procedures.stream(recorder, samples, 1 / rate if rate else 0.0)
         else:
@@ -309,7 +318,7 @@ def tensile(
     _record(
         {"tensile": port},
         {"tensile": setup},
-        lambda recorder: procedures.stream(recorder, None),
+        lambda recorder: procedures.stream(recorder, None, moves=True),
         {"name": "stream"},
         out,
         name,
@@ -339,8 +348,12 @@ def check(
     typer.echo(f", {table.time_s.iloc[-1]:.2f} s of device time" if len(table) else "")
     typer.echo(f"missing {parsed.missing} in {len(parsed.gaps)} gaps, repeated {parsed.repeated}, damaged ", nl=False)
     typer.echo(f"{parsed.checksum_errors + parsed.broken_frames}, resets {parsed.resets}")
+    if parsed.malformed or parsed.unknown_kinds:
+        typer.echo(f"frames that make no sense {parsed.malformed}, of an unknown kind {parsed.unknown_kinds}")
     if parsed.cut_at is not None:
         typer.echo(f"cut off at byte {parsed.cut_at}; everything before that is there")
+    for fault in parsed.faults:
+        typer.echo(f"NOT AS RECORDED: {fault}")
     if repaired:
         typer.echo("its metadata were never finished; completed now from the log")
     if parsed.session is not None:
@@ -348,6 +361,8 @@ def check(
     if csv is not None:
         table.to_csv(csv, index=False)
         typer.echo(f"table: {csv}")
+    if parsed.faults:
+        raise typer.Exit(1)
 
 
 @app.command()
@@ -420,22 +435,27 @@ def _record(
     stem = name or f"{'-'.join(ports)}-{datetime.now():%Y%m%d-%H%M%S}"
     weather = _air(air)
     recorders = []
-    for instrument, port in ports.items():
-        known = INSTRUMENTS[instrument]
-        recorders.append(
-            Recorder(
-                known,
-                SerialTransport(port, known.baud_rate),
-                SystemClock(),
-                out,
-                stem if len(ports) == 1 else f"{stem}-{instrument}",
-                setups[instrument].model_copy(update={"air": weather}),
-                group=stem,
-                procedure=procedure,
-                say=lambda text: console.print(text, style="bold"),
-                stop_asked=stop,
+    try:
+        for instrument, port in ports.items():
+            known = INSTRUMENTS[instrument]
+            recorders.append(
+                Recorder(
+                    known,
+                    SerialTransport(port, known.baud_rate),
+                    SystemClock(),
+                    out,
+                    stem if len(ports) == 1 else f"{stem}-{instrument}",
+                    setups[instrument].model_copy(update={"air": weather}),
+                    group=stem,
+                    procedure=procedure,
+                    say=lambda text: console.print(text, style="bold"),
+                    stop_asked=stop,
+                )
             )
-        )
+        for recorder in recorders:  # all of them before the first one leaves a log
+            recorder.check_name()
+    except AcquireError as error:
+        _fail(str(error))
     plots = [view.Plot(r, plot) for r in recorders if plot in r.instrument.columns]
     if plot is not None and not plots:
         columns = ", ".join(column for r in recorders for column in r.instrument.columns)
@@ -454,10 +474,8 @@ def _record(
     except AcquireError as error:
         console.print(str(error), style="bold red")
         code = 1
-    except FileExistsError as error:
-        _fail(f"{error.filename}: exists already; a recording is never overwritten. Choose another --id.")
     for recorder in recorders:
-        if recorder.log_path.exists():
+        if recorder.begun:
             counts = recorder.session.counts
             typer.echo(f"{recorder.log_path}: {counts.samples} samples, {counts.missing} missing")
             for warning in recorder.session.warnings:
@@ -476,7 +494,11 @@ def _prompt(recorder: Recorder, place_s: float | None) -> procedures.Prompt:
 
         def pressed() -> bool:
             ready, _, _ = select.select([sys.stdin], [], [], 0)
-            return bool(ready) and sys.stdin.readline() != ""
+            if ready and not sys.stdin.readline():
+                recorder.note(
+                    "input_over", "standard input is at its end: nobody can press Enter, so this is taken as done"
+                )
+            return bool(ready)
 
         return pressed
 

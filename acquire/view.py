@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -98,11 +99,16 @@ def watch(
     """
 
     def interrupt(number, frame) -> None:
-        if stop.is_set():
+        if number == signal.SIGHUP:
+            _leave_the_terminal()
+        elif stop.is_set():
             raise KeyboardInterrupt
         stop.set()
 
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    ends = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # under nohup a recording outlives its terminal
+        ends.append(signal.SIGHUP)
+    before = {number: signal.signal(number, interrupt) for number in ends}
     try:
         if not console.is_terminal:
             run()
@@ -122,15 +128,29 @@ def watch(
             forces = [text for recorder in recorders if (text := bench_forces(recorder)) is not None]
             return Group(*map(panel, recorders), *forces, *(plot.render() for plot in plots))
 
-        with Live(picture(), console=console, auto_refresh=False) as live:
-            while thread.is_alive():
-                thread.join(1 / REFRESH_HZ)
-                live.update(picture(), refresh=True)
+        try:
+            with Live(picture(), console=console, auto_refresh=False) as live:
+                while thread.is_alive():
+                    thread.join(1 / REFRESH_HZ)
+                    live.update(picture(), refresh=True)
+        except BaseException:  # nobody looks any more: the device must not go on for that
+            stop.set()
+            thread.join()
+            raise
         if failure:
             raise failure[0]
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _leave_the_terminal() -> None:
+    """The terminal is gone: what is still to be said must not fail for that."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        if os.isatty(descriptor):
+            os.dup2(nowhere, descriptor)
+    os.close(nowhere)
 
 
 def stderr_console() -> Console:

@@ -17,6 +17,7 @@ import pytest
 from acquire import procedures
 from acquire.emulators.faults import Faults
 from acquire.errors import (
+    BadName,
     DeviceReset,
     DeviceSilent,
     DiskFull,
@@ -298,7 +299,7 @@ def test_disk_full(plugged, recorder_on):
 def test_a_recording_is_never_overwritten(plugged, recorder_on):
     port = plugged("bench").names[0]
     first = record(recorder_on("bench", port))
-    with pytest.raises(FileExistsError):
+    with pytest.raises(BadName, match="exists already"):
         record(recorder_on("bench", port))
     assert len(read_log(first.path).table) == len(first.table)
 
