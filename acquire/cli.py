@@ -6,38 +6,32 @@ import select
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import replace
 from datetime import datetime
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from acquire import procedures, view
-from acquire.clock import SystemClock
 from acquire.errors import AcquireError, Interrupted
+from acquire.options import Shared, with_shared
 from acquire.programmes import HOLD_S, RAMP_S, programme_of
+from acquire.record import recorders_for, run_with
 from acquire.recorder import Recorder
-from acquire.transport import SerialTransport
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.session import Air, SessionError, Setup
+from rotorid.io.session import SessionError, Setup
 from rotorid.io.wire import INSTRUMENTS, quadrotor
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 
 Port = Annotated[str, typer.Option("--port", "-p", help="serial port; `rotorid-acquire ports` lists them")]
-Out = Annotated[Path, typer.Option(help="folder for the log and its metadata")]
-Name = Annotated[str | None, typer.Option("--id", help="name of the recording; default: instrument and time")]
-Plotted = Annotated[str | None, typer.Option("--plot", help="also draw this column, e.g. cell_1_v")]
-Operator = Annotated[str | None, typer.Option(help="who records")]
-AirText = Annotated[str | None, typer.Option("--air", help="temperature °C, pressure Pa, humidity: 23,95400,0.5")]
 Propeller = Annotated[str | None, typer.Option(help="propeller, e.g. '5040 three-blade'")]
 BatteryName = Annotated[str | None, typer.Option("--battery", help="battery, e.g. '4S 1500 mAh no. 1'")]
 PlaceS = Annotated[
     float | None, typer.Option("--place-s", help="give a load so many seconds instead of waiting for Enter")
 ]
-DEFAULT_OUT = Path("raw/local")
 
 
 @app.command()
@@ -53,6 +47,7 @@ def ports() -> None:
 
 
 @app.command()
+@with_shared
 def bench(
     port: Port,
     test: Annotated[str, typer.Option(help="stream, calibrate, static or dynamic")] = "stream",
@@ -70,18 +65,17 @@ def bench(
     load_gf: Annotated[float | None, typer.Option(help="the weight, gf")] = None,
     repeat: Annotated[int | None, typer.Option(help="number of the repeat")] = None,
     place_s: PlaceS = None,
-    out: Out = DEFAULT_OUT,
-    name: Name = None,
-    operator: Operator = None,
-    air: AirText = None,
-    plot: Plotted = None,
+    *,
+    shared: Shared,
 ) -> None:
     """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
     instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
     if tolerance is not None:
         rule = replace(rule, tolerance=tolerance)
     kind = {"calibrate": "calibration", "stream": "free"}.get(test, test)
-    setup = Setup(kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=operator)
+    setup = Setup(
+        kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=shared.operator
+    )
 
     def run(recorder: Recorder) -> None:
         prompt = _prompt(recorder, place_s)
@@ -96,10 +90,11 @@ def bench(
         else:
             raise typer.BadParameter(f"--test is stream, calibrate, static or dynamic, not {test!r}")
 
-    _record({instrument: port}, {instrument: setup}, run, {"name": test}, out, name, air, plot)
+    _record({instrument: port}, {instrument: setup}, run, {"name": test}, shared)
 
 
 @app.command()
+@with_shared
 def rotor(
     port: Port,
     throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
@@ -107,28 +102,25 @@ def rotor(
     hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 4.0,
     propeller: Propeller = None,
     battery: BatteryName = None,
-    out: Out = DEFAULT_OUT,
-    name: Name = None,
-    operator: Operator = None,
-    air: AirText = None,
-    plot: Plotted = None,
+    *,
+    shared: Shared,
 ) -> None:
     """Record the thrust tester: rest, throttle, rest. Keep clear of the propeller."""
-    setup = Setup(kind="thrust", throttle=throttle, propeller=propeller, battery=battery, operator=operator, motor=1)
+    setup = Setup(
+        kind="thrust", throttle=throttle, propeller=propeller, battery=battery, operator=shared.operator, motor=1
+    )
     procedure = {"name": "thrust_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s}
     _record(
         {"rotor": port},
         {"rotor": setup},
         lambda recorder: procedures.thrust_test(recorder, throttle, rest_s, hold_s),
         procedure,
-        out,
-        name,
-        air,
-        plot,
+        shared,
     )
 
 
 @app.command()
+@with_shared
 def wrench(
     port: Port,
     interval: Annotated[float, typer.Option(help="sampling interval, s")] = 0.01,
@@ -137,11 +129,8 @@ def wrench(
     offset: Annotated[bool, typer.Option(help="take the present reading as zero first")] = False,
     samples: Annotated[int | None, typer.Option(help="stop after so many; default: Ctrl-C stops")] = None,
     only: Annotated[str | None, typer.Option(help="just this: power-on, power-off or offset")] = None,
-    out: Out = DEFAULT_OUT,
-    name: Name = None,
-    operator: Operator = None,
-    air: AirText = None,
-    plot: Plotted = None,
+    *,
+    shared: Shared,
 ) -> None:
     """Record the six-axis sensor: power, initialise, offset, start, stop, save."""
     operations = {"power-on": ("P", b"\1"), "power-off": ("P", b"\0"), "offset": ("O", b"")}
@@ -161,11 +150,12 @@ def wrench(
         "measuring_times": measuring_times,
         "offset": offset,
     }
-    setup = Setup(operator=operator, tared=offset)
-    _record({"wrench": port}, {"wrench": setup}, run, procedure, out, name, air, plot)
+    setup = Setup(operator=shared.operator, tared=offset)
+    _record({"wrench": port}, {"wrench": setup}, run, procedure, shared)
 
 
 @app.command("quadrotor")
+@with_shared
 def quadrotor_command(
     port: Port,
     dynamics: Annotated[str, typer.Option(help=f"command character: {quadrotor.DYNAMICS}")] = "h",
@@ -176,11 +166,8 @@ def quadrotor_command(
     frequency: Annotated[float, typer.Option(help="of the sine, Hz")] = 0.25,
     propeller: Propeller = None,
     battery: BatteryName = None,
-    out: Out = DEFAULT_OUT,
-    name: Name = None,
-    operator: Operator = None,
-    air: AirText = None,
-    plot: Plotted = None,
+    *,
+    shared: Shared,
 ) -> None:
     """Send the quadrotor a programme and record what its motors are told."""
     if dynamics not in quadrotor.DYNAMICS:
@@ -194,32 +181,27 @@ def quadrotor_command(
         programme.pack()
     except ValueError as error:
         raise typer.BadParameter(f"--maxima are four fractions such as 0.1,0.1,0.1,0.1 ({error})") from error
-    setup = Setup(kind="free", propeller=propeller, battery=battery, operator=operator)
+    setup = Setup(kind="free", propeller=propeller, battery=battery, operator=shared.operator)
     procedure = {"name": "fly_programme", "letter": dynamics, **programme._asdict(), "maxima": list(four)}
     _record(
         {"quadrotor": port},
         {"quadrotor": setup},
         lambda recorder: procedures.fly_programme(recorder, dynamics, programme),
         procedure,
-        out,
-        name,
-        air,
-        plot,
+        shared,
     )
 
 
 @app.command()
+@with_shared
 def experiment(
     number: Annotated[int, typer.Argument(min=1, max=48, help="number in the thesis's table A.1")],
     quadrotor_port: Annotated[str, typer.Option(help="serial port of the ESP32")],
     wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor")],
     propeller: Propeller = None,
     battery: BatteryName = None,
-    out: Out = DEFAULT_OUT,
-    name: Name = None,
-    operator: Operator = None,
-    air: AirText = None,
-    plot: Plotted = None,
+    *,
+    shared: Shared,
 ) -> None:
     """Record experiment N of table A.1: quadrotor and wrench together, each with its own clock."""
     row = EXPERIMENTS[number]
@@ -238,21 +220,19 @@ def experiment(
         tared=False,
         propeller=propeller,
         battery=battery,
-        operator=operator,
+        operator=shared.operator,
     )
     _record(
         {"quadrotor": quadrotor_port, "wrench": wrench_port},
         {"quadrotor": setup, "wrench": setup},
         lambda vehicle, sensor: procedures.experiment(vehicle, sensor, letter, programme),
         {"name": "experiment", "number": number, "letter": letter, "duration_s": programme.duration_s},
-        out,
-        name or f"exp-{number:02d}-{datetime.now():%Y%m%d-%H%M%S}",
-        air,
-        plot,
+        replace(shared, name=shared.name or f"exp-{number:02d}-{datetime.now():%Y%m%d-%H%M%S}"),
     )
 
 
 @app.command()
+@with_shared
 def torque(
     throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
     rotor_port: Annotated[str, typer.Option(help="serial port of the thrust tester, which drives motor 1")],
@@ -261,11 +241,8 @@ def torque(
     hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 6.0,
     propeller: Propeller = None,
     battery: BatteryName = None,
-    out: Out = DEFAULT_OUT,
-    name: Name = None,
-    operator: Operator = None,
-    air: AirText = None,
-    plot: Plotted = None,
+    *,
+    shared: Shared,
 ) -> None:
     """Record the torque of motor 1 by thrust tester and six-axis sensor. Keep clear of the propeller."""
     setup = Setup(
@@ -278,32 +255,27 @@ def torque(
         tared=False,
         propeller=propeller,
         battery=battery,
-        operator=operator,
+        operator=shared.operator,
     )
     _record(
         {"rotor": rotor_port, "wrench": wrench_port},
         {"rotor": setup, "wrench": setup},
         lambda tester, sensor: procedures.torque_test(tester, sensor, throttle, rest_s, hold_s),
         {"name": "torque_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s},
-        out,
-        name,
-        air,
-        plot,
+        shared,
     )
 
 
 @app.command()
+@with_shared
 def tensile(
     port: Port,
     infill_percent: Annotated[int, typer.Option(help="infill density of the specimen")],
     repeat: Annotated[int, typer.Option(help="number of the specimen")] = 1,
     gauge_length_mm: Annotated[float, typer.Option(help="distance between the grips")] = 40.0,
     cross_section_mm2: Annotated[float, typer.Option(help="narrowest cross-section")] = 19.2,
-    out: Out = DEFAULT_OUT,
-    name: Name = None,
-    operator: Operator = None,
-    air: AirText = None,
-    plot: Plotted = None,
+    *,
+    shared: Shared,
 ) -> None:
     """Record the tensile tester until the specimen is broken."""
     setup = Setup(
@@ -313,17 +285,14 @@ def tensile(
         specimen=f"{infill_percent}-{repeat}",
         gauge_length_mm=gauge_length_mm,
         cross_section_mm2=cross_section_mm2,
-        operator=operator,
+        operator=shared.operator,
     )
     _record(
         {"tensile": port},
         {"tensile": setup},
         lambda recorder: procedures.stream(recorder, None, moves=True),
         {"name": "stream"},
-        out,
-        name,
-        air,
-        plot,
+        shared,
     )
 
 
@@ -416,6 +385,72 @@ def emulate(
             pass
 
 
+@app.command()
+def campaign(
+    plan: Annotated[Path, typer.Argument(help="a plan file (docs/acquisition.md)")],
+    show: Annotated[bool, typer.Option("--show", help="only say what is done and what is left")] = False,
+    repeat: Annotated[str | None, typer.Option(help="record this one once more, by its name")] = None,
+    emulate_it: Annotated[bool, typer.Option("--emulate", help="with emulators in the place of the ports")] = False,
+    speed: Annotated[float, typer.Option(help="of the emulators, device seconds per second")] = 20.0,
+    place_s: Annotated[float | None, typer.Option(help="give a load so many seconds; nobody is asked")] = None,
+) -> None:
+    """Record a campaign by its plan: checks first, then step after step; goes on where it was left."""
+    from functools import partial
+    from tempfile import TemporaryDirectory
+
+    from acquire import run_plan
+    from acquire.plan import PlanError, is_done, read_plan, steps_of
+
+    console = view.stderr_console()
+    stop = threading.Event()
+    try:
+        planned = read_plan(plan)
+        steps = steps_of(planned)
+    except PlanError as error:
+        _fail(str(error))
+    if show:
+        for step in steps:
+            typer.echo(f"{'done' if is_done(planned, step) else 'left'}\t{step.number}\t{step.name}\t{step.ask}")
+        return
+    if repeat is not None and repeat not in [step.name for step in steps]:
+        near = get_close_matches(repeat, [step.name for step in steps], 1)
+        _fail(f"{plan}: no step is called {repeat!r}" + (f"; did you mean {near[0]}?" if near else ""))
+    wait_s = place_s if place_s is not None else (4.0 if emulate_it else None)
+
+    def ask(text: str) -> str:
+        if wait_s is not None:
+            console.print(text, style="bold")
+            return ""
+        console.print(f"{text}  [Enter: go on, s: skip, q: stop here]", style="bold")
+        return sys.stdin.readline().strip().lower()
+
+    def watch(recorders: list[Recorder], work: Callable[[], None]) -> None:
+        for recorder in recorders:
+            recorder.stop_asked = stop
+        view.watch(recorders, work, stop, [], console)
+
+    desk = run_plan.Desk(
+        say=lambda text: console.print(text),
+        ask=ask,
+        prompts=lambda step: lambda recorder: _prompt(recorder, wait_s),
+        watch=watch,
+    )
+    try:
+        with TemporaryDirectory(prefix="rotorid-") as folder:
+            ports_of = partial(run_plan.real_ports, planned)
+            if emulate_it:
+                ports_of = partial(
+                    run_plan.emulated_ports, planned, folder=Path(folder), speed=speed, place_s=wait_s * 0.6
+                )
+            left = run_plan.run(planned, ports_of, desk, repeat)
+    except Interrupted as error:
+        console.print(str(error))
+        raise typer.Exit(130) from error
+    except (AcquireError, PlanError, SessionError, OSError) as error:
+        _fail(f"{error}\nNothing that is recorded is lost; the same command goes on from here.")
+    typer.echo(f"{planned.out}: {len(steps) - left} of {len(steps)} recordings are there; {planned.out}/sessions.tsv")
+
+
 # ---- shared ----------------------------------------------------------------------------------------------
 
 
@@ -424,50 +459,38 @@ def _record(
     setups: dict[str, Setup],
     run: Callable[..., None],
     procedure: dict,
-    out: Path,
-    name: str | None,
-    air: str | None,
-    plot: str | None,
+    shared: Shared,
 ) -> None:
     """Open one recorder per instrument, run, show, and leave with a code: 0, 1 or (interrupted) 130."""
     console = view.stderr_console()
     stop = threading.Event()
-    stem = name or f"{'-'.join(ports)}-{datetime.now():%Y%m%d-%H%M%S}"
-    weather = _air(air)
-    recorders = []
+    columns = [column for instrument in ports for column in INSTRUMENTS[instrument].columns]
+    wrong = [column for column in shared.plot or [] if column not in columns]
+    if wrong:
+        raise typer.BadParameter(f"--plot is one of {', '.join(columns)}, not {wrong[0]!r}")
     try:
-        for instrument, port in ports.items():
-            known = INSTRUMENTS[instrument]
-            recorders.append(
-                Recorder(
-                    known,
-                    SerialTransport(port, known.baud_rate),
-                    SystemClock(),
-                    out,
-                    stem if len(ports) == 1 else f"{stem}-{instrument}",
-                    setups[instrument].model_copy(update={"air": weather}),
-                    group=stem,
-                    procedure=procedure,
-                    say=lambda text: console.print(text, style="bold"),
-                    stop_asked=stop,
-                )
-            )
-        for recorder in recorders:  # all of them before the first one leaves a log
-            recorder.check_name()
+        recorders = recorders_for(
+            ports,
+            shared.out,
+            shared.name,
+            {name: setup.model_copy(update={"air": shared.weather}) for name, setup in setups.items()},
+            procedure=procedure,
+            limits=shared.limits(columns),
+            say=lambda text: console.print(text, style="bold"),
+            stop_asked=stop,
+            source=shared.source,
+        )
     except AcquireError as error:
         _fail(str(error))
-    plots = [view.Plot(r, plot) for r in recorders if plot in r.instrument.columns]
-    if plot is not None and not plots:
-        columns = ", ".join(column for r in recorders for column in r.instrument.columns)
-        raise typer.BadParameter(f"--plot is one of {columns}, not {plot!r}")
-
-    def work() -> None:
-        with ExitStack() as stack:
-            run(*(stack.enter_context(recorder) for recorder in recorders))
-
+    plots = [
+        view.Plot(recorder, column)
+        for recorder in recorders
+        for column in shared.plot or []
+        if column in recorder.instrument.columns
+    ]
     code = 0
     try:
-        view.watch(recorders, work, stop, plots, console)
+        view.watch(recorders, lambda: run_with(recorders, run), stop, plots, console)
     except Interrupted as error:
         console.print(str(error))
         code = 130
@@ -503,18 +526,6 @@ def _prompt(recorder: Recorder, place_s: float | None) -> procedures.Prompt:
         return pressed
 
     return prompt
-
-
-def _air(text: str | None) -> Air | None:
-    if text is None:
-        return None
-    try:
-        temperature, pressure, humidity = (float(part) for part in text.split(","))
-        return Air(temperature_c=temperature, pressure_pa=pressure, relative_humidity=humidity)
-    except ValueError as error:
-        raise typer.BadParameter(
-            "--air is temperature in °C, pressure in Pa and humidity from 0 to 1, such as 23,95400,0.5"
-        ) from error
 
 
 def _fail(text: str) -> None:

@@ -57,6 +57,12 @@ class GaveUp(AcquireError):
     ended = Ended.GAVE_UP
 
 
+class LimitExceeded(AcquireError):
+    """A reading went beyond what was allowed."""
+
+    ended = Ended.LIMIT_EXCEEDED
+
+
 class BadName(AcquireError):
     """A recording cannot be called that, or one is called that already."""
 

@@ -13,7 +13,7 @@ import os
 import re
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import file_digest
 from pathlib import Path
@@ -29,6 +29,7 @@ from acquire.errors import (
     DeviceSilent,
     DiskFull,
     Interrupted,
+    LimitExceeded,
     PortBusy,
     PortLost,
     PortMissing,
@@ -109,6 +110,7 @@ class Recorder:
         stop_asked: threading.Event | None = None,
         durable: bool = True,
         source: str | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         if not NAME.fullmatch(recording_id):
             raise BadName(
@@ -133,6 +135,12 @@ class Recorder:
         self._say = say
         self._durable = durable
         self._source = source
+        self._limits = [
+            (instrument.columns.index(column), low, high)
+            for column, (low, high) in (limits or {}).items()
+            if column in instrument.columns
+        ]
+        self._exceeded = ""
         self._intake = Intake(instrument)
         self._tracker = self._intake.tracker
         self._decoder = self._intake.decoder
@@ -273,8 +281,10 @@ class Recorder:
         From here on the device hears from us at least four times in that time. Raises Refused where the firmware
         has no watchdog.
         """
-        if self._watched or self._timings.watchdog_s is None:
+        if self._timings.watchdog_s is None:
             return
+        if self._watched and self._clock.now_ns() - self._last_sent_ns < self._timings.watchdog_s / 2 * 1e9:
+            return  # it was switched on just now
         try:
             self.command(KEEP, pack_keep(self._timings.watchdog_s))
         except Refused as error:
@@ -427,6 +437,8 @@ class Recorder:
             self._last_sample_ns = now_ns
         if self._closing:
             return
+        if self._exceeded:
+            raise LimitExceeded(self._exceeded)
         if not self._samples and self._intake.malformed_samples >= UNREADABLE_AT_MOST:
             raise Refused(
                 f"the {self.instrument.title} sends what this version cannot read ({self._intake.fault}): "
@@ -464,6 +476,7 @@ class Recorder:
             self._last_values = values
             self._rows.append(row)
             self._time(row, now_ns)
+            self._check_limits(values)
             if self.on_row is not None:
                 self.on_row(row)
         elif kind == ANSWER:
@@ -476,6 +489,12 @@ class Recorder:
             self._skipped += content.skipped
             self._streaming = self._watched = False
             self.over = True
+
+    def _check_limits(self, values: tuple[float, ...]) -> None:
+        for number, low, high in self._limits:
+            if not low <= values[number] <= high and not self._exceeded:
+                column = self.instrument.columns[number]
+                self._exceeded = f"{column} is {values[number]:.5g}, allowed are {low:g} to {high:g}: stopped"
 
     def _time(self, row: Row, now_ns: int) -> None:
         """Keep the first and the latest sample of the present segment, for rate and clock ratio."""

@@ -29,6 +29,7 @@ class Ended(StrEnum):
     DISK_FULL = "disk_full"
     DEVICE_FAULT = "device_fault"
     GAVE_UP = "gave_up"
+    LIMIT_EXCEEDED = "limit_exceeded"
     FAILED = "failed"
 
 
