@@ -35,15 +35,32 @@ PlaceS = Annotated[
 
 
 @app.command()
-def ports() -> None:
-    """List the serial ports of this computer."""
+def ports(
+    identify: Annotated[bool, typer.Option("--identify", help="ask each port who is there")] = False,
+    also: Annotated[list[str] | None, typer.Option("--port", help="ask this one as well, e.g. an emulator's")] = None,
+    udev: Annotated[str | None, typer.Option("--udev", help="print a udev rule that names the only board so")] = None,
+) -> None:
+    """List the serial ports of this computer by names that stay the same, and who is on them."""
     from serial.tools import list_ports
 
+    from acquire.identify import stable_name, udev_rule, who_is_there
+
     found = sorted(list_ports.comports())
-    if not found:
+    if udev is not None:
+        boards = [port for port in found if port.vid is not None]
+        if len(boards) != 1:
+            _fail(f"--udev is for one board at a time; plugged in by USB are {len(boards)}")
+        (board,) = boards
+        typer.echo(udev_rule(f"{board.vid:04x}", f"{board.pid:04x}", board.serial_number, udev))
+        return
+    if not found and not also:
         typer.echo("no serial port found. Plug the instrument in; for an emulator: rotorid-acquire emulate --help")
     for port in found:
-        typer.echo(f"{port.device}\t{port.description}\t{port.hwid}")
+        typer.echo(f"{stable_name(port.device)}\t{port.description}\t{port.hwid}")
+        if identify:
+            typer.echo(f"  {who_is_there(port.device)}")
+    for name in also or []:
+        typer.echo(f"{name}\n  {who_is_there(name)}")
 
 
 @app.command()

@@ -555,7 +555,7 @@ class Recorder:
         if self.identity.instrument != self.instrument.name:
             raise Refused(
                 f"{self._transport.name} is a {self.identity.instrument!r} ({self.identity.firmware}), "
-                f"not a {self.instrument.name!r}; see `rotorid-acquire ports`"
+                f"not a {self.instrument.name!r}; see `rotorid-acquire ports --identify`"
             )
         self._restarted = False
         self.session.firmware = self.identity.firmware

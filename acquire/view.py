@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from acquire.geometry import body_forces, cell_forces
-from acquire.recorder import Recorder
+from acquire.recorder import Recorder, Status
 
 REFRESH_HZ = 5
 PLOT_SAMPLES = 600
@@ -48,10 +48,19 @@ class Plot:
         self.column = column
         self._number = recorder.instrument.columns.index(column)
         self._values: deque[float] = deque(maxlen=PLOT_SAMPLES)
-        recorder.on_row = lambda row: self._values.append(row.values[self._number])
+        before = recorder.on_row  # several curves of one recorder: each sees every sample
+
+        def see(row) -> None:
+            if before is not None:
+                before(row)
+            self._values.append(row.values[self._number])
+
+        recorder.on_row = see
 
     def render(self) -> Text:
-        return Text(f"{self.column}\n" + "\n".join(braille(list(self._values))))
+        values = list(self._values)
+        noise = f"   noise of the last {len(values)}: {np.std(values):.3g}" if len(values) > 1 else ""
+        return Text(f"{self.column}{noise}\n" + "\n".join(braille(values)))
 
 
 def panel(recorder: Recorder) -> Table:
@@ -65,13 +74,17 @@ def panel(recorder: Recorder) -> Table:
     table.add_row(
         f"{status.samples}" + (f"/{status.wanted}" if status.wanted else ""),
         f"{status.rate_hz:.1f}" if status.rate_hz else "–",
-        str(status.missing),
+        str(status.missing) + (f" ({_share(status):.2%})" if status.missing else ""),
         str(status.bad_frames),
         f"{status.elapsed_s:.1f}",
         f"{status.remaining_s:.0f}" if status.remaining_s is not None else "–",
         *(f"{value:.5g}" for value in status.values or [float("nan")] * len(recorder.instrument.columns)),
     )
     return table
+
+
+def _share(status: Status) -> float:
+    return status.missing / max(status.samples + status.missing, 1)
 
 
 def bench_forces(recorder: Recorder) -> Text | None:

@@ -91,7 +91,7 @@ def test_steps_one_by_one_one_skipped_one_again_and_the_index(tmp_path, emulated
     name = steps_of(plan)[0].name
     assert run(plan, emulated(plan), desk(told), repeat=name, checked=True) == 0
     assert attempts(plan, steps_of(plan)[0]) == [name, f"{name}.2"]
-    assert len(read_index(plan.out)) == 4 + 2  # and the checks of bench and rotor
+    assert len(read_index(plan.out)) == 4 + 1  # and the check before the first
     assert any("put 100.0 gf on" in text for text in told) and "2 left" in " ".join(told)
 
 
