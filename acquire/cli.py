@@ -325,6 +325,8 @@ def check(
     from rotorid.io.rawlog import NotALog
 
     try:
+        if _check_lines(log, csv):
+            return
         parsed = read_log(log)
         repaired = repair(log, parsed)
     except (LogError, NotALog, SessionError, OSError) as error:
@@ -400,6 +402,47 @@ def emulate(
             emulated.wait()
         except KeyboardInterrupt:
             pass
+
+
+@app.command()
+@with_shared
+def lines(
+    description: Annotated[Path, typer.Argument(help="a file that says how its lines are read (docs/acquisition.md)")],
+    port: Port,
+    samples: Annotated[int | None, typer.Option(help="stop after so many lines; default: Ctrl-C stops")] = None,
+    silence_s: Annotated[float, typer.Option(help="give up after so long without a byte, s")] = 60.0,
+    *,
+    shared: Shared,
+) -> None:
+    """Record an instrument that sends plain lines of text (CSV, key=value, fixed places) and knows no frames."""
+    from acquire.clock import SystemClock
+    from acquire.lines import record_lines
+    from acquire.transport import SerialTransport
+    from rotorid.io.lines import DescriptionError, read_description
+
+    console = view.stderr_console()
+    stop = threading.Event()
+    try:
+        read = read_description(description)
+        name = shared.name or f"{read.name}-{datetime.now():%Y%m%d-%H%M%S}"
+        setup = Setup(operator=shared.operator, air=shared.weather)
+        transport = SerialTransport(port, read.baud_rate)
+
+        def work() -> None:
+            record_lines(
+                *(read, transport, SystemClock(), shared.out, name, setup),
+                samples=samples,
+                stop_asked=stop,
+                silence_s=silence_s,
+            )
+
+        view.watch([], work, stop, [], console)
+    except Interrupted as error:
+        console.print(str(error))
+        raise typer.Exit(130) from error
+    except (DescriptionError, AcquireError) as error:
+        _fail(str(error))
+    typer.echo(f"{shared.out / name}.rlog: recorded; `rotorid-acquire check` reads it")
 
 
 @app.command()
@@ -543,6 +586,22 @@ def _prompt(recorder: Recorder, place_s: float | None) -> procedures.Prompt:
         return pressed
 
     return prompt
+
+
+def _check_lines(log: Path, csv: Path | None) -> bool:
+    """Say what is in a log of plain lines; False where it is one of frames."""
+    from rotorid.io.lines import read_line_log
+    from rotorid.io.session import read_session, session_path
+
+    if not session_path(log).exists() or "description" not in read_session(session_path(log)).procedure:
+        return False
+    found = read_line_log(log)
+    typer.echo(f"{log}: {len(found.table)} lines read, {found.unreadable} could not be", nl=False)
+    typer.echo(f", {found.damaged_bytes} bytes damaged" if found.damaged_bytes else "")
+    if csv is not None:
+        found.table.to_csv(csv, index=False)
+        typer.echo(f"table: {csv}")
+    return True
 
 
 def _fail(text: str) -> None:
