@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -162,8 +163,17 @@ def test_ports_say_who_is_there(plugged):
 
 def test_a_port_with_another_device_says_what_was_heard(tmp_path):
     master, slave = os.openpty()
-    os.write(master, b"T=23.5C\r\n")
-    assert "T=23.5C" in who_is_there(os.ttyname(slave), wait_s=0.2)
+    over = threading.Event()
+
+    def speak() -> None:
+        while not over.wait(0.02):
+            os.write(master, b"T=23.5C\r\n")
+
+    thread = threading.Thread(target=speak)
+    thread.start()
+    assert "T=23.5C" in who_is_there(os.ttyname(slave), wait_s=0.3)
+    over.set()
+    thread.join()
     os.close(master)
     os.close(slave)
 

@@ -31,6 +31,11 @@ needs_avr = pytest.mark.skipif(not (shutil.which("avr-gcc") and SIMAVR.exists())
 pytestmark = pytest.mark.xdist_group("firmware")  # one build at a time
 
 
+def slow(value):
+    """One of the cases that `.ci/run` looks at and `make test` does not."""
+    return pytest.param(value, marks=pytest.mark.slow)
+
+
 def made(*targets: str) -> None:
     done = subprocess.run(["make", "-s", "-C", str(FIRMWARE), *targets], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -174,7 +179,7 @@ def test_host_rotor_and_quadrotor_by_the_usual_procedures(on_host, recorder_on, 
 
 
 @needs_avr
-@pytest.mark.parametrize("rate_hz", [10, 50, 100, 250])
+@pytest.mark.parametrize("rate_hz", [slow(10), 50, slow(100), 250])
 def test_avr_every_sample_of_the_pattern(on_avr, recorder_on, rate_hz):
     recorder = recorder_on("bench", on_avr()[0])
     wanted = 15 + rate_hz // 3
@@ -198,7 +203,7 @@ def test_avr_an_interval_it_cannot_do_is_refused(on_avr, recorder_on):
 
 
 @needs_avr
-@pytest.mark.parametrize("word", ["reset", "brownout"])
+@pytest.mark.parametrize("word", ["reset", slow("brownout")])
 def test_avr_reset_in_the_midst(on_avr, recorder_on, word):
     port, process = on_avr()
     recorder = recorder_on("bench", port, Timings(poll_s=0.02, reply_s=1.0, silence_s=1.0, reconnect_s=20))
@@ -219,6 +224,7 @@ def test_avr_reset_in_the_midst(on_avr, recorder_on, word):
 
 
 @needs_avr
+@pytest.mark.slow
 def test_avr_and_host_starved_of_time(on_avr, recorder_on):
     """The computer looks away for a second: the port's buffers hold what they can, and every loss is counted."""
     port, process = on_avr(speed=1)

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from typer.testing import CliRunner
 
 from acquire import procedures
+from acquire.cli import app
 from acquire.errors import AcquireError, LimitExceeded
 from acquire.plan import Plan, PlanError, attempts, is_done, read_plan, steps_of
 from acquire.record import record
@@ -111,7 +113,7 @@ def test_a_campaign_of_twenty_steps_killed_twice(tmp_path):
         assert killed_at - 2 <= done <= killed_at
     finished = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert finished.returncode == 0 and "20 of 20 recordings are there" in finished.stdout, finished.stderr
-    shown = subprocess.run([*command, "--show"], capture_output=True, text=True).stdout.splitlines()
+    shown = CliRunner().invoke(app, ["campaign", str(tmp_path / "plan.yaml"), "--show"]).output.splitlines()
     assert len(shown) == 20 and all(line.startswith("done") for line in shown)
     rows = [row for row in read_index(plan.out) if row["kind"] == "free" and row["id"].startswith("quiet")]
     assert 20 <= len(rows) <= 22 and sum(row["ended"] == "finished" for row in rows) in (20, 21)
