@@ -45,10 +45,37 @@ class Refused(AcquireError):
     ended = Ended.REFUSED
 
 
+class DeviceFault(AcquireError):
+    """The device ended the stream by itself, and not because it was done."""
+
+    ended = Ended.DEVICE_FAULT
+
+
+class GaveUp(AcquireError):
+    """A weight, a steady reading: what was waited for did not come in the time that was given."""
+
+    ended = Ended.GAVE_UP
+
+
+class LimitExceeded(AcquireError):
+    """A reading went beyond what was allowed."""
+
+    ended = Ended.LIMIT_EXCEEDED
+
+
+class BadName(AcquireError):
+    """A recording cannot be called that, or one is called that already."""
+
+
+class CannotWrite(AcquireError):
+    """The folder does not take the log."""
+
+
 class DiskFull(AcquireError):
-    """The log cannot be written any more."""
+    """The log cannot be written any more. `stored`: the chunk in hand is whole on disk all the same."""
 
     ended = Ended.DISK_FULL
+    stored = False
 
 
 class Interrupted(AcquireError):

@@ -10,7 +10,7 @@ from acquire.errors import DiskFull
 from rotorid.io import rawlog
 
 BALLAST_BYTES = 64 * 1024
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class LogWriter:
@@ -34,6 +34,7 @@ class LogWriter:
                 self._ballast.write_bytes(bytes(BALLAST_BYTES))
             self._append(rawlog.MAGIC)
         except OSError as error:
+            self.discard()
             raise self._full(error) from error
 
     def write(self, tag: int, host_ns: int, data: bytes) -> None:
@@ -49,6 +50,13 @@ class LogWriter:
         self._file = -1
         self._ballast.unlink(missing_ok=True)
 
+    def discard(self) -> None:
+        """Leave nothing behind: for a recording that never began."""
+        self.durable = False
+        self.close()
+        self._ballast.unlink(missing_ok=True)
+        self.path.unlink(missing_ok=True)
+
     def _write(self, packed: bytes, host_ns: int) -> None:
         start = self.bytes_written
         try:
@@ -57,14 +65,16 @@ class LogWriter:
                 os.fdatasync(self._file)
                 self._synced_ns = host_ns
         except OSError as error:
-            if error.errno not in _FULL:
+            if error.errno not in FULL:
                 raise
             self._ballast.unlink(missing_ok=True)
+            full = self._full(error)
             try:
                 self._append(packed[self.bytes_written - start :])
+                full.stored = True
             except OSError:  # not even the ballast's room was enough: the log ends in a cut chunk
                 pass
-            raise self._full(error) from error
+            raise full from error
 
     def _append(self, data: bytes) -> None:
         while data:

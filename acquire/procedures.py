@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from acquire.errors import GaveUp
 from acquire.recorder import Recorder, Row
 from acquire.steady import LowPass, Steadiness
 from rotorid.io.wire import quadrotor, rotor, wrench
@@ -28,6 +29,7 @@ class SteadyRule:
     tolerance: float = 2e-7
 
 
+WAIT_S = 600.0  # device time that a weight, or a steady reading, is waited for
 STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)  # in N: the reference sensor is noisy
 
 
@@ -44,9 +46,13 @@ def countdown(samples: int) -> Callable[[], bool]:
     return done
 
 
-def stream(recorder: Recorder, samples: int | None, interval_s: float = 0.0) -> None:
-    """Record `samples` samples, or until interrupted."""
-    recorder.start(interval_s)
+def stream(recorder: Recorder, samples: int | None, interval_s: float = 0.0, moves: bool = False) -> None:
+    """Record `samples` samples, or until interrupted. An instrument that `moves` something as long as it streams
+    has its watchdog on, and a restart makes the run void."""
+    if moves:
+        recorder.guard()
+        recorder.ends_by_itself = True
+    recorder.start(interval_s, resumable=not moves)
     recorder.phase = "recording"
     for _ in recorder.rows(samples):
         pass
@@ -70,17 +76,21 @@ def static_test(
     prompt: Prompt,
     samples: int = 50,
     rule: SteadyRule = SteadyRule(),  # noqa: B008
+    wait_s: float = WAIT_S,
 ) -> None:
-    """Thesis fig. 2.35: settle, wait until steady, tare, load, wait until steady, read."""
+    """Thesis fig. 2.35: settle, wait until steady, tare, load, wait until steady, read. Raises GaveUp where the load
+    or a steady reading takes longer than `wait_s` of device time."""
     recorder.start()
-    _tare(recorder, rule)
+    _tare(recorder, rule, wait_s)
     recorder.phase = "put the load on"
     done = prompt("put the load on")
-    row = next(recorder.rows(1))
-    while not done():
-        row = next(recorder.rows(1))
+    for count, row in enumerate(recorder.rows()):  # noqa: B007 - the last row is marked
+        if done():
+            break
+        if count * recorder.instrument.interval_us > wait_s * 1e6:
+            raise GaveUp(f"no load within {wait_s:g} s (--wait-s); the device is stopped, the log has what came before")
     recorder.mark("load", row)
-    _wait_until_steady(recorder, rule, "load_steady")
+    _wait_until_steady(recorder, rule, "load_steady", wait_s)
     recorder.phase = "reading"
     _read(recorder, samples)
     recorder.stop()
@@ -91,10 +101,11 @@ def dynamic_test(
     prompt: Prompt,
     samples: int,
     rule: SteadyRule = SteadyRule(),  # noqa: B008
+    wait_s: float = WAIT_S,
 ) -> None:
-    """Settle, wait until steady, tare, then record the vehicle's manoeuvre."""
+    """Settle, wait until steady, tare, then record the vehicle's manoeuvre. Raises GaveUp as `static_test` does."""
     recorder.start()
-    _tare(recorder, rule)
+    _tare(recorder, rule, wait_s)
     recorder.phase = "reading"
     prompt("fly the manoeuvre now")
     _read(recorder, samples)
@@ -103,6 +114,7 @@ def dynamic_test(
 
 def thrust_test(recorder: Recorder, throttle: float, rest_s: float, hold_s: float) -> None:
     """Rest, throttle on, rest. A device that restarts makes the run void."""
+    recorder.guard()
     recorder.start(resumable=False)
     rate_hz = 1e6 / recorder.instrument.interval_us
     _rest(recorder, rest_s, rate_hz)
@@ -132,6 +144,7 @@ def measure_wrench(
         recorder.start(interval_s, resumable=False)  # the zero is lost with the power
     else:
         start_wrench(recorder, interval_s, arguments)
+    recorder.ends_by_itself = measuring_times > 0
     recorder.phase = "measuring"
     for _ in recorder.rows(samples):
         pass
@@ -161,6 +174,7 @@ def fly_programme(recorder: Recorder, letter: str, programme: quadrotor.Programm
 
 def start_programme(recorder: Recorder, letter: str, programme: quadrotor.Programme) -> None:
     """Send the programme and expect the stream. A vehicle that restarts makes the run void."""
+    recorder.guard()
     recorder.command(letter, programme.pack())
     recorder.begin_stream()
     recorder.resume = None
@@ -178,6 +192,7 @@ def experiment(
     interval_s: float = 0.01,
 ) -> None:
     """Quadrotor and wrench together, each with its own clock: rest, programme, rest."""
+    vehicle.guard()
     start_wrench(sensor, interval_s)
     _together(sensor, rest_s / interval_s, vehicle)
     start_programme(vehicle, letter, programme)
@@ -201,6 +216,7 @@ def torque_test(
     interval_s: float = 0.01,
 ) -> None:
     """Motor 1 of the vehicle on the wrench sensor, driven and counted by the thrust tester."""
+    tester.guard()
     start_wrench(sensor, interval_s)
     tester.start(resumable=False)
     _together(sensor, rest_s / interval_s, tester)
@@ -217,12 +233,12 @@ def torque_test(
 # ---- steps ---------------------------------------------------------------------------------------------
 
 
-def _tare(recorder: Recorder, rule: SteadyRule) -> None:
+def _tare(recorder: Recorder, rule: SteadyRule, wait_s: float) -> None:
     recorder.phase = "settling"
     for row in recorder.rows(SETTLING_SAMPLES):
         last = row
     recorder.mark("settled", last)
-    _wait_until_steady(recorder, rule, "steady")
+    _wait_until_steady(recorder, rule, "steady", wait_s)
     recorder.phase = "taring"
     sums = [0.0] * len(recorder.instrument.channels)
     count = 0
@@ -236,14 +252,21 @@ def _tare(recorder: Recorder, rule: SteadyRule) -> None:
     recorder.session.tare = dict(zip(recorder.instrument.columns, means, strict=True))
 
 
-def _wait_until_steady(recorder: Recorder, rule: SteadyRule, mark: str) -> None:
+def _wait_until_steady(recorder: Recorder, rule: SteadyRule, mark: str, wait_s: float) -> None:
     recorder.phase = "waiting until steady"
     low_pass = LowPass(rule.cutoff_hz, recorder.instrument.interval_us * 1e-6)
     steadiness = Steadiness(rule.window, (rule.tolerance,) * len(recorder.instrument.channels))
-    for row in recorder.rows():
+    for count, row in enumerate(recorder.rows()):
         if steadiness.update(low_pass.update(row.values)):
             recorder.mark(mark, row)
             return
+        if count * recorder.instrument.interval_us > wait_s * 1e6:
+            spans = steadiness.spans()
+            worst = max(range(len(spans)), key=spans.__getitem__)
+            raise GaveUp(
+                f"not steady within {wait_s:g} s (--wait-s): {recorder.instrument.columns[worst]} still moves by "
+                f"{spans[worst]:.3g} over {rule.window} samples, {rule.tolerance:.3g} is allowed (--tolerance)"
+            )
 
 
 def _read(recorder: Recorder, samples: int) -> None:

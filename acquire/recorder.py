@@ -7,11 +7,13 @@ ends, the log is closed and the metadata beside it say how it ended.
 
 from __future__ import annotations
 
+import errno
 import json
-import struct
+import os
+import re
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import file_digest
 from pathlib import Path
@@ -20,24 +22,30 @@ from typing import NamedTuple
 from acquire.clock import Clock
 from acquire.errors import (
     AcquireError,
+    BadName,
+    CannotWrite,
+    DeviceFault,
     DeviceReset,
     DeviceSilent,
     DiskFull,
     Interrupted,
+    LimitExceeded,
     PortBusy,
     PortLost,
     PortMissing,
     Refused,
 )
-from acquire.log_writer import LogWriter
+from acquire.log_writer import FULL, LogWriter
 from acquire.transport import Transport
 from rotorid.io import rawlog, wire
-from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, StreamDecoder, encode
-from rotorid.io.sequence import Tracker
+from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, encode
+from rotorid.io.intake import Intake, Taken
 from rotorid.io.session import Counts, Ended, GapEntry, Session, Setup, write_session
 from rotorid.io.session import Event as SessionEvent
-from rotorid.io.wire.base import GO, IDENTIFY, OK, STOP
+from rotorid.io.wire.base import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
 
+NAME = re.compile(r"\w[\w.+-]{0,99}")  # of a recording: one file name, nothing that leads to another folder
+UNREADABLE_AT_MOST = 20  # samples of a wrong length before the first right one: the firmware is another
 MAX_GAPS_LISTED = 1000
 RATE_TOLERANCE = 0.02
 
@@ -51,7 +59,8 @@ class Timings:
     tries: int = 3  # of a command
     silence_s: float = 2.0  # in a stream, before the device is asked whether it is still there
     retry_open_s: float = 0.25  # between two attempts to reopen a port that went away
-    reconnect_s: float = 60.0  # before a port that went away is given up
+    reconnect_s: float = 60.0  # before a port that went away, or a device that went silent, is given up
+    watchdog_s: float | None = 2.0  # what moves stops when it has not heard us for so long; None: not asked for
 
 
 class Row(NamedTuple):
@@ -100,7 +109,14 @@ class Recorder:
         say: Callable[[str], None] = lambda text: None,
         stop_asked: threading.Event | None = None,
         durable: bool = True,
+        source: str | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
+        if not NAME.fullmatch(recording_id):
+            raise BadName(
+                f"a recording is called by letters, digits, '.', '_', '+' and '-', such as static-z-3; "
+                f"{recording_id!r} cannot be its name"
+            )
         self.instrument = instrument
         self.log_path = Path(folder) / f"{recording_id}.rlog"
         self.session_path = Path(folder) / f"{recording_id}.yaml"
@@ -118,18 +134,32 @@ class Recorder:
         self._timings = timings or Timings()
         self._say = say
         self._durable = durable
-        self._decoder = StreamDecoder()
-        self._tracker = Tracker()
+        self._source = source
+        self._limits = [
+            (instrument.columns.index(column), low, high)
+            for column, (low, high) in (limits or {}).items()
+            if column in instrument.columns
+        ]
+        self._exceeded = ""
+        self._intake = Intake(instrument)
+        self._tracker = self._intake.tracker
+        self._decoder = self._intake.decoder
         self._rows: deque[Row] = deque()
-        self._answers: list[wire.Answer] = []
+        self._answers: deque[wire.Answer] = deque(maxlen=64)
         self._sequence = 0
         self._bytes = 0
+        self._last_bytes = b""
         self._samples = 0
         self._consumed = 0
         self._port_losses = 0
         self._skipped = 0
         self._last_values: tuple[float, ...] = ()
-        self._last_byte_ns = 0
+        self._aside: Intake | None = None
+        self._answered = False
+        self._last_sample_ns = 0
+        self._last_sent_ns = 0
+        self._watched = False  # the device's watchdog is on and wants to hear from us
+        self._disk_full = False
         self._streaming = False
         self._closing = False
         self._restarted = False
@@ -155,13 +185,11 @@ class Recorder:
 
     def __enter__(self) -> Recorder:
         """Open the port, create the log, ask the device who it is. Raises AcquireError."""
-        self._transport.open()  # first of all: a port that is not there leaves no empty log behind
+        self.check_name()
+        self._transport.open()  # before the log: a port that is not there leaves no empty log behind
         try:
-            self.log_path.parent.mkdir(parents=True, exist_ok=True)
-            self._writer = LogWriter(self.log_path, self._durable)
-            write_session(self.session, self.session_path)
+            self._create()
             self._note("begin", id=self.session.id)
-            self._last_byte_ns = self._clock.now_ns()
             self._identify()
         except BaseException as error:
             self._finish(error)
@@ -171,6 +199,35 @@ class Recorder:
     def __exit__(self, kind, error, trace) -> None:
         self._finish(error)
 
+    def check_name(self) -> None:
+        """Raises BadName where a recording of this name is there, packed or not: none is ever overwritten."""
+        for path in (self.log_path, self.log_path.with_name(self.log_path.name + ".gz"), self.session_path):
+            if os.path.lexists(path):
+                raise BadName(f"{path}: exists already; a recording is never overwritten. Choose another --id.")
+
+    def _create(self) -> None:
+        """Log and metadata, or, where the folder does not take both, neither."""
+        folder = self.log_path.parent
+        writer = None
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            writer = LogWriter(self.log_path, self._durable)
+            write_session(self.session, self.session_path)
+        except FileExistsError as error:
+            if error.filename is not None and Path(error.filename) == self.log_path:  # made since we looked
+                raise BadName(f"{error.filename}: exists already; choose another --id.") from error
+            raise CannotWrite(f"{folder}: is a file, not a folder; choose another --out.") from error
+        except OSError as error:
+            if writer is not None:
+                writer.discard()
+            if error.errno in FULL:
+                raise DiskFull(f"{folder}: the disk is full; free some space or choose another --out.") from error
+            raise CannotWrite(
+                f"{error.filename or folder}: cannot be written ({os.strerror(error.errno or errno.EIO)}); "
+                "choose another --out."
+            ) from error
+        self._writer = writer
+
     def _finish(self, error: BaseException | None) -> None:
         """Stop the device, close the log, write the metadata; never raises over the error that led here."""
         self._closing = True
@@ -178,8 +235,10 @@ class Recorder:
             self._transport.close()
             return
         try:
-            if self._streaming and not isinstance(error, (PortLost, PortMissing)):
+            if self._streaming and not isinstance(error, (PortLost, PortMissing, DeviceSilent)):
                 self.stop()
+            elif self._streaming or self._watched:  # it may hear us, though we did not hear it
+                self._send(STOP, b"")
         except AcquireError as late:
             self._event("stop", f"the device could not be stopped: {late}")
         finally:
@@ -206,7 +265,7 @@ class Recorder:
             deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
             while self._clock.now_ns() < deadline:
                 self._pump()
-                for answer in self._answers:
+                for answer in list(self._answers):
                     if answer.letter == letter:
                         if answer.status != OK:
                             raise Refused(f"the {self.instrument.title} refused {letter!r}: {answer.text}")
@@ -216,10 +275,29 @@ class Recorder:
             f"({self._timings.tries} tries). Is it powered, and is this the right port?"
         )
 
+    def guard(self) -> None:
+        """Switch on the watchdog of a device that moves something: should this computer die, the motion stops.
+
+        From here on the device hears from us at least four times in that time. Raises Refused where the firmware
+        has no watchdog.
+        """
+        if self._timings.watchdog_s is None:
+            return
+        if self._watched and self._clock.now_ns() - self._last_sent_ns < self._timings.watchdog_s / 2 * 1e9:
+            return  # it was switched on just now
+        try:
+            self.command(KEEP, pack_keep(self._timings.watchdog_s))
+        except Refused as error:
+            raise Refused(
+                f"the {self.instrument.title} has no watchdog (command {KEEP!r}): what it moves would go on should "
+                "this computer die. Update its firmware."
+            ) from error
+        self._watched = True
+
     def start(self, interval_s: float = 0.0, resumable: bool = True) -> None:
         """Start the stream; an interval of 0 leaves the choice to the instrument. A stream that is not
         `resumable` is void when the device restarts."""
-        arguments = struct.pack("<I", round(interval_s * 1e6))
+        arguments = round(interval_s * 1e6).to_bytes(4, "little")
 
         def go() -> None:
             self.command(GO, arguments)
@@ -234,7 +312,7 @@ class Recorder:
     def begin_stream(self) -> None:
         """From now on the device is expected to send without being asked."""
         self._streaming = True
-        self._last_byte_ns = self._clock.now_ns()
+        self._last_sample_ns = self._clock.now_ns()
 
     def stop(self) -> None:
         """Stop the stream and take in what is still on its way, up to the end record."""
@@ -243,7 +321,7 @@ class Recorder:
         deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
         while self.ended is None and self._clock.now_ns() < deadline:
             self._pump()
-        self._streaming = False
+        self._streaming = self._watched = False
 
     def rows(self, count: int | None = None) -> Iterator[Row]:
         """Samples as they come: `count` of them, or all until the device ends the stream.
@@ -280,6 +358,16 @@ class Recorder:
         """Tell the person at the keyboard."""
         self._say(text)
 
+    def note(self, what: str, text: str) -> None:
+        """Something happened that belongs into log and metadata; the person is told as well."""
+        self._event(what, text)
+        self._say(text)
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is a log of this recording."""
+        return self._writer is not None
+
     def status(self) -> Status:
         """A snapshot for a live view; may be called from another thread."""
         elapsed = (self._clock.now_ns() - self.session.host_start_ns) / 1e9
@@ -307,12 +395,14 @@ class Recorder:
         if self._streaming and not self._closing:
             if self._restarted:
                 self._after_restart()
-            elif self._clock.now_ns() - self._last_byte_ns > self._timings.silence_s * 1e9:
+            elif self._clock.now_ns() - self._last_sample_ns > self._silence_s() * 1e9:
                 self._after_silence()
 
     # ---- inside --------------------------------------------------------------------------------------
 
     def _pump(self) -> None:
+        if self._watched and self._clock.now_ns() - self._last_sent_ns > self._timings.watchdog_s / 4 * 1e9:
+            self._send(KEEP, pack_keep(self._timings.watchdog_s))
         try:
             data = self._transport.read(self._timings.poll_s)
         except PortLost as error:
@@ -321,44 +411,90 @@ class Recorder:
         if not data:
             return
         now_ns = self._clock.now_ns()
-        self._write(rawlog.RECEIVED, data)  # first of all
-        self._bytes += len(data)
-        self._last_byte_ns = now_ns
-        for frame in self._decoder.feed(data):
-            self._take(frame, now_ns)
+        try:
+            stored = self._write(rawlog.RECEIVED, data)  # first of all
+        except DiskFull as full:
+            if full.stored:
+                self._absorb(data, now_ns)
+            raise
+        if stored:
+            self._absorb(data, now_ns)
+        else:
+            self._overhear(data)
 
-    def _take(self, frame: Frame, now_ns: int) -> None:
-        resets = self._tracker.resets
-        place = self._tracker.place(frame)
-        if self._tracker.resets > resets:
+    def _absorb(self, data: bytes, now_ns: int) -> None:
+        """Bytes that are in the log: count them, and hand on what they say."""
+        tracker = self._tracker
+        resets, before = tracker.resets, self._data_frames()
+        self._bytes += len(data)
+        self._last_bytes = data[-24:]
+        for taken in self._intake.feed(data):
+            self._take(taken, now_ns)
+        if tracker.resets > resets:
             self._restarted = True
             self._event("reset", "the device restarted")
-        if place is None:
+        if self._data_frames() > before:
+            self._last_sample_ns = now_ns
+        if self._closing:
             return
-        if frame.kind == DATA:
-            try:
-                values = self.instrument.decode(frame.payload)
-            except struct.error:
-                raise Refused(
-                    f"the {self.instrument.title} sends samples of {len(frame.payload)} bytes, "
-                    f"this version expects {self.instrument.layout.size}: update its firmware or this program"
-                ) from None
+        if self._exceeded:
+            raise LimitExceeded(self._exceeded)
+        if not self._samples and self._intake.malformed_samples >= UNREADABLE_AT_MOST:
+            raise Refused(
+                f"the {self.instrument.title} sends what this version cannot read ({self._intake.fault}): "
+                "update its firmware or this program"
+            )
+        if self.ended is not None and self.ended.reason not in (STOPPED, COMPLETE):
+            unheard = self.ended.reason == UNHEARD
+            raise DeviceFault(
+                f"the {self.instrument.title} ended the stream by itself: "
+                + ("its watchdog heard nothing from this computer" if unheard else "it reports a fault")
+                + ". What it moved stands still; what came before is in the log."
+            )
+
+    def _data_frames(self) -> int:
+        return self._samples + self._intake.malformed_samples + self._tracker.repeated
+
+    def _overhear(self, data: bytes) -> None:
+        """Bytes that no log could take any more: listened to for the device's end, and not counted."""
+        if self._aside is None:
+            self._aside = Intake(self.instrument)
+            self._aside.decoder.pending = self._decoder.pending
+        for kind, _, content in self._aside.feed(data):
+            if kind == ANSWER:
+                self._answers.append(content)
+            elif kind == END:
+                self.ended, self.over = content, True
+                self._streaming = self._watched = False
+
+    def _take(self, taken: Taken, now_ns: int) -> None:
+        kind, place, content = taken
+        if kind == DATA:
+            values = self.instrument.decode(content)
             row = Row(place.segment, place.index, place.clock_us / 1e6, values)
             self._samples += 1
             self._last_values = values
             self._rows.append(row)
             self._time(row, now_ns)
+            self._check_limits(values)
             if self.on_row is not None:
                 self.on_row(row)
-        elif frame.kind == ANSWER:
-            self._answers.append(wire.Answer.unpack(frame.payload))
-        elif frame.kind == START:
-            self.identity = wire.StartRecord.unpack(frame.payload)
-        elif frame.kind == END:
-            self.ended = wire.EndRecord.unpack(frame.payload)
-            self._skipped += self.ended.skipped
-            self._streaming = False
+        elif kind == ANSWER:
+            self._answers.append(content)
+        elif kind == START:
+            self.identity = content
+            self._answered = True
+        elif kind == END:
+            self.ended = content
+            self._skipped += content.skipped
+            self._streaming = self._watched = False
             self.over = True
+
+    def _check_limits(self, values: tuple[float, ...]) -> None:
+        for number, low, high in self._limits:
+            if not low <= values[number] <= high and not self._exceeded:
+                column = self.instrument.columns[number]
+                self._exceeded = f"{column} is {values[number]:.5g}, allowed are {low:g} to {high:g}: stopped"
 
     def _time(self, row: Row, now_ns: int) -> None:
         """Keep the first and the latest sample of the present segment, for rate and clock ratio."""
@@ -374,6 +510,7 @@ class Recorder:
         payload = letter.encode() + arguments
         data = encode(Frame(COMMAND, self._sequence, self._clock.now_ns() // 1000, payload))
         self._sequence += 1
+        self._last_sent_ns = self._clock.now_ns()
         self._write(rawlog.SENT, data)
         try:
             # the leading zero ends whatever noise the line has put into the device's buffer
@@ -381,35 +518,63 @@ class Recorder:
         except PortLost as error:
             self._reconnect(error)
 
-    def _ask_identity(self) -> bool:
-        """Ask the device who it is; whether it answered. Its start record also tells a restart."""
-        self.identity = None
-        for _ in range(self._timings.tries):
+    def _ask_identity(self, patience_s: float | None = None) -> bool:
+        """Ask the device who it is, a few times or for so long; whether it answered. Its start record also tells a
+        restart; samples, should they come instead, will do as a sign of life."""
+        self._answered = False
+        samples = self._data_frames()
+        begin_ns, asked = self._clock.now_ns(), 0
+        while asked < self._timings.tries or (
+            patience_s is not None and self._clock.now_ns() - begin_ns < patience_s * 1e9
+        ):
+            if self.stop_asked.is_set() and patience_s is not None:
+                raise Interrupted("stopped at your wish while nothing was heard of the device; the log is safe")
             self._send(IDENTIFY, b"")
+            asked += 1
             deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-            while self.identity is None and self._clock.now_ns() < deadline:
+            while not self._answered and self._clock.now_ns() < deadline:
                 self._pump()
-            if self.identity is not None:
+                if patience_s is not None and self._data_frames() > samples:
+                    return True
+            if self._answered:
                 return True
         return False
 
     def _identify(self) -> None:
         if not self._ask_identity():
+            if self._intake.fault:
+                raise Refused(
+                    f"{self._transport.name} answers, but not as docs/wire-formats.md asks: {self._intake.fault}. "
+                    "Update its firmware."
+                )
             raise DeviceSilent(
                 f"{self._transport.name} is open but nothing on it answers like a {self.instrument.title}. "
                 "Is it powered, is this the right port, is the baud rate right "
-                f"({self._transport.baud_rate or self.instrument.baud_rate})?"
+                f"({self._transport.baud_rate or self.instrument.baud_rate})? {self._heard()}"
             )
         if self.identity.instrument != self.instrument.name:
             raise Refused(
                 f"{self._transport.name} is a {self.identity.instrument!r} ({self.identity.firmware}), "
-                f"not a {self.instrument.name!r}; see `rotorid-acquire ports`"
+                f"not a {self.instrument.name!r}; see `rotorid-acquire ports --identify`"
             )
         self._restarted = False
         self.session.firmware = self.identity.firmware
         self.session.serial_number = self.identity.serial_number
-        self.session.source = "emulator" if "emulat" in self.identity.firmware else "instrument"
+        self.session.source = self._source or _source(self.identity, self._transport.name)
         write_session(self.session, self.session_path)
+
+    def _heard(self) -> str:
+        """What came instead of an answer, for a message."""
+        if not self._bytes:
+            return "Heard: nothing at all."
+        if self._decoder.frames:
+            return f"Heard: {self._decoder.frames} frames, none of them a start record."
+        return f"Heard: {self._bytes} bytes and no frame, the last of them {self._last_bytes!r}."
+
+    def _silence_s(self) -> float:
+        """How long a stream may be without a sample: never less than three of its own intervals."""
+        interval_s = self.identity.interval_us / 1e6 if self.identity is not None else 0.0
+        return max(self._timings.silence_s, 3 * interval_s)
 
     def _after_restart(self) -> None:
         """Bring a device that restarted, or whose port was gone, back to streaming."""
@@ -420,23 +585,49 @@ class Recorder:
             )
         # its start record has to come before its samples, or these look like old ones
         if not self._ask_identity():
-            self._streaming = False
-            raise DeviceSilent(
-                f"the {self.instrument.title} on {self._transport.name} has gone silent. "
-                "Check its power and cable, then record again; what came before is in the log."
-            )
+            self._give_up()
         self._restarted = False
+        self._go_on()
+
+    def _go_on(self) -> None:
         self._say(f"telling the {self.instrument.title} to go on")
         self.resume()
 
+    def _give_up(self) -> None:
+        raise DeviceSilent(
+            f"the {self.instrument.title} on {self._transport.name} has gone silent. "
+            "Check its power and cable, then record again; what came before is in the log."
+        )
+
     def _after_silence(self) -> None:
-        self._event("silence", f"nothing for {self._timings.silence_s:g} s")
-        if self.ends_by_itself and self._ask_identity() and not self._restarted:
-            self._event("end_lost", "the device is there and idle: its end record was lost on the way")
-            self._streaming = False
-            self.over = True
+        """A line at rest has as long as a port that is gone; what then comes decides how the recording goes on."""
+        self._event("silence", f"no sample for {self._silence_s():g} s")
+        self._say(f"nothing from the {self.instrument.title}; waiting up to {self._timings.reconnect_s:g} s for it")
+        samples = self._data_frames()
+        if not self._ask_identity(self._timings.reconnect_s):
+            self._give_up()
+        if self._restarted:
+            self._after_restart()
             return
-        self._after_restart()
+        # it answers; if it still streams, a sample is not far
+        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
+        while self._data_frames() == samples and not self.over and self._clock.now_ns() < deadline:
+            self._pump()
+        if self._data_frames() > samples:
+            self._event("silence_over", "samples come again")
+        elif self.over:
+            return
+        elif self.ends_by_itself:
+            self._event("end_lost", "the device is there and idle: its end record was lost on the way")
+            self._streaming = self._watched = False
+            self.over = True
+        elif self.resume is not None:
+            self._go_on()
+        else:
+            raise DeviceFault(
+                f"the {self.instrument.title} answers, but no longer streams: the run is void. "
+                "Record again; what came before is in the log."
+            )
 
     def _reconnect(self, error: PortLost) -> None:
         """Wait for a port that went away. Raises PortLost when it does not come back."""
@@ -458,7 +649,7 @@ class Recorder:
                 continue
             self._event("port_back", f"{self._transport.name} is back")
             self._say(f"{self._transport.name} is back; going on")
-            self._last_byte_ns = self._clock.now_ns()
+            self._last_sample_ns = self._clock.now_ns()
             if self._streaming:
                 self._restarted = True  # whatever it was: it has to be told to go on
             return
@@ -476,13 +667,19 @@ class Recorder:
     def _note(self, what: str, **more) -> None:
         self._write(rawlog.NOTE, json.dumps({"note": what, **more}, separators=(",", ":")).encode())
 
-    def _write(self, tag: int, data: bytes) -> None:
-        """To disk. While closing, a full disk no longer hinders: the device still has to be stopped."""
+    def _write(self, tag: int, data: bytes) -> bool:
+        """To disk; whether it is there. While closing, a full disk no longer hinders: the device still has to be
+        stopped. Behind a chunk that found no room nothing is written any more."""
+        if self._disk_full:
+            return False
         try:
             self._writer.write(tag, self._clock.now_ns(), data)
-        except DiskFull:
+        except DiskFull as full:
+            self._disk_full = True
             if not self._closing:
                 raise
+            return full.stored
+        return True
 
     def _measured_rate(self) -> float | None:
         first, latest = self._first, self._latest
@@ -506,6 +703,9 @@ class Recorder:
             clock_rollovers=tracker.rollovers,
             port_losses=self._port_losses,
             device_skipped=self._skipped,
+            malformed=self._intake.malformed or None,
+            malformed_samples=self._intake.malformed_samples or None,
+            unknown_kinds=self._intake.unknown_kinds or None,
         )
         session.gaps = [GapEntry(**vars(gap)) for gap in tracker.gaps[:MAX_GAPS_LISTED]]
         session.gaps_left_out = max(0, len(tracker.gaps) - MAX_GAPS_LISTED)
@@ -523,6 +723,13 @@ class Recorder:
         session.warnings = list(_warnings(session))
         with open(self.log_path, "rb") as log:
             session.log_sha256 = file_digest(log, "sha256").hexdigest()
+
+
+def _source(identity: wire.StartRecord, port: str) -> str:
+    """`instrument` or `emulator`: what says so itself, or sits on a pseudo-terminal, is no instrument."""
+    says = f"{identity.firmware} {identity.serial_number}".lower()
+    pretends = "emulat" in says or "simul" in says
+    return "emulator" if pretends or os.path.realpath(port).startswith("/dev/pts/") else "instrument"
 
 
 def _how(error: BaseException | None) -> tuple[Ended, str]:
@@ -545,6 +752,10 @@ def _warnings(session: Session) -> Iterator[str]:
     bad = counts.checksum_errors + counts.broken_frames
     if bad:
         yield f"{bad} frames came damaged; a loose plug, a long cable or a wrong baud rate does that"
+    if counts.malformed:
+        yield f"{counts.malformed} frames came whole and make no sense; does the firmware fit docs/wire-formats.md?"
+    if counts.unknown_kinds:
+        yield f"{counts.unknown_kinds} frames are of a kind this version does not know; is the firmware a newer one?"
     if counts.device_skipped:
         yield f"the device itself skipped {counts.device_skipped} samples; ask for a lower rate"
     promised, measured = session.promised_rate_hz, session.measured_rate_hz

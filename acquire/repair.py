@@ -19,7 +19,8 @@ def repair(log: Path, parsed: Log) -> bool:
     if session is None or session.ended != Ended.RECORDING or session.duration_s is not None:
         return False
     table = parsed.table
-    received = sum(len(chunk.data) for chunk in read_raw(log).chunks if chunk.tag == RECEIVED)
+    raw = read_raw(log)
+    received = sum(len(chunk.data) for chunk in raw.chunks if chunk.tag == RECEIVED)
     session.counts = Counts(
         bytes_received=received,
         samples=len(table),
@@ -28,7 +29,11 @@ def repair(log: Path, parsed: Log) -> bool:
         checksum_errors=parsed.checksum_errors,
         broken_frames=parsed.broken_frames,
         resets=parsed.resets,
+        malformed=parsed.malformed or None,
+        unknown_kinds=parsed.unknown_kinds or None,
     )
+    if not parsed.faults:  # from now on a change of the log is noticed
+        session.log_sha256 = raw.sha256
     session.gaps = [GapEntry(**asdict(gap)) for gap in parsed.gaps[:1000]]
     session.gaps_left_out = max(0, len(parsed.gaps) - 1000)
     session.duration_s = round(float(table.time_s.iloc[-1]), 6) if len(table) else 0.0

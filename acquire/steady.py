@@ -34,5 +34,8 @@ class Steadiness:
         self._last.append(filtered)
         if len(self._last) < self._last.maxlen:
             return False
-        channels = zip(*self._last, strict=True)
-        return all(max(c) - min(c) <= t for c, t in zip(channels, self._tolerance, strict=True))
+        return all(span <= t for span, t in zip(self.spans(), self._tolerance, strict=True))
+
+    def spans(self) -> list[float]:
+        """What each channel spans over the window so far."""
+        return [max(channel) - min(channel) for channel in zip(*self._last, strict=True)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -15,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from acquire.geometry import body_forces, cell_forces
-from acquire.recorder import Recorder
+from acquire.recorder import Recorder, Status
 
 REFRESH_HZ = 5
 PLOT_SAMPLES = 600
@@ -47,10 +48,19 @@ class Plot:
         self.column = column
         self._number = recorder.instrument.columns.index(column)
         self._values: deque[float] = deque(maxlen=PLOT_SAMPLES)
-        recorder.on_row = lambda row: self._values.append(row.values[self._number])
+        before = recorder.on_row  # several curves of one recorder: each sees every sample
+
+        def see(row) -> None:
+            if before is not None:
+                before(row)
+            self._values.append(row.values[self._number])
+
+        recorder.on_row = see
 
     def render(self) -> Text:
-        return Text(f"{self.column}\n" + "\n".join(braille(list(self._values))))
+        values = list(self._values)
+        noise = f"   noise of the last {len(values)}: {np.std(values):.3g}" if len(values) > 1 else ""
+        return Text(f"{self.column}{noise}\n" + "\n".join(braille(values)))
 
 
 def panel(recorder: Recorder) -> Table:
@@ -64,13 +74,17 @@ def panel(recorder: Recorder) -> Table:
     table.add_row(
         f"{status.samples}" + (f"/{status.wanted}" if status.wanted else ""),
         f"{status.rate_hz:.1f}" if status.rate_hz else "–",
-        str(status.missing),
+        str(status.missing) + (f" ({_share(status):.2%})" if status.missing else ""),
         str(status.bad_frames),
         f"{status.elapsed_s:.1f}",
         f"{status.remaining_s:.0f}" if status.remaining_s is not None else "–",
         *(f"{value:.5g}" for value in status.values or [float("nan")] * len(recorder.instrument.columns)),
     )
     return table
+
+
+def _share(status: Status) -> float:
+    return status.missing / max(status.samples + status.missing, 1)
 
 
 def bench_forces(recorder: Recorder) -> Text | None:
@@ -98,11 +112,16 @@ def watch(
     """
 
     def interrupt(number, frame) -> None:
-        if stop.is_set():
+        if number == signal.SIGHUP:
+            _leave_the_terminal()
+        elif stop.is_set():
             raise KeyboardInterrupt
         stop.set()
 
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    ends = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # under nohup a recording outlives its terminal
+        ends.append(signal.SIGHUP)
+    before = {number: signal.signal(number, interrupt) for number in ends}
     try:
         if not console.is_terminal:
             run()
@@ -122,15 +141,29 @@ def watch(
             forces = [text for recorder in recorders if (text := bench_forces(recorder)) is not None]
             return Group(*map(panel, recorders), *forces, *(plot.render() for plot in plots))
 
-        with Live(picture(), console=console, auto_refresh=False) as live:
-            while thread.is_alive():
-                thread.join(1 / REFRESH_HZ)
-                live.update(picture(), refresh=True)
+        try:
+            with Live(picture(), console=console, auto_refresh=False) as live:
+                while thread.is_alive():
+                    thread.join(1 / REFRESH_HZ)
+                    live.update(picture(), refresh=True)
+        except BaseException:  # nobody looks any more: the device must not go on for that
+            stop.set()
+            thread.join()
+            raise
         if failure:
             raise failure[0]
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _leave_the_terminal() -> None:
+    """The terminal is gone: what is still to be said must not fail for that."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        if os.isatty(descriptor):
+            os.dup2(nowhere, descriptor)
+    os.close(nowhere)
 
 
 def stderr_console() -> Console:

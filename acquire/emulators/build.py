@@ -42,6 +42,7 @@ def build(
     def line(device, **options) -> WireHalf:
         error = getattr(truth.clocks, device.instrument.name)
         chosen = faults or Faults(share=fault_share)
+        device.needs_watchdog = True
         return WireHalf(device, rng, clock_error=error, faults=chosen, **options)
 
     if what == "bench":

@@ -16,7 +16,7 @@ from rotorid.io import wire
 from rotorid.io.wire import bench, jr3, quadrotor, rotor, tensile, wrench
 from rotorid.io.wire.base import GO, STOP
 
-FIRMWARE = "1.2 (emulated)"
+FIRMWARE = "1.2 (emulated)"  # the committed campaign's
 
 
 class CommandRefused(Exception):
@@ -33,6 +33,7 @@ class Device:
     """What all instruments do: start, stop, one interval. `streaming` tells the wire half to sample."""
 
     instrument: wire.Instrument
+    needs_watchdog = False  # refuses to move anything before its watchdog is on, as firmware from 1.3 on does
 
     def __init__(self, serial_number: str) -> None:
         self.serial_number = serial_number
@@ -44,12 +45,18 @@ class Device:
         """Raises CommandRefused, or struct.error for arguments of the wrong length."""
         if letter == GO:
             (interval_us,) = struct.unpack("<I", arguments)
+            if self.streaming and interval_us not in (0, self.interval_us):
+                raise CommandRefused("a stream of another interval is running; stop it first")
             self.interval_us = interval_us or self.interval_us
             self.streaming = True
         elif letter == STOP:
             self.streaming = False
         else:
             self.operate(letter, arguments)
+
+    def moves(self, letter: str, arguments: bytes) -> bool:
+        """Whether a command sets something in motion."""
+        return False
 
     def operate(self, letter: str, arguments: bytes) -> None:
         """The instrument's own commands."""
@@ -89,6 +96,9 @@ class RotorDevice(Device):
         super().__init__(serial_number)
         self._physics = physics
         self._left_s = 0.0
+
+    def moves(self, letter: str, arguments: bytes) -> bool:
+        return letter == rotor.THROTTLE and arguments[:2] != b"\0\0"
 
     def operate(self, letter: str, arguments: bytes) -> None:
         if letter != rotor.THROTTLE:
@@ -205,6 +215,9 @@ class QuadrotorDevice(Device):
         self._time_s = 0.0
         self._led = quadrotor.RED
 
+    def moves(self, letter: str, arguments: bytes) -> bool:
+        return letter in quadrotor.DYNAMICS
+
     def command(self, letter: str, arguments: bytes) -> None:
         if letter == GO:
             raise CommandRefused("this device starts with a programme, not with G")
@@ -269,6 +282,9 @@ class TensileDevice(Device):
     def __init__(self, physics: TensilePhysics, serial_number: str = "EMU-AGSX-1") -> None:
         super().__init__(serial_number)
         self._physics = physics
+
+    def moves(self, letter: str, arguments: bytes) -> bool:
+        return letter == GO
 
     def tick(self, dt_s: float) -> None:
         self._physics.moving = self.streaming

@@ -20,6 +20,7 @@ class Faults:
     share: float = 0.0  # each of the six kinds above befalls a frame at random with this probability
     reset_at: frozenset[int] = frozenset()  # the device restarts instead of sending it
     silent_from: int | None = None  # nothing from here on, no answers either
+    same_boot_id: bool = False  # a device that does not count its boots
     lose_end: bool = False  # the end record never arrives
     refuse: frozenset[str] = frozenset()  # commands refused
     pace: float = 1.0  # samples per promised sample

@@ -76,6 +76,8 @@ class EmulatedPorts:
         self._world = world
         self._speed, self._slice_s, self._replug_after_s = speed, slice_s, replug_after_s
         self.terminals = [PseudoTerminal(link) for link in links or [None] * len(world.lines)]
+        for line in world.lines:  # a watchdog guards against a computer that is gone, and computers live in real time
+            line.host_time_s = time.monotonic
         self._pending = [bytearray() for _ in world.lines]
         self.overruns = 0
         self._away_until: dict[int, float] = {}

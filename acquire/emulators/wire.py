@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
+from collections.abc import Callable
 from zlib import crc32
 
 import numpy as np
@@ -12,7 +13,20 @@ from acquire.emulators.devices import CommandRefused, Device, Physics
 from acquire.emulators.faults import Faults, FaultyLine
 from rotorid.io import wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, StreamDecoder, encode
-from rotorid.io.wire.base import ASKED, BOOTED, COMPLETE, IDENTIFY, OK, REFUSED, STOP, STOPPED, STREAMING
+from rotorid.io.wire.base import (
+    ASKED,
+    BOOTED,
+    COMPLETE,
+    IDENTIFY,
+    KEEP,
+    OK,
+    REFUSED,
+    STOP,
+    STOPPED,
+    STREAMING,
+    UNHEARD,
+    unpack_keep,
+)
 
 
 class WireHalf:
@@ -33,6 +47,7 @@ class WireHalf:
         self.device = device
         self.due_s: float | None = None  # true time of the next sample
         self.unplugged = False
+        self.at_rest = False  # the cable carries nothing, either way, and no port notices
         self.line = FaultyLine(faults, rng)
         self._faults = faults
         self._rng = rng
@@ -43,14 +58,20 @@ class WireHalf:
         self._now_s = 0.0
         self._boots = 0
         self._fired: set[int] = set()  # resets happen once
+        self.host_time_s: Callable[[], float] = lambda: self._now_s  # ports that run faster than life set their own
+        self._watchdog_s: float | None = None
+        self._heard_s = 0.0
         self.power_up()
 
     # ---- the line ------------------------------------------------------------------------------------
 
     def receive(self, data: bytes) -> None:
         """Bytes from the host. What is no intact command is ignored, as real firmware does."""
+        if self.at_rest:
+            return
         for frame in self._decoder.feed(data):
             if frame.kind == COMMAND and frame.payload:
+                self._heard_s = self.host_time_s()
                 self._obey(chr(frame.payload[0]), frame.payload[1:])
 
     def take(self) -> bytes:
@@ -58,7 +79,7 @@ class WireHalf:
         out = bytearray()
         while self._out and self._out[0][0] <= self._now_s:
             out += self._out.popleft()[1]
-        return bytes(out)
+        return b"" if self.at_rest else bytes(out)
 
     @property
     def busy(self) -> bool:
@@ -77,6 +98,16 @@ class WireHalf:
         self._now_s = now_s
         if self.due_s is not None and not self.device.streaming:
             self._end(COMPLETE)
+        if self._watchdog_s is not None and self.host_time_s() - self._heard_s > self._watchdog_s:
+            self._stop_unheard()
+
+    def _stop_unheard(self) -> None:
+        """The computer is gone: what moves stands still."""
+        self.device.command(STOP, b"")
+        self.device.tick(0.0)
+        if self.due_s is not None:
+            self._end(UNHEARD)
+        self._watchdog_s = None
 
     def sample(self) -> None:
         """The moment `due_s` is there: take a sample and send it."""
@@ -98,6 +129,7 @@ class WireHalf:
         self._sequence = 0
         self._sent = 0
         self.due_s = None
+        self._watchdog_s = None
         self._clock_zero_s = self._now_s
         self.device.boot()
         self._start_record(BOOTED)
@@ -118,7 +150,12 @@ class WireHalf:
         try:
             if letter in self._faults.refuse:
                 raise CommandRefused("this device was told to refuse it")
-            self.device.command(letter, arguments)
+            if letter == KEEP and letter in self.device.instrument.commands:
+                self._watchdog_s = unpack_keep(arguments)
+            elif self.device.needs_watchdog and self._watchdog_s is None and self.device.moves(letter, arguments):
+                raise CommandRefused("switch the watchdog on first (K)")
+            else:
+                self.device.command(letter, arguments)
         except CommandRefused as refusal:
             status, text = REFUSED, str(refusal)
         except struct.error:
@@ -133,7 +170,8 @@ class WireHalf:
 
     def _start_record(self, reason: int) -> None:
         device = self.device
-        boot_id = crc32(f"{device.serial_number} {self._boots}".encode())
+        boots = 1 if self._faults.same_boot_id else self._boots
+        boot_id = crc32(f"{device.serial_number} {boots}".encode())
         record = wire.StartRecord(
             boot_id, device.interval_us, reason, device.instrument.name, device.firmware, device.serial_number
         )
@@ -141,6 +179,7 @@ class WireHalf:
 
     def _end(self, reason: int) -> None:
         self.due_s = None
+        self._watchdog_s = None
         if self._faults.lose_end:
             return
         self._emit(self._frame(END, wire.EndRecord(self._sent, 0, reason).pack()))

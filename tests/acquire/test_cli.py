@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from typer.testing import CliRunner
 from acquire import procedures
 from acquire.cli import app
 from acquire.geometry import GF_N, body_forces, cell_forces
+from acquire.identify import stable_name, udev_rule, who_is_there
 from acquire.view import Plot, bench_forces, braille, panel, watch
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
@@ -148,6 +151,41 @@ def test_mistakes_get_one_clear_sentence(arguments, sentence, tmp_path, monkeypa
     assert result.exit_code in (1, 2)
     text = " ".join(result.output.replace("│", " ").split())
     assert sentence in text and "Traceback" not in text
+
+
+def test_ports_say_who_is_there(plugged):
+    bench, rotor = plugged("bench").names[0], plugged("rotor").names[0]
+    result = CliRunner().invoke(app, ["ports", "--port", bench, "--port", rotor, "--port", "/dev/nothing"])
+    assert result.exit_code == 0
+    assert "bench, firmware bench 1.2 (emulated), serial EMU-BENCH-1" in result.output
+    assert "rotor, firmware rotor 1.2 (emulated)" in result.output and "no such port" in result.output
+
+
+def test_a_port_with_another_device_says_what_was_heard(tmp_path):
+    master, slave = os.openpty()
+    over = threading.Event()
+
+    def speak() -> None:
+        while not over.wait(0.02):
+            os.write(master, b"T=23.5C\r\n")
+
+    thread = threading.Thread(target=speak)
+    thread.start()
+    assert "T=23.5C" in who_is_there(os.ttyname(slave), wait_s=0.3)
+    over.set()
+    thread.join()
+    os.close(master)
+    os.close(slave)
+
+
+def test_stable_names_and_a_udev_rule(tmp_path):
+    (tmp_path / "usb-Arduino_UNO").symlink_to("/dev/null")
+    assert stable_name("/dev/null", tmp_path) == str(tmp_path / "usb-Arduino_UNO")
+    assert stable_name("/dev/zero", tmp_path) == "/dev/zero"
+    rule = udev_rule("2341", "0043", "755333", "rotorid-bench")
+    assert (
+        'ATTRS{idVendor}=="2341"' in rule and 'ATTRS{serial}=="755333"' in rule and 'SYMLINK+="rotorid-bench"' in rule
+    )
 
 
 def test_ports_lists_or_says_what_to_do():

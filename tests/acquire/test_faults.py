@@ -17,6 +17,7 @@ import pytest
 from acquire import procedures
 from acquire.emulators.faults import Faults
 from acquire.errors import (
+    BadName,
     DeviceReset,
     DeviceSilent,
     DiskFull,
@@ -32,6 +33,7 @@ from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
 from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
+from tests.acquire.fault_table import seen
 
 SAMPLES = 300
 
@@ -61,6 +63,7 @@ def assert_metadata_agree(log):
     ]
 
 
+@seen("a good line loses nothing")
 def test_a_good_line_loses_nothing(plugged, recorder_on):
     log = record(recorder_on("bench", plugged("bench").names[0]))
     assert log.complete and log.end.sent == len(log.table) >= SAMPLES
@@ -71,6 +74,7 @@ def test_a_good_line_loses_nothing(plugged, recorder_on):
     assert_metadata_agree(log)
 
 
+@seen("port missing")
 def test_port_missing(recorder_on, tmp_path):
     with pytest.raises(PortMissing, match="no such port.*rotorid-acquire ports"):
         with recorder_on("bench", str(tmp_path / "nothing")):
@@ -78,6 +82,7 @@ def test_port_missing(recorder_on, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@seen("port busy")
 def test_port_busy(plugged, recorder_on, tmp_path):
     port = plugged("bench").names[0]
     other = SerialTransport(port, 115200)
@@ -99,6 +104,7 @@ def pull_at(ports, recorder, samples):
     recorder.on_row = watch
 
 
+@seen("port vanishes and comes back")
 def test_port_vanishes_and_comes_back(plugged, recorder_on):
     ports = plugged("bench", replug_after_s=0.02)
     recorder = recorder_on("bench", ports.names[0])
@@ -116,6 +122,7 @@ def test_port_vanishes_and_comes_back(plugged, recorder_on):
     assert_metadata_agree(log)
 
 
+@seen("port vanishes for good")
 def test_port_vanishes_for_good(plugged, recorder_on):
     ports = plugged("bench", replug_after_s=None)
     recorder = recorder_on("bench", ports.names[0], replace(QUICK, reconnect_s=0.02))
@@ -128,6 +135,7 @@ def test_port_vanishes_for_good(plugged, recorder_on):
     assert_metadata_agree(log)
 
 
+@seen("garbage and half frames")
 def test_garbage_and_half_frames(plugged, recorder_on):
     faults = Faults(garbage=frozenset({20, 150}), half=frozenset({60, 151, 200}))
     log = record(recorder_on("bench", plugged("bench", faults).names[0]))
@@ -140,6 +148,7 @@ def test_garbage_and_half_frames(plugged, recorder_on):
     assert_metadata_agree(log)
 
 
+@seen("wrong checksum")
 def test_wrong_checksum(plugged, recorder_on):
     bad = frozenset({10, 11, 170})
     log = record(recorder_on("bench", plugged("bench", Faults(corrupt=bad)).names[0]))
@@ -153,6 +162,7 @@ def test_wrong_checksum(plugged, recorder_on):
     assert_metadata_agree(log)
 
 
+@seen("dropped repeated and reordered frames")
 def test_dropped_repeated_and_reordered_frames(plugged, recorder_on):
     faults = Faults(drop=frozenset({30, 31, 32, 100}), repeat=frozenset({40, 41, 200}), swap=frozenset({50, 150}))
     log = record(recorder_on("bench", plugged("bench", faults).names[0]))
@@ -168,6 +178,7 @@ def test_dropped_repeated_and_reordered_frames(plugged, recorder_on):
 
 
 @pytest.mark.parametrize("seed", range(3))
+@seen("everything at once at random")
 def test_everything_at_once_at_random(plugged, recorder_on, seed):
     ports = plugged("bench", Faults(share=0.01))
     line = ports._world.lines[0].line
@@ -182,6 +193,7 @@ def test_everything_at_once_at_random(plugged, recorder_on, seed):
     assert_metadata_agree(log)
 
 
+@seen("device resets and the recording goes on")
 def test_device_resets_and_the_recording_goes_on(plugged, recorder_on):
     log = record(recorder_on("bench", plugged("bench", Faults(reset_at=frozenset({120}))).names[0]))
     assert log.resets == 1
@@ -192,6 +204,7 @@ def test_device_resets_and_the_recording_goes_on(plugged, recorder_on):
     assert_metadata_agree(log)
 
 
+@seen("a reset makes a thrust test void")
 def test_a_reset_makes_a_thrust_test_void(plugged, recorder_on):
     port = plugged("rotor", Faults(reset_at=frozenset({80}))).names[0]
     with pytest.raises(DeviceReset, match="void.*record again"):
@@ -202,6 +215,7 @@ def test_a_reset_makes_a_thrust_test_void(plugged, recorder_on):
     assert log.session.ended == Ended.DEVICE_RESET
 
 
+@seen("clock rollover")
 def test_clock_rollover(plugged, recorder_on):
     faults = Faults(clock_start_us=(1 << 32) - 2_000_000)  # rolls over two seconds into the stream
     log = record(recorder_on("bench", plugged("bench", faults).names[0]))
@@ -211,6 +225,7 @@ def test_clock_rollover(plugged, recorder_on):
 
 
 @pytest.mark.parametrize(("pace", "word", "rate"), [(0.8, "slower", 40.0), (1.25, "faster", 62.5)])
+@seen("device slower or faster than promised")
 def test_device_slower_or_faster_than_promised(plugged, recorder_on, pace, word, rate):
     log = record(recorder_on("bench", plugged("bench", Faults(pace=pace)).names[0]))
     assert log.missing == 0
@@ -219,6 +234,7 @@ def test_device_slower_or_faster_than_promised(plugged, recorder_on, pace, word,
     assert any(f"{word} than promised" in warning for warning in log.session.warnings)
 
 
+@seen("silent device")
 def test_silent_device(plugged, recorder_on):
     port = plugged("bench", Faults(silent_from=100)).names[0]
     with pytest.raises(DeviceSilent, match="gone silent.*power and cable"):
@@ -227,6 +243,7 @@ def test_silent_device(plugged, recorder_on):
     assert len(log.table) == 100 and log.session.ended == Ended.DEVICE_SILENT
 
 
+@seen("port without a device")
 def test_port_without_a_device(recorder_on, tmp_path):
     master, slave = os.openpty()
     try:
@@ -239,12 +256,14 @@ def test_port_without_a_device(recorder_on, tmp_path):
     assert read_session(tmp_path / "run.yaml").ended == Ended.DEVICE_SILENT
 
 
+@seen("another instrument on the port")
 def test_another_instrument_on_the_port(plugged, recorder_on):
     with pytest.raises(Refused, match="is a 'bench'.*not a 'rotor'"):
         with recorder_on("rotor", plugged("bench").names[0]):
             pass
 
 
+@seen("refused command")
 def test_refused_command(plugged, recorder_on):
     port = plugged("wrench", Faults(refuse=frozenset("I"))).names[0]
     with pytest.raises(Refused, match="refused 'I'"):
@@ -253,6 +272,7 @@ def test_refused_command(plugged, recorder_on):
     assert read_session(recorder.session_path).ended == Ended.REFUSED
 
 
+@seen("sensor that resets is powered and initialised again")
 def test_sensor_that_resets_is_powered_and_initialised_again(plugged, recorder_on):
     port = plugged("wrench", Faults(reset_at=frozenset({50}))).names[0]
     with recorder_on("wrench", port) as recorder:
@@ -263,6 +283,7 @@ def test_sensor_that_resets_is_powered_and_initialised_again(plugged, recorder_o
     np.testing.assert_allclose(np.diff(after.time_s), 0.005, atol=2e-6)
 
 
+@seen("a programme whose end record is lost still ends")
 def test_a_programme_whose_end_record_is_lost_still_ends(plugged, recorder_on):
     port = plugged("quadrotor", Faults(lose_end=True)).names[0]
     programme = Programme(TRAPEZOID, (0.1, 0.1, 0.1, 0.1), 0.5, 1.0, 0.0)
@@ -274,6 +295,7 @@ def test_a_programme_whose_end_record_is_lost_still_ends(plugged, recorder_on):
     assert [event.what for event in log.session.events] == ["silence", "end_lost"]
 
 
+@seen("disk full")
 def test_disk_full(plugged, recorder_on):
     """The kernel refuses to let the file grow (EFBIG), as a full disk does (ENOSPC)."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -295,14 +317,16 @@ def test_disk_full(plugged, recorder_on):
     assert not recorder.log_path.with_name("run.rlog.ballast").exists()
 
 
+@seen("a recording is never overwritten")
 def test_a_recording_is_never_overwritten(plugged, recorder_on):
     port = plugged("bench").names[0]
     first = record(recorder_on("bench", port))
-    with pytest.raises(FileExistsError):
+    with pytest.raises(BadName, match="exists already"):
         record(recorder_on("bench", port))
     assert len(read_log(first.path).table) == len(first.table)
 
 
+@seen("stop asked from outside")
 def test_stop_asked_from_outside(plugged, recorder_on):
     recorder = recorder_on("bench", plugged("bench").names[0])
     recorder.on_row = lambda row: recorder.stop_asked.set() if row.index > 50 else None
@@ -338,6 +362,7 @@ def wait_for_bytes(process: subprocess.Popen, path: Path, count: int) -> None:
         time.sleep(0.002)
 
 
+@seen("ctrl c")
 def test_ctrl_c(plugged, tmp_path):
     process = start_recorder(plugged("bench", speed=20.0).names[0], tmp_path)
     wait_for_bytes(process, tmp_path / "run.rlog", 3000)
@@ -350,6 +375,7 @@ def test_ctrl_c(plugged, tmp_path):
     assert_metadata_agree(log)
 
 
+@seen("sigkill")
 def test_sigkill(plugged, tmp_path):
     ports = plugged("bench", speed=20.0)
     process = start_recorder(ports.names[0], tmp_path)

@@ -18,6 +18,8 @@ def main(logs: Sequence[str], samples: str, recordings: str) -> None:
     table, sessions = read_tables(path for path in logs if not path.endswith(".yaml"))
     for row in sessions[~sessions["finished"]].itertuples():
         LOGGER.warning("%s did not come to its end and is left out of what follows", row.id)
+    for row in sessions[sessions["faults"] != ""].itertuples():
+        LOGGER.warning("%s: %s; %d samples missing", row.id, row.faults, row.missing)
     LOGGER.info("%d recordings, %d samples, %d missing", len(sessions), len(table), sessions["missing"].sum())
     table.to_parquet(samples, index=False)
     sessions.to_csv(recordings, index=False)

@@ -1,7 +1,8 @@
 """Raw logs to tidy tables: `read_log(path)` gives a table with units, quality flags and the metadata.
 
-A log cut off anywhere is read up to the cut; `Log.cut_at` says so. The table's time is the device's own
-clock, unwrapped; the host's time stands beside it, so that two instruments can be aligned.
+A log cut off anywhere is read up to the cut, a damaged one behind the damage as well; `Log.faults` says in
+sentences what is not as it was recorded. The table's time is the device's own clock, unwrapped; the host's time
+stands beside it, so that two instruments can be aligned.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ import numpy as np
 import pandas as pd
 
 from rotorid.io import rawlog, wire
-from rotorid.io.frames import DATA, END, START, StreamDecoder
-from rotorid.io.sequence import Gap, Quality, Tracker
-from rotorid.io.session import Session, SessionError, read_session, session_path
+from rotorid.io.frames import DATA, END, START
+from rotorid.io.intake import Intake
+from rotorid.io.sequence import Gap, Quality
+from rotorid.io.session import Ended, Session, SessionError, read_session, session_path
+from rotorid.io.wire.base import STREAMING
 
 
 class LogError(ValueError):
@@ -49,70 +52,143 @@ class Log:
     repeated: int
     resets: int
     cut_at: int | None
+    malformed: int = 0  # frames whose checksum fits and whose content does not
+    unknown_kinds: int = 0
+    missing_outside_gaps: int = 0  # before the first and behind the last frame, by the device's and recorder's counts
+    damaged_bytes: int = 0  # of the file, not of the line
+    faults: tuple[str, ...] = ()  # a sentence each: in what the file is not what the recorder wrote
 
     @property
     def complete(self) -> bool:
-        """Whole file, end record there, nothing missing."""
-        return self.cut_at is None and self.end is not None and not self.gaps
+        """The file as it was written, end record there, nothing missing."""
+        return not self.faults and self.cut_at is None and self.end is not None and not self.missing
 
     @property
     def missing(self) -> int:
-        return sum(gap.count for gap in self.gaps)
+        """Samples that were sent, or recorded, and are not in the table."""
+        return sum(gap.count for gap in self.gaps) + self.missing_outside_gaps
 
 
 def read_log(path: str | Path) -> Log:
-    """Parse a raw log (`.rlog` or `.rlog.gz`), whole or cut.
+    """Parse a raw log (`.rlog` or `.rlog.gz`), whole, cut or damaged.
 
-    Raises LogError where no start record tells the instrument (and no metadata does either), NotALog where
-    the file is none, OSError where there is no file.
+    Raises LogError where no start record tells the instrument (and no metadata does either) or where the log and
+    the metadata beside it are of two recordings, NotALog where the file is none, OSError where there is no file.
     """
     path = Path(path)
     raw = rawlog.read_raw(path)
     session = _session_of(path)
-    decoder, tracker = StreamDecoder(), Tracker()
-    start = end = None
+    _same_recording(path, raw, session)
+    intake = Intake(wire.INSTRUMENTS.get(session.instrument) if session is not None else None)
+    starts: list[wire.StartRecord] = []
+    end = None
     origin_ns = raw.chunks[0].host_ns if raw.chunks else 0
     places, hosts, payloads = [], [], []
     notes: list[tuple[float, dict]] = []
-    for chunk in raw.chunks:
-        host_ns = chunk.host_ns - origin_ns
-        if chunk.tag == rawlog.NOTE:
-            note = json.loads(chunk.data)
+    before_stream = 0  # samples sent before the latest stream began
+
+    def sent_so_far() -> int:
+        return len(places) + intake.tracker.missing + intake.malformed_samples
+
+    for piece in raw.pieces():
+        if isinstance(piece, rawlog.Damage):
+            if piece.rescued is None:
+                intake.decoder.break_off()
+                continue
+            piece = piece.rescued
+        host_ns = piece.host_ns - origin_ns
+        if piece.tag == rawlog.NOTE:
+            note = _note(piece.data)
             notes.append((host_ns / 1e9, note))
             if note.get("note") == "port_lost":
-                decoder.break_off()
-        if chunk.tag != rawlog.RECEIVED:
+                intake.decoder.break_off()
+        if piece.tag != rawlog.RECEIVED:
             continue
-        for frame in decoder.feed(chunk.data):
-            place = tracker.place(frame)
-            if place is None:
-                continue
-            if frame.kind == DATA:
+        for kind, place, content in intake.feed(piece.data):
+            if kind == DATA:
                 places.append(place)
                 hosts.append(host_ns)
-                payloads.append(frame.payload)
-            elif frame.kind == START:
-                start = wire.StartRecord.unpack(frame.payload)
-            elif frame.kind == END:
-                end = wire.EndRecord.unpack(frame.payload)
-    instrument = _instrument(path, start, session)
-    if start is None:
+                payloads.append(content)
+            elif kind == START:
+                starts.append(content)
+                intake.instrument = wire.INSTRUMENTS.get(content.instrument, intake.instrument)
+                if content.reason == STREAMING:
+                    before_stream = sent_so_far()
+            elif kind == END:
+                end = content
+                reached = sent_so_far() - before_stream
+    instrument, fault = _instrument(path, starts, session)
+    fitting = [
+        number for number, payload in enumerate(payloads) if len(payload) == instrument.layout.size and not fault
+    ]
+    malformed = len(payloads) - len(fitting)
+    unseen = max(0, end.sent - reached) if end is not None else 0
+    if session is not None and session.ended != Ended.RECORDING:
+        counts = session.counts
+        unseen = max(unseen, counts.samples + counts.missing + (counts.malformed_samples or 0) - sent_so_far())
+    faults = [*([fault] if fault else []), *_faults(raw, session)]
+    if starts:
+        start = starts[-1]
+    else:
         start = wire.StartRecord(0, instrument.interval_us, 0, instrument.name, "unknown", "unknown")
+    kept = [[values[number] for number in fitting] for values in (places, hosts, payloads)]
     return Log(
         path=path,
         instrument=instrument,
-        table=_table(path, instrument, places, hosts, payloads),
+        table=_table(instrument, *kept),
         start=start,
         end=end,
         session=session,
         notes=notes,
-        gaps=list(tracker.gaps),
-        checksum_errors=decoder.checksum_errors,
-        broken_frames=decoder.broken_frames,
-        repeated=tracker.repeated,
-        resets=tracker.resets,
+        gaps=list(intake.tracker.gaps),
+        checksum_errors=intake.decoder.checksum_errors,
+        broken_frames=intake.decoder.broken_frames,
+        repeated=intake.tracker.repeated,
+        resets=intake.tracker.resets,
         cut_at=raw.cut_at,
+        malformed=intake.malformed + malformed,
+        unknown_kinds=intake.unknown_kinds,
+        missing_outside_gaps=unseen,
+        damaged_bytes=raw.lost_bytes,
+        faults=tuple(faults),
     )
+
+
+def _note(data: bytes) -> dict:
+    """A note of the recorder; one that is no JSON object (its checksum fits: someone else wrote it) says nothing."""
+    try:
+        note = json.loads(data)
+    except ValueError:
+        return {}
+    return note if isinstance(note, dict) else {}
+
+
+def _same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> None:
+    """Raises LogError where the log's own name is not that of the metadata beside it."""
+    if session is None:
+        return
+    for chunk in raw.chunks:
+        if chunk.tag == rawlog.NOTE and _note(chunk.data).get("note") == "begin":
+            name = _note(chunk.data).get("id")
+            if name is not None and name != session.id:
+                raise LogError(
+                    f"{path}: holds the recording {name!r}, and the metadata beside it are those of {session.id!r}; "
+                    "put the right file back"
+                )
+            return
+
+
+def _faults(raw: rawlog.RawLog, session: Session | None) -> list[str]:
+    """What is not as it was written, a sentence each."""
+    faults = []
+    if raw.damages:
+        first = raw.damages[0].start
+        places = f"{len(raw.damages)} places" if len(raw.damages) > 1 else "one place"
+        faults.append(f"damaged in {places}, {raw.lost_bytes} bytes, first at byte {first}; the rest is read")
+    expected = session.log_sha256 if session is not None else None
+    if expected is not None and raw.sha256 != expected:
+        faults.append(f"not the bytes that were recorded: SHA-256 {raw.sha256[:12]}…, by the metadata {expected[:12]}…")
+    return faults
 
 
 def _session_of(path: Path) -> Session | None:
@@ -124,25 +200,27 @@ def _session_of(path: Path) -> Session | None:
         return None
 
 
-def _instrument(path: Path, start: wire.StartRecord | None, session: Session | None) -> wire.Instrument:
-    name = start.instrument if start else session.instrument if session else None
+def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | None) -> tuple[wire.Instrument, str]:
+    """Who wrote the log, and a sentence where that is an instrument we do not know: its samples cannot be read."""
+    named = [start.instrument for start in starts]
+    for name in reversed(named):
+        if name in wire.INSTRUMENTS:
+            return wire.INSTRUMENTS[name], ""
+    name = named[-1] if named else session.instrument if session else None
     if name is None:
         raise LogError(
             f"{path}: no start record in it and no {session_path(path).name} beside it, "
             "so nothing says which instrument wrote it"
         )
-    if name not in wire.INSTRUMENTS:
-        raise LogError(f"{path}: unknown instrument {name!r}; known are {', '.join(wire.INSTRUMENTS)}")
-    return wire.INSTRUMENTS[name]
+    known = f"unknown instrument {name!r}; known are {', '.join(wire.INSTRUMENTS)}"
+    if name in wire.INSTRUMENTS:
+        return wire.INSTRUMENTS[name], ""
+    if session is None or session.instrument not in wire.INSTRUMENTS:
+        raise LogError(f"{path}: {known}")
+    return wire.INSTRUMENTS[session.instrument], known
 
 
-def _table(path: Path, instrument: wire.Instrument, places, hosts, payloads) -> pd.DataFrame:
-    for payload in payloads:
-        if len(payload) != instrument.layout.size:
-            raise LogError(
-                f"{path}: a {instrument.name} sample has {instrument.layout.size} bytes, "
-                f"here is one of {len(payload)}; does the firmware fit this version's wire format?"
-            )
+def _table(instrument: wire.Instrument, places, hosts, payloads) -> pd.DataFrame:
     dtype = np.dtype([(c.column, "<" + _NUMPY[c.code]) for c in instrument.channels])
     counts = np.frombuffer(b"".join(payloads), dtype=dtype)
     where = np.array(places, dtype=np.int64).reshape(-1, 4)

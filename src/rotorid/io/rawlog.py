@@ -3,8 +3,9 @@
     "ROTORLOG1\\n"  then chunks:  tag u8 | monotonic time u64, ns | length u16 | bytes | CRC-16 of the chunk
 
 Tags: `R` received from the instrument, `T` sent to it, `N` a note of the recorder (JSON, one object).
-Nothing is ever rewritten, so a file cut off anywhere is readable up to the cut. A finished log may be
-kept gzipped (`.rlog.gz`); the reader takes both, and cut ones of both.
+Nothing is ever rewritten, so a file cut off anywhere is readable up to the cut. Behind bytes that were changed
+the reader goes on with the next intact chunk. A finished log may be kept gzipped (`.rlog.gz`); the reader takes
+both, and cut and damaged ones of both.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import zlib
 from binascii import crc_hqx
 from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +24,7 @@ CHUNK_HEAD = struct.Struct("<BQH")
 CHUNK_TAIL = struct.Struct("<H")
 MAX_CHUNK = 0xFFFF
 RECEIVED, SENT, NOTE = ord("R"), ord("T"), ord("N")
+_TAGS = frozenset((RECEIVED, SENT, NOTE))
 
 
 class NotALog(ValueError):
@@ -36,13 +39,42 @@ class Chunk(NamedTuple):
     data: bytes
 
 
+class Damage(NamedTuple):
+    """Bytes `start` up to `stop` of the unpacked file that are no intact chunk; `after` chunks come before them.
+
+    `rescued`: what a damaged chunk of received bytes holds, where its length still fits; the frames in it have
+    checksums of their own.
+    """
+
+    start: int
+    stop: int
+    after: int
+    rescued: Chunk | None
+
+
 @dataclass(frozen=True)
 class RawLog:
-    """All chunks up to the end or the cut. `cut_at` is the byte (of the unpacked file) where a cut or
-    damaged chunk begins, None for a whole log."""
+    """All intact chunks. `cut_at` is the byte (of the unpacked file) behind which nothing is intact, None for a
+    log that goes to its end; `damages` are the places before that where bytes were changed; `sha256` is that of
+    the unpacked file as it is."""
 
     chunks: tuple[Chunk, ...]
     cut_at: int | None
+    damages: tuple[Damage, ...] = ()
+    sha256: str = ""
+
+    @property
+    def lost_bytes(self) -> int:
+        """Bytes of the file in damaged places, not counting the end that a cut took."""
+        return sum(damage.stop - damage.start for damage in self.damages)
+
+    def pieces(self) -> Iterator[Chunk | Damage]:
+        """Chunks and damages in the order of the file."""
+        damages = list(self.damages)
+        for number, chunk in enumerate(self.chunks):
+            while damages and damages[0].after <= number:
+                yield damages.pop(0)
+            yield chunk
 
 
 def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
@@ -56,38 +88,73 @@ def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
 
 
 def read_raw(path: str | Path) -> RawLog:
-    """Read a log, whole or cut, plain or gzipped. Raises NotALog, or OSError where there is no file."""
+    """Read a log, whole, cut or damaged, plain or gzipped. Raises NotALog, or OSError where there is no file."""
     data = Path(path).read_bytes()
     truncated = False
     if data[:2] == b"\x1f\x8b":
-        unpacker = zlib.decompressobj(wbits=31)
-        try:
-            data = unpacker.decompress(data)
-            truncated = not unpacker.eof
-        except zlib.error as error:
-            raise NotALog(f"{path}: damaged gzip stream ({error}); fetch the file again") from error
+        data, truncated = _unpacked(data)
     if not MAGIC.startswith(data[: len(MAGIC)]):
         raise NotALog(f"{path}: does not begin with {MAGIC!r}, so it is no raw log of rotorid-acquire")
+    digest = sha256(data).hexdigest()
     if len(data) < len(MAGIC):  # cut inside the first ten bytes: a log with nothing in it
-        return RawLog((), len(data))
-    chunks = []
-    position = len(MAGIC)
-    for chunk, end in _walk(data, position):
+        return RawLog((), len(data), sha256=digest)
+    chunks, damages, position = [], [], len(MAGIC)
+    for chunk, begin, end in _walk(data, len(MAGIC)):
+        if begin > position:
+            damages.append(Damage(position, begin, len(chunks), _rescued(data, position, begin, chunks, chunk)))
         chunks.append(chunk)
         position = end
     cut = position if truncated or position < len(data) else None
-    return RawLog(tuple(chunks), cut)
+    return RawLog(tuple(chunks), cut, tuple(damages), digest)
 
 
-def _walk(data: bytes, position: int) -> Iterator[tuple[Chunk, int]]:
-    """Intact chunks and where each ends, up to the first that is cut or damaged."""
+def _unpacked(data: bytes) -> tuple[bytes, bool]:
+    """What a gzip stream holds up to its end or to where it is damaged, and whether that is less than all."""
+    unpacker, out = zlib.decompressobj(wbits=31), []
+    try:
+        for start in range(0, len(data), 512):  # in small pieces: an error costs no more than one of them
+            out.append(unpacker.decompress(data[start : start + 512]))
+    except zlib.error:
+        return b"".join(out), True
+    return b"".join(out), not unpacker.eof
+
+
+def _walk(data: bytes, position: int) -> Iterator[tuple[Chunk, int, int]]:
+    """Intact chunks, each with where it begins and ends; what lies between two of them is damaged."""
+    last_ns = 0
     while position + CHUNK_HEAD.size + CHUNK_TAIL.size <= len(data):
-        tag, host_ns, length = CHUNK_HEAD.unpack_from(data, position)
-        body_end = position + CHUNK_HEAD.size + length
-        if body_end + CHUNK_TAIL.size > len(data):
-            return
-        if crc_hqx(data[position:body_end], 0xFFFF) != CHUNK_TAIL.unpack_from(data, body_end)[0]:
-            return
-        position_of_data = position + CHUNK_HEAD.size
-        position = body_end + CHUNK_TAIL.size
-        yield Chunk(tag, host_ns, data[position_of_data:body_end]), position
+        chunk = _chunk_at(data, position)
+        # behind a damage any two bytes may look like a checksum: the time, too, has to go on
+        if chunk is not None and chunk.host_ns >= last_ns:
+            last_ns = chunk.host_ns
+            end = position + CHUNK_HEAD.size + len(chunk.data) + CHUNK_TAIL.size
+            yield chunk, position, end
+            position = end
+        else:
+            position += 1
+
+
+def _chunk_at(data: bytes, position: int) -> Chunk | None:
+    """The chunk that begins at a byte, None where none does."""
+    if data[position] not in _TAGS:
+        return None
+    tag, host_ns, length = CHUNK_HEAD.unpack_from(data, position)
+    begin = position + CHUNK_HEAD.size
+    end = begin + length
+    if end + CHUNK_TAIL.size > len(data):
+        return None
+    if crc_hqx(data[position:end], 0xFFFF) != CHUNK_TAIL.unpack_from(data, end)[0]:
+        return None
+    return Chunk(tag, host_ns, data[begin:end])
+
+
+def _rescued(data: bytes, start: int, stop: int, before: list[Chunk], following: Chunk) -> Chunk | None:
+    """The content of one damaged chunk of received bytes whose length still leads to the next chunk."""
+    if stop - start < CHUNK_HEAD.size + CHUNK_TAIL.size:
+        return None
+    tag, host_ns, length = CHUNK_HEAD.unpack_from(data, start)
+    if tag != RECEIVED or start + CHUNK_HEAD.size + length + CHUNK_TAIL.size != stop:
+        return None
+    earliest = before[-1].host_ns if before else 0
+    content = data[start + CHUNK_HEAD.size : stop - CHUNK_TAIL.size]
+    return Chunk(tag, min(max(host_ns, earliest), following.host_ns), content)

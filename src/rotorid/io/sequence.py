@@ -11,8 +11,10 @@ from typing import NamedTuple
 
 from rotorid.io import wire
 from rotorid.io.frames import CLOCK_PERIOD_US, DATA, SEQUENCE_PERIOD, START, Frame
+from rotorid.io.wire.base import BOOTED
 
 UNKNOWN_BOOT = -1  # a reset was noticed whose start record never came
+LATE_US = 1_000_000  # a frame that comes late or twice is not older than this
 
 
 class Quality(IntFlag):
@@ -52,9 +54,9 @@ class Placed(NamedTuple):
 class Tracker:
     """Unwraps sequence numbers (u16) and device clocks (u32 µs) and notices what is missing.
 
-    A reset shows as a start record with another boot id, or, should that record be lost, as an old sequence
-    number with a clock that does not fit it; sequence and clock then begin anew in a new segment. A gap
-    that spans half the sequence's period or more is counted with the help of the clock.
+    A reset shows as a start record with another boot id, or, should that record be lost or the boot id be the
+    same, as an old sequence number with a clock that does not fit it; sequence and clock then begin anew in a
+    new segment. A gap that spans half the sequence's period or more is counted with the help of the clock.
     """
 
     def __init__(self) -> None:
@@ -68,6 +70,7 @@ class Tracker:
         self.gaps: list[Gap] = []
         self._index: int | None = None  # the youngest frame's
         self._clock = 0
+        self._origin = (0, 0)  # index and clock of the segment's first frame
         self._kind = START
         self._rollovers = 0
         self._flags = Quality.GOOD  # for the next sample
@@ -79,8 +82,8 @@ class Tracker:
 
     def place(self, frame: Frame) -> Placed | None:
         """The frame's place, or None for a frame that was here before."""
-        if frame.kind == START:
-            record = wire.StartRecord.unpack(frame.payload)
+        record = _start_record(frame)
+        if record is not None:
             self.interval_us = record.interval_us or self.interval_us
             if self.boot_id == UNKNOWN_BOOT:
                 self.boot_id = record.boot_id
@@ -95,6 +98,9 @@ class Tracker:
             if self._contradicts(step, ticks):
                 self._begin_segment(UNKNOWN_BOOT)
                 return self._first(frame)
+        elif self._began_anew(step, ticks, record):
+            self._begin_segment(UNKNOWN_BOOT if record is None else record.boot_id)
+            return self._first(frame)
         index, clock = self._index + step, self._clock + ticks
         if step <= 0:
             return self._old(index, clock)
@@ -109,6 +115,7 @@ class Tracker:
         if self.segment < 0:
             self.segment = 0
         self._index, self._clock, self._kind = frame.sequence, frame.clock_us, frame.kind
+        self._origin = (self._index, self._clock)
         return Placed(self.segment, self._index, self._clock, self._take_flags(frame))
 
     def _begin_segment(self, boot_id: int) -> None:
@@ -141,6 +148,22 @@ class Tracker:
             return False
         return abs(ticks - step * self.interval_us) > max(1_000_000, ticks // 100) + 50 * self.interval_us
 
+    def _began_anew(self, step: int, ticks: int, record: wire.StartRecord | None) -> bool:
+        """Whether an old sequence number is that of a device that restarted with the boot id it had before.
+
+        A frame that came late or twice is old by its sequence and by its clock, and by no more than a second; the
+        first record of a boot that is not the one already seen needs no such patience.
+        """
+        if step > 0:
+            return False
+        if record is not None and record.reason == BOOTED:
+            return (self._index + step, self._clock + ticks) != self._origin
+        return abs(ticks) > LATE_US + 50 * (self.interval_us or 0)
+
+    def unreadable(self) -> None:
+        """The frame just placed holds no sample: the next sample says that one is missing before it."""
+        self._flags |= Quality.AFTER_GAP
+
     def _old(self, index: int, clock: int) -> Placed | None:
         for i in range(len(self.gaps) - 1, -1, -1):  # a late frame's gap is one of the last
             gap = self.gaps[i]
@@ -161,6 +184,16 @@ def _split(gap: Gap, index: int, clock_s: float) -> list[Gap]:
         Gap(gap.segment, index + 1, after, clock_s, gap.stop_s),
     ]
     return [part for part in parts if part.count]
+
+
+def _start_record(frame: Frame) -> wire.StartRecord | None:
+    """What a start record says; None for other frames, and for a record that makes no sense."""
+    if frame.kind != START:
+        return None
+    try:
+        return wire.StartRecord.unpack(frame.payload)
+    except wire.Malformed:
+        return None
 
 
 def _signed(difference: int, period: int) -> int:

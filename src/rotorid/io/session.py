@@ -27,6 +27,9 @@ class Ended(StrEnum):
     DEVICE_RESET = "device_reset"
     REFUSED = "refused"
     DISK_FULL = "disk_full"
+    DEVICE_FAULT = "device_fault"
+    GAVE_UP = "gave_up"
+    LIMIT_EXCEEDED = "limit_exceeded"
     FAILED = "failed"
 
 
@@ -112,6 +115,10 @@ class Counts(_Model):
     clock_rollovers: int = 0
     port_losses: int = 0
     device_skipped: int = 0  # samples the device itself said it had to skip
+    # absent where there were none, which is nearly always
+    malformed: int | None = None  # frames with a right checksum and a content that is none
+    malformed_samples: int | None = None  # those of them that should have been samples
+    unknown_kinds: int | None = None  # frames of a kind that this version does not know
 
 
 class Session(_Model):
@@ -123,7 +130,7 @@ class Session(_Model):
     instrument: str
     firmware: str | None = None
     serial_number: str | None = None
-    source: str | None = None  # instrument | emulator, as the device itself says
+    source: str | None = None  # instrument | emulator
     started: str  # ISO 8601 with offset
     host_start_ns: int  # the host's monotonic clock at that moment; comparable within a group
     port: str | None = None

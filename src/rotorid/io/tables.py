@@ -29,7 +29,8 @@ def read_tables(paths: Iterable[str | Path]) -> tuple[pd.DataFrame, pd.DataFrame
     Raises
     ------
     InputError
-        No logs, logs of different instruments, a log without its metadata, or two of the same id.
+        No logs, logs of different instruments, a log without its metadata or with bytes that are not those of the
+        recording, or two of the same id.
     """
     logs = [read_log(path) for path in paths]
     if not logs:
@@ -37,6 +38,8 @@ def read_tables(paths: Iterable[str | Path]) -> tuple[pd.DataFrame, pd.DataFrame
     for log in logs:
         if log.session is None:
             raise InputError(f"{log.path}: its metadata file is missing, so nobody knows what was measured")
+        if log.faults and not log.damaged_bytes and log.cut_at is None:
+            raise InputError(f"{log.path}: {log.faults[0]}; put the right file back")
         if log.instrument.name != logs[0].instrument.name:
             raise InputError(f"{log.path}: is of a {log.instrument.name}, expected one of a {logs[0].instrument.name}")
     logs.sort(key=lambda log: (log.session.started, log.session.id))
@@ -69,11 +72,14 @@ def _row(log: Log) -> dict:
         "rate_hz": _rate(log.table["time_s"].to_numpy()),
         "flagged": flagged,
         "missing": log.missing,
-        "damaged": log.checksum_errors + log.broken_frames,
+        "damaged": log.checksum_errors + log.broken_frames + log.malformed,
+        "damaged_bytes": log.damaged_bytes,
         "repeated": log.repeated,
         "resets": log.resets,
         "complete": log.complete,
-        "finished": session.ended == Ended.FINISHED,
+        "faults": "; ".join(log.faults),
+        # a cut log has lost its end, whatever its metadata say
+        "finished": session.ended == Ended.FINISHED and log.cut_at is None,
         **{f"mark_{name}": place for name, place in session.marks.items()},
     }
 

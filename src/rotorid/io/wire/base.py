@@ -8,10 +8,28 @@ from functools import cached_property
 from typing import NamedTuple
 
 BOOTED, ASKED, STREAMING = 0, 1, 2  # why a start record is sent
-STOPPED, COMPLETE, FAULT = 0, 1, 2  # why a stream ended
+STOPPED, COMPLETE, FAULT, UNHEARD = 0, 1, 2, 3  # why a stream ended; 3: the watchdog heard no computer
 OK, REFUSED, UNKNOWN = 0, 1, 2  # how a command was taken
 
 IDENTIFY, GO, STOP = "?", "G", "X"  # commands that every instrument knows
+KEEP = "K"  # the watchdog of everything that moves: u16 in ms
+_KEEP = struct.Struct("<H")
+
+
+class Malformed(ValueError):
+    """A frame whose checksum fits, but whose payload is not what its kind says."""
+
+
+def pack_keep(timeout_s: float) -> bytes:
+    """Arguments of the watchdog command: how long the device goes on without hearing from the computer."""
+    if not 0 < timeout_s <= 65.5:
+        raise ValueError(f"a watchdog waits for more than 0 and at most 65.5 s, not {timeout_s}")
+    return _KEEP.pack(round(timeout_s * 1e3))
+
+
+def unpack_keep(arguments: bytes) -> float:
+    """Time in s. Raises struct.error for arguments of another length."""
+    return _KEEP.unpack(arguments)[0] / 1e3
 
 
 class StartRecord(NamedTuple):
@@ -32,9 +50,17 @@ class StartRecord(NamedTuple):
 
     @classmethod
     def unpack(cls, payload: bytes) -> StartRecord:
-        boot_id, interval_us, reason = cls._LAYOUT.unpack_from(payload)
-        instrument, firmware, serial_number = payload[cls._LAYOUT.size :].decode().split("\0")
-        return cls(boot_id, interval_us, reason, instrument, firmware, serial_number)
+        """Raises Malformed for a record too short, without its three strings, or with text that is no UTF-8."""
+        size = cls._LAYOUT.size
+        if len(payload) < size:
+            raise Malformed(f"a start record has at least {size} bytes, this one has {len(payload)}")
+        try:
+            strings = payload[size:].decode().split("\0")
+        except UnicodeDecodeError as error:
+            raise Malformed(f"a start record's strings are UTF-8, these are not ({error})") from error
+        if len(strings) != 3:
+            raise Malformed(f"a start record has 3 strings (instrument, firmware, serial number), not {len(strings)}")
+        return cls(*cls._LAYOUT.unpack_from(payload), *strings)
 
 
 class EndRecord(NamedTuple):
@@ -51,6 +77,9 @@ class EndRecord(NamedTuple):
 
     @classmethod
     def unpack(cls, payload: bytes) -> EndRecord:
+        """Raises Malformed for a record of another length."""
+        if len(payload) != cls._LAYOUT.size:
+            raise Malformed(f"an end record has {cls._LAYOUT.size} bytes, this one has {len(payload)}")
         return cls(*cls._LAYOUT.unpack(payload))
 
 
@@ -66,6 +95,9 @@ class Answer(NamedTuple):
 
     @classmethod
     def unpack(cls, payload: bytes) -> Answer:
+        """Raises Malformed for an answer without letter and status."""
+        if len(payload) < 2:
+            raise Malformed(f"an answer has at least 2 bytes, this one has {len(payload)}")
         return cls(chr(payload[0]), payload[1], payload[2:].decode(errors="replace"))
 
 
@@ -110,8 +142,14 @@ class Instrument:
         return self.layout.pack(*(min(max(n, c.low), c.high) for n, c in zip(counts, self.channels, strict=True)))
 
     def decode(self, payload: bytes) -> tuple[float, ...]:
-        """Values in the columns' units. Raises struct.error where the payload has another length."""
+        """Values in the columns' units. Raises Malformed where the payload has another length."""
+        self.check(payload)
         return tuple(n * s for n, s in zip(self.layout.unpack(payload), self.scales, strict=True))
+
+    def check(self, payload: bytes) -> None:
+        """Raises Malformed where a sample's payload has another length."""
+        if len(payload) != self.layout.size:
+            raise Malformed(f"a {self.name} sample has {self.layout.size} bytes, this one has {len(payload)}")
 
 
 def counts(columns: list[str], code: str, scale: float, high: int, low: int | None = None) -> tuple:
@@ -123,4 +161,7 @@ COMMON_COMMANDS = {
     IDENTIFY: "say who you are (a start record)",
     GO: "start to stream; interval u32 in µs, 0 for the instrument's own",
     STOP: "stop the stream",
+}
+WATCHDOG = {
+    KEEP: "watchdog, u16 in ms: when no intact command has come for so long, what moves is stopped and the stream ended"
 }

@@ -7,7 +7,7 @@ what each motor does: a trapezoid (ramp up, hold, ramp down) or a sine between z
 import struct
 from typing import NamedTuple
 
-from rotorid.io.wire.base import COMMON_COMMANDS, Channel, Instrument
+from rotorid.io.wire.base import COMMON_COMMANDS, WATCHDOG, Channel, Instrument
 
 THROTTLE_SCALE = 1e-4
 RED, YELLOW, GREEN = 0, 1, 2  # no motor turns, speeds change, speeds constant
@@ -33,6 +33,7 @@ INSTRUMENT = Instrument(
         Channel("led", "B", 1, 0, 3, reading=False),
     ),
     commands={letter: text for letter, text in COMMON_COMMANDS.items() if letter != "G"}
+    | WATCHDOG
     | {letter: f"run a programme: {text}" for letter, text in DYNAMICS.items()},
 )
 

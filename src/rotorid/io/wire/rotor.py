@@ -2,7 +2,7 @@
 
 import struct
 
-from rotorid.io.wire.base import COMMON_COMMANDS, Channel, Instrument
+from rotorid.io.wire.base import COMMON_COMMANDS, WATCHDOG, Channel, Instrument
 
 THROTTLE = "T"
 _THROTTLE = struct.Struct("<HH")
@@ -21,6 +21,7 @@ INSTRUMENT = Instrument(
         Channel("battery_current_a", "H", 1e-3, 0, 50_000),
     ),
     commands=COMMON_COMMANDS
+    | WATCHDOG
     | {
         THROTTLE: "throttle u16 in 1e-4, hold u16 in ms; the motor stops by itself when the time is over, "
         "so that a host that died leaves no motor running"

@@ -1,6 +1,6 @@
 """The tensile tester (thesis 2.6.4): 10 mm/min, ten samples a second, 40 mm between the grips."""
 
-from rotorid.io.wire.base import COMMON_COMMANDS, Channel, Instrument
+from rotorid.io.wire.base import COMMON_COMMANDS, WATCHDOG, Channel, Instrument
 
 INSTRUMENT = Instrument(
     name="tensile",
@@ -11,5 +11,5 @@ INSTRUMENT = Instrument(
         Channel("displacement_mm", "i", 1e-4, -1_000_000, 1_000_000),
         Channel("force_n", "i", 0.1, -50_000, 50_000),
     ),
-    commands=COMMON_COMMANDS,
+    commands=COMMON_COMMANDS | WATCHDOG,
 )

@@ -1,0 +1,151 @@
+"""Instruments that send plain lines of text and cannot be taught our frames, read by a small description.
+
+    name: jr3-text
+    baud_rate: 9600
+    form: csv                # csv, key=value, or fixed (places in the line)
+    separator: ","           # of csv and key=value; left out: any white space
+    columns:
+      force_x_n: {field: 0, scale: 4.44822}     # value = scale × number; csv: the field's number from 0
+      force_z_n: {field: 2, scale: 4.44822}     # key=value: the key; fixed: {start: 10, stop: 18}
+
+The raw log keeps the bytes as they came, and the metadata the description, so a better one can be applied later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import pandas as pd
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from rotorid.io.rawlog import RECEIVED, read_raw
+from rotorid.io.session import SessionError, read_session, session_path
+
+MAX_LINE = 4096
+
+
+class DescriptionError(ValueError):
+    """The description is not what it should be; the sentence names file and place."""
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class Column(_Model):
+    """Where a column's number stands in a line."""
+
+    field: int | str | None = None
+    start: int | None = None
+    stop: int | None = None
+    scale: float = 1.0
+
+
+class Description(_Model):
+    """How an instrument's lines are read."""
+
+    name: str
+    baud_rate: int = 9600
+    form: Literal["csv", "key=value", "fixed"] = "csv"
+    separator: str | None = None
+    begin: str = ""  # sent to start it, escapes as in YAML: "R\r\n"
+    end: str = ""  # sent to stop it
+    columns: dict[str, Column]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Description:
+        for name, column in self.columns.items():
+            if self.form == "fixed" and (column.start is None or column.stop is None):
+                raise ValueError(f"columns.{name}: form `fixed` needs `start` and `stop`")
+            wanted = {"csv": int, "key=value": str}.get(self.form)
+            if wanted is not None and not isinstance(column.field, wanted):
+                what = "the field's number from 0" if wanted is int else "the key"
+                raise ValueError(f"columns.{name}: form `{self.form}` needs `field`, {what}")
+        return self
+
+    def values(self, line: str) -> tuple[float, ...]:
+        """The columns' values. Raises ValueError for a line that is none (a heading, a cut one)."""
+        if self.form == "fixed":
+            texts = [line[column.start : column.stop] for column in self.columns.values()]
+        else:
+            parts = [part.strip() for part in line.split(self.separator)]
+            if self.form == "csv":
+                found = dict(enumerate(parts))
+            else:
+                found = {key.strip(): value for key, sign, value in (part.partition("=") for part in parts) if sign}
+            try:
+                texts = [found[column.field] for column in self.columns.values()]
+            except KeyError as error:
+                raise ValueError(f"no field {error} in {line!r}") from error
+        return tuple(float(text) * column.scale for text, column in zip(texts, self.columns.values(), strict=True))
+
+
+def read_description(path: Path) -> Description:
+    """Read and validate. Raises DescriptionError."""
+    try:
+        return Description.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise DescriptionError(f"{path}: cannot be read ({error.strerror})") from error
+    except yaml.YAMLError as error:
+        raise DescriptionError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise DescriptionError(f"{path}: {'.'.join(map(str, first['loc'])) or 'file'}: {first['msg']}") from error
+
+
+class LineDecoder:
+    """Lines out of bytes that come as they like; counts those that are none. `unread` keeps the last such line."""
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        self.lines = 0
+        self.unreadable = 0
+        self.unread = ""
+        self._pending = b""
+
+    def feed(self, data: bytes) -> list[tuple[float, ...]]:
+        """Values of the lines that these bytes complete."""
+        *whole, self._pending = (self._pending + data).replace(b"\r", b"\n").split(b"\n")
+        self._pending = self._pending[-MAX_LINE:]
+        found = []
+        for line in whole:
+            text = line.decode(errors="replace").strip("\0")
+            if not text.strip():
+                continue
+            try:
+                found.append(self.description.values(text))
+                self.lines += 1
+            except ValueError:
+                self.unreadable += 1
+                self.unread = text[:120]
+        return found
+
+
+@dataclass(frozen=True)
+class LineLog:
+    """`table`: `host_time_s` (when the line's end was read, from the beginning of the log), `index` and the columns."""
+
+    table: pd.DataFrame
+    unreadable: int
+    cut_at: int | None
+    damaged_bytes: int
+
+
+def read_line_log(path: Path, description: Description | None = None) -> LineLog:
+    """Read a log of plain lines by its own description or by another. Raises SessionError, NotALog, OSError."""
+    if description is None:
+        stored = read_session(session_path(path)).procedure.get("description")
+        if stored is None:
+            raise SessionError(f"{session_path(path)}: holds no description of lines; is this a log of frames?")
+        description = Description.model_validate(stored)
+    raw, decoder, rows = read_raw(path), LineDecoder(description), []
+    for chunk in raw.chunks:
+        if chunk.tag == RECEIVED:
+            host_s = (chunk.host_ns - raw.chunks[0].host_ns) / 1e9
+            rows += [(host_s, *values) for values in decoder.feed(chunk.data)]
+    table = pd.DataFrame(rows, columns=["host_time_s", *description.columns])
+    table.insert(1, "index", range(len(table)))
+    return LineLog(table, decoder.unreadable, raw.cut_at, raw.lost_bytes)

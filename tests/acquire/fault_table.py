@@ -1,0 +1,29 @@
+"""The table of faults: what was tried, and what was seen before it was mended (or that it held from the first).
+
+`python -c "from tests.acquire.fault_table import show; show()"` prints it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+HELD = "held when it was first tried"
+TABLE: list[tuple[str, str, str]] = []  # fault, what was seen before, test
+
+
+def seen(fault: str, before: str = HELD) -> Callable:
+    """Enter a test into the table."""
+
+    def enter(test: Callable) -> Callable:
+        TABLE.append((fault, before, test.__name__))
+        return test
+
+    return enter
+
+
+def show() -> None:
+    """Print the table: fault, what was seen before, test."""
+    from tests.acquire import test_fault_table, test_faults  # noqa: F401 - importing them fills it
+
+    for fault, before, test in TABLE:
+        print(f"{fault}\t{before}\t{test}")
