@@ -228,8 +228,9 @@ def wake(s: Sheet):
     """Thrust overshoots until the wake has formed (Pitt and Peters): a lead that no id describes."""
     s.nature.wake, s.nature.wake_s = s.size(0.1, 0.5), s.rng.uniform(0.06, 0.2)
     acceptable = ["motor_lag", "delay", "rotor_acceleration_torque", "axial_inflow"]
-    s.outside.append({"id": "wake_memory", "acceptable": acceptable, "parameters": [
-        {"symbol": "share", "value": s.nature.wake, "unit": "-"}, {"symbol": "memory", "value": s.nature.wake_s, "unit": "s"}]})  # fmt: skip
+    told = (("share", s.nature.wake, "-"), ("memory", s.nature.wake_s, "s"))
+    listed = [{"symbol": a, "value": v, "unit": u} for a, v, u in told]
+    s.outside.append({"id": "wake_memory", "acceptable": acceptable, "parameters": listed})
     s.styles, s.log = ("stir", "bob", "stir", "survey"), False
 
 

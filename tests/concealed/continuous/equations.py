@@ -90,7 +90,9 @@ def turn_matrix(q):
 
 
 @njit(cache=True)
-def slope(t, y, path, gusts, c, hubs, spin, gain, centre, inertia, flown_inertia, unturned, inverse, areas, damping, wind):
+def slope(
+    t, y, path, gusts, c, hubs, spin, gain, centre, inertia, flown_inertia, unturned, inverse, areas, damping, wind
+):
     """Time derivative of the state, and at its end the specific force at the believed origin (3)."""
     (mass, thrust_c, torque_c, radius, hover, lag, second, tilt_x, tilt_y, blades, axiswise, hub_moment, sag, limit,
      sail, wake_s, wake, solidity, pitch, loop, capacity, g) = c  # fmt: skip
@@ -232,12 +234,15 @@ def parameters(craft: Craft, nature: Nature, seconds: float):
     )  # fmt: skip
     gain = np.ones(n) if nature.gain is None else nature.gain
     flown = craft.inertia if nature.inertia is None else nature.inertia
-    return (tuple(float(x) for x in c), craft.hubs, craft.spin, gain, nature.centre, craft.inertia, flown, np.linalg.inv(flown),
+    back = np.linalg.inv(flown)
+    return (tuple(float(x) for x in c), craft.hubs, craft.spin, gain, nature.centre, craft.inertia, flown, back,
             np.linalg.pinv(effect), nature.area, nature.damping, nature.wind)  # fmt: skip
 
 
 @njit(cache=True)
-def forces_at(times, states, path, gusts, c, hubs, spin, gain, centre, inertia, flown, back, inverse, areas, damping, wind):
+def forces_at(
+    times, states, path, gusts, c, hubs, spin, gain, centre, inertia, flown, back, inverse, areas, damping, wind
+):
     """Specific force at the believed origin, (k, 3), of a solution."""
     out = np.empty((len(times), 3))
     for i in range(len(times)):

@@ -45,7 +45,9 @@ def path(seconds: float, style: str, rng: np.random.Generator, scale: float, sma
         for axis in (0, 1):
             at = np.sort(rng.uniform(3, seconds - 4, 4))
             steps = rng.uniform(-4, 4, 4) * reach
-            place[:, axis] += sum(s * (smooth((t - a) / 3.0) - smooth((t - seconds + 6) / 4)) for s, a in zip(steps, at, strict=True))
+            place[:, axis] += sum(
+                s * (smooth((t - a) / 3.0) - smooth((t - seconds + 6) / 4)) for s, a in zip(steps, at, strict=True)
+            )
     heading = np.zeros(k)
     if style == "spin":
         heading = 2.5 * gate * np.sin(2 * np.pi * t / rng.uniform(6, 10))

@@ -1,7 +1,7 @@
 """Blade elements with uniform inflow after Glauert, as in Leishman's and Bramwell's textbooks.
 
-With advance ratios μ (in the disc) and μ_z (up through it, from above: positive in a climb), solidity σ, lift slope a, pitch θ
-at constant angle and profile drag C_d: C_T = σa/2 (θ/3 + θ μ²/2 − λ/2), λ = μ_z + C_T / (2 √(μ² + λ²)) and an
+With advance ratios μ (in the disc) and μ_z (through it from above: positive in a climb), solidity σ, lift slope a, one
+pitch θ along the blade and profile drag C_d: C_T = σa/2 (θ/3 + θ μ²/2 − λ/2), λ = μ_z + C_T / (2 √(μ² + λ²)) and an
 in-plane force C_H = σ C_d μ/4 + σ a μ λ θ/4. In still air C_T does not depend on the speed: thrust is C_F ω².
 """
 

@@ -50,6 +50,11 @@ class Draft:
             }
         )
 
+    def outside_with(self, id: str, acceptable, *parameters) -> None:
+        """Name a cause that no id of the catalogue covers, and the ids that would not be wrong names for it."""
+        listed = [{"symbol": s, "value": v, "unit": u} for s, v, u in parameters]
+        self.outside.append({"id": id, "acceptable": list(acceptable), "parameters": listed})
+
 
 def bodies(at, length, mass, links, cable, damping):
     """MJCF of a cable of rigid links on ball joints with a small heavy ball at its end."""
@@ -252,8 +257,7 @@ def sloshing(d: Draft) -> None:
     own = mass * np.diag([low**2, low**2, 0.0])
     j = q.inertia - own - rest * np.diag([centre[2] ** 2, centre[2] ** 2, 0.0])
     d.world.mass, d.world.centre, d.world.inertia = rest, centre, j
-    d.outside.append({"id": "slosh", "acceptable": ["payload"], "parameters": [
-        {"symbol": "mass", "value": mass, "unit": "kg"}, {"symbol": "frequency", "value": hz, "unit": "Hz"}]})  # fmt: skip
+    d.outside_with("slosh", ["payload"], ("mass", mass, "kg"), ("frequency", hz, "Hz"))
     d.kinds = ("waypoints", "figure", "shaking", "waypoints")
 
 
@@ -268,8 +272,7 @@ def tether(d: Draft) -> None:
         f'<spatial stiffness="{stiff}" damping="{0.05 * stiff}" springlength="0 {slack}">'
         '<site site="winch"/><site site="eye"/></spatial>'
     )
-    d.outside.append({"id": "tether", "acceptable": [], "parameters": [
-        {"symbol": "stiffness", "value": stiff, "unit": "N/m"}, {"symbol": "length", "value": slack, "unit": "m"}]})  # fmt: skip
+    d.outside_with("tether", [], ("stiffness", stiff, "N/m"), ("length", slack, "m"))
     d.kinds = ("waypoints", "figure", "vertical", "waypoints")
 
 
@@ -288,8 +291,7 @@ def loose_battery(d: Draft) -> None:
     )
     d.world.mass = q.mass - mass
     d.world.inertia = q.inertia - own * np.eye(3)
-    d.outside.append({"id": "loose_battery", "acceptable": [], "parameters": [
-        {"symbol": "mass", "value": mass, "unit": "kg"}, {"symbol": "frequency", "value": hz, "unit": "Hz"}]})  # fmt: skip
+    d.outside_with("loose_battery", [], ("mass", mass, "kg"), ("frequency", hz, "Hz"))
     d.kinds = ("vertical", "waypoints", "figure", "shaking")
 
 

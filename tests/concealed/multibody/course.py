@@ -14,7 +14,9 @@ def sweep(t, rng, lowest, highest, count):
     return np.sqrt(2 / count) * np.sin(2 * np.pi * f * t[:, None] + rng.uniform(0, 2 * np.pi, count)).sum(axis=1)
 
 
-def reference(seconds: float, kinds, rng: np.random.Generator, agility: float, base_m: float = 12.0, floor_m: float = 0.2):
+def reference(
+    seconds: float, kinds, rng: np.random.Generator, agility: float, base_m: float = 12.0, floor_m: float = 0.2
+):
     """(k, 13): position, velocity, acceleration in the world, heading, angular acceleration to inject (body).
 
     `agility` scales speeds and shaking; with `low` among the kinds all is flown between `floor_m` and about a metre

@@ -232,9 +232,11 @@ def fly(quad: Quad, world: World, reference: np.ndarray, noise: np.ndarray, band
         out["voltage"][i], out["current"][i] = voltage, current
         if m or world.lag > 0:
             speed = np.clip(speed + STEP * slope, 0.0, 1.2 * quad.top)
-        if data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number or data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number:
+        if (
+            data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number
+            or data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number
+        ):
             raise Lost(f"a hung body whipped about at {i * STEP:.1f} s")
         if i % 200 == 0 and not (np.abs(p - reference[i, :3]).max() < 12.0):
             raise Lost(f"strayed at {i * STEP:.1f} s")
     return out
-

@@ -119,7 +119,9 @@ def record(flight: dict, grade: Grade, hover: float, noise: np.ndarray, rng: np.
     if grade.vibration:
         phase = np.cumsum(flight["speed"], axis=0) * STEP + rng.uniform(0, 6.28, len(rotors))
         size = (flight["speed"] / hover) ** 2
-        shake = np.stack([(size * np.cos(phase)).sum(1), (size * np.sin(phase)).sum(1), (size * np.cos(phase + 1)).sum(1)], 1)
+        shake = np.stack(
+            [(size * np.cos(phase)).sum(1), (size * np.sin(phase)).sum(1), (size * np.cos(phase + 1)).sum(1)], 1
+        )
         sos = butter(2, 40.0, fs=1 / STEP, output="sos")
         rough = rough + grade.vibration * sosfilt(sos, shake, axis=0)[pick]
     put(three("specific_force", "m_s2"), f, rough)
@@ -129,4 +131,3 @@ def record(flight: dict, grade: Grade, hover: float, noise: np.ndarray, rng: np.
     if "height" in grade.groups:
         put(["height_m"], -flight["p"][pick][:, 2:], 0.005 * rng.standard_normal((k, 1)))
     return pd.DataFrame(ideal), pd.DataFrame(written)
-
