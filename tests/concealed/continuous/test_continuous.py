@@ -75,7 +75,8 @@ def test_blades_carry_the_vehicle_and_follow_momentum_theory():
     _, felt = derivative(Nature(lag=0.03, blades=1.0))
     assert felt == pytest.approx([0, 0, -craft.GRAVITY], rel=1e-5)
     climb, sink = (coefficients(0.0, m, 0.12, pitch)[0] for m in (0.01, -0.01))
-    # with k = σa/4 and λ = μ_z + C_T/2λ, in hover 2 dλ = dμ_z + dC_T/2λ: dC_T/dμ_z = −(k/2) / (1 + k/4λ), 4λ = 2 √(2 C_T)
+    # with k = σa/4 and λ = μ_z + C_T/2λ, in hover 2 dλ = dμ_z + dC_T/2λ, so that
+    # dC_T/dμ_z = −(k/2) / (1 + k/4λ) with 4λ = 2 √(2 C_T)
     k = 0.12 * 5.7 / 4
     slope_ = -0.5 * k / (1 + k / (2 * np.sqrt(2 * target)))
     assert (climb - sink) / 0.02 == pytest.approx(slope_, rel=0.05)
