@@ -52,7 +52,7 @@ def _shown(present: str, rows: pd.DataFrame) -> pd.DataFrame:
 
 def provenance(row: pd.Series, present: str) -> str:
     """Whether older code judged a row's cases, and how many of them are development cases."""
-    said = [] if row["judged_by"] == present else ["older code"]
+    said = [] if pd.isna(row["judged_by"]) or row["judged_by"] in ("", present) else ["older code"]
     looked, cases = row["looked_at"], row["cases"]
     if looked > 0 and pd.notna(cases):
         said.append("looked at" if looked >= cases else f"{int(looked)} looked at")
@@ -61,7 +61,7 @@ def provenance(row: pd.Series, present: str) -> str:
 
 def of_families(families: pd.DataFrame) -> pd.DataFrame:
     """Drawn cases, one row a family and date, as text."""
-    out = families.astype({"cases": int, "right": int, "false_alarms": int}).astype(str).replace("nan", "")
+    out = families.astype(object).fillna("").astype(str)
     out["released"] = out["released"].replace("", "development")
     for column in ("family", "wrong_names", "missed"):
         out[column] = out[column].str.replace("_", " ")

@@ -52,7 +52,7 @@ def write_tables(
     summary = table.summary(scores)
     summary.append(better_row(rows) | table.provenance(scores))
     for row in summary:
-        row["older"] = row["judged_by"] != present
+        row["older"] = row["judged_by"] not in ("", present)
     tables = {
         "summary": summary,
         "cases": table.case_rows(scores),
