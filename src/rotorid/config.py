@@ -194,6 +194,12 @@ class Proof(Section):
     seeds: dict[str, Annotated[int, Field(ge=0)]] = Field(
         description="Repetitions taken of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
     )
+    release: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = Field(
+        description="Date of a release proof: cases are drawn from it that nobody has looked at; empty for none [date]."
+    )
+    released: dict[str, Annotated[int, Field(ge=0)]] = Field(
+        description="Repetitions taken of each family of drawn cases in a release proof [1]."
+    )
     cases: list[Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
     batch: int = Field(ge=1, description="Cases that one job treats [1].")
     peers: bool = Field(description="Whether other methods are asked about the same recordings [true, false].")

@@ -13,14 +13,19 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from . import cases, ground, rotorpy_cases
+from . import cases, drawn, ground, rotorpy_cases
 from .richsim import scene
 from .write import write_set
 
 
 def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> Path:
     """Write one set and its answer; with `signals` also the noise-free tables beside the answer."""
-    make = {"richsim": scene.make, "rotorpy": rotorpy_cases.make, "ground": ground.make}[case.generator]
+    make = {
+        "richsim": scene.make,
+        "rotorpy": rotorpy_cases.make,
+        "ground": ground.make,
+        "drawn": drawn.make,
+    }[case.generator]
     recording, truth, ideals = make(case.settings, case.seed)
     write_set(recording, out / case.set_name)
     answers.mkdir(parents=True, exist_ok=True)
@@ -28,8 +33,10 @@ def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> 
         for run, table in ideals.items():
             (answers / case.set_name).mkdir(exist_ok=True)
             table.to_parquet(answers / case.set_name / f"{run}.parquet", index=False)
-    # what a hidden cause needs to show (a wind needs drag) is to be found as well
-    expected = sorted({*case.truth, *(e["id"] for e in truth["effects"])})
+    # what a hidden cause needs to show (a wind needs drag) is to be found as well; what is far below the noise is not
+    hidden = [] if truth.get("need_not_be_found") else [e["id"] for e in truth["effects"]]
+    wrong = truth["wrong_parameters"] if case.generator == "drawn" else ()
+    expected = sorted({*case.truth, *hidden, *wrong})
     answer = {"set": case.set_name, "case": case.name, "generator": case.generator, "expected": expected, **truth}
     path = answers / f"{case.set_name}.json"
     path.write_text(json.dumps(answer, indent=1))
@@ -53,7 +60,7 @@ def _one(job):
     start = time.monotonic()
     try:
         build(case, out, answers, signals)
-    except RuntimeError as error:
+    except RuntimeError as error:  # a vehicle that no controller held
         return f"FAILED {case.name}: {error}"
     return f"{case.set_name} {time.monotonic() - start:.1f} s"
 
@@ -63,6 +70,9 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--cases", default="*", help="shell patterns on case names, comma-separated")
     parser.add_argument("--out", type=Path, help="folder for recording sets")
     parser.add_argument("--answers", type=Path, help="another folder, for the truth")
+    parser.add_argument(
+        "--release", metavar="DATE", help="cases drawn for this date (2026-11-30) instead of the listed ones"
+    )
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--signals", action="store_true", help="keep the noise-free tables beside the answers")
     parser.add_argument("--list", action="store_true", help="only list the cases")
@@ -71,7 +81,7 @@ def main(argv: list[str] | None = None) -> int:
     if args.write_index:
         print(f"written: {write_index().name}")
         return 0
-    chosen = cases.matching(args.cases)
+    chosen = cases.matching(args.cases, cases.drawn(args.release) if args.release else None)
     if args.list:
         print("\n".join(f"{c.set_name}  {c.name}" for c in chosen))
         return 0

@@ -5,11 +5,13 @@ A case is named openly here; its recording set carries a name that says nothing 
 
 import hashlib
 import zlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 
 import numpy as np
 
+from . import drawn as drawn_cases
 from . import ground_cases
 from .ground import GroundPlan
 from .richsim.hidden import OUTSIDE, Hidden
@@ -25,7 +27,7 @@ class Case:
     name: str
     seed: int
     generator: str
-    settings: Plan | RotorpyPlan | GroundPlan
+    settings: Plan | RotorpyPlan | GroundPlan | str  # of a drawn case its name
     truth: tuple[str, ...]
 
     @property
@@ -540,6 +542,25 @@ def ground() -> list[Case]:
     return [Case(name, seed, "ground", plan, tuple(truth)) for name, seed, plan, truth in ground_cases.plans()]
 
 
+RATES_ASKED = (25, 50, 100, 1000)
+
+
+def rates() -> list[Case]:
+    """Every clean flight once more at each of four rates: the same flights and sensors, recorded by another logger."""
+    out = []
+    for hz in RATES_ASKED:
+        for case in clean():
+            plan = replace(case.settings, rate_hz=float(hz), flown_for_hz=case.settings.rate_hz)
+            name = f"rate/{hz:04d}/{case.name.rsplit('/', 1)[1]}"
+            out.append(Case(name, case.seed, "richsim", plan, ()))
+    return out
+
+
+def drawn(date: str = drawn_cases.DEVELOPMENT) -> list[Case]:
+    """Cases drawn whole from one seed (`drawn.py`): those for development, or those of a release's date."""
+    return [named(name) for name in drawn_cases.names(date)]
+
+
 NEVER_HELD = ("single/thrust_curve/strong/1",)
 """Cases whose controller loses the vehicle in any size of flight: of a crash nothing is asked."""
 
@@ -547,14 +568,35 @@ NEVER_HELD = ("single/thrust_curve/strong/1",)
 def all_cases() -> list[Case]:
     """Every case that can be flown, in a fixed order; names are unique."""
     out = [*singles(), *mixtures(), *wrong_values(), *confusable(), *power(), *partial()]
-    out += [*outside(), *mistakes(), *rotorpy(), *clean(), *ground()]
+    out += [*outside(), *mistakes(), *rotorpy(), *clean(), *rates(), *ground(), *drawn()]
     names = [c.name for c in out]
     if len(set(names)) != len(names):
         raise ValueError("two cases carry the same name")
     return [c for c in out if c.name not in NEVER_HELD]
 
 
-def matching(patterns: str) -> list[Case]:
-    """Cases whose name fits one of the comma-separated shell patterns."""
+def matching(patterns: str, among: list[Case] | None = None) -> list[Case]:
+    """Cases (of all, or of those given) whose name fits one of the comma-separated shell patterns."""
     wanted = [p.strip() for p in patterns.split(",")]
-    return [c for c in all_cases() if any(fnmatch(c.name, p) for p in wanted)]
+    return [c for c in (all_cases() if among is None else among) if any(fnmatch(c.name, p) for p in wanted)]
+
+
+def named(name: str) -> Case:
+    """The drawn case of a name, listed or released.
+
+    Raises
+    ------
+    KeyError
+        There is no such case.
+    """
+    simulator, family, date, number = drawn_cases.parts(name)
+    if family not in drawn_cases.SIMULATORS[simulator]:
+        raise KeyError(f"{name}: {simulator} draws no {family}, but {', '.join(drawn_cases.SIMULATORS[simulator])}")
+    seed = drawn_cases.seed_of(date, f"{simulator}/{family}", number)
+    return Case(name, seed, "drawn", name, ())
+
+
+def with_names(names: Sequence[str]) -> list[Case]:
+    """The cases of these names, listed or released, in their order; a KeyError for a name that no case has."""
+    listed = {c.name: c for c in all_cases()}
+    return [named(n) if drawn_cases.parts(n) else listed[n] for n in names]

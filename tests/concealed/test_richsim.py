@@ -313,6 +313,15 @@ def test_generators_share_nothing_with_the_library():
             assert not [n for n in names if n.split(".")[0] in ("rotorid", "acquire", "workflow")], path
 
 
+@pytest.mark.parametrize("simulator", ["multibody", "continuous", "rig"])
+def test_simulators_of_drawn_cases_share_nothing_with_each_other(simulator):
+    """Only the form of a set and the yardstick for the noise are common."""
+    for path in (Path(__file__).parent / simulator).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.level > 1:
+                assert node.module in ("residuals", "write"), path
+
+
 def test_every_class_of_case_is_there():
     found = cases.all_cases()
     by_class: dict[str, int] = {}

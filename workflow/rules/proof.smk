@@ -13,7 +13,9 @@ try:
     plan.check_families(CASES, CONFIG.proof.seeds)
 except InputError as error:
     raise WorkflowError(str(error)) from None
-BATCHES = plan.batches(plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases), CONFIG.proof.batch)
+CHOSEN = plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases)
+RELEASED = plan.choose(plan.released(CASES, CONFIG.proof.release), CONFIG.proof.released, CONFIG.proof.cases)
+BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)
 # Recordings come from code outside the library: its hash stands beside that of the script.
 CONCEALING = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))]
 STUDIES = [study.name for study in real.STUDIES] if CONFIG.proof.real else []
@@ -98,8 +100,10 @@ rule score_proof:
         power="results/proof/power.csv",
         parameters="results/proof/parameters.csv",
         peers="results/proof/peers.csv",
+        families="results/proof/families.csv",
         state="results/proof/state.json",
     params:
+        judging=code_of("judge"),
         code=code_of("score_proof"),
     log:
         "results/logs/score_proof.log",
@@ -177,6 +181,7 @@ rule chapter_proof:
         notebook="notebooks/proof.ipynb",
         summary=f"{CONFIG.proof.tables}/summary.csv",
         cases=f"{CONFIG.proof.tables}/cases.csv",
+        families=f"{CONFIG.proof.tables}/families.csv",
         effects=f"{CONFIG.proof.tables}/effects.csv",
         confusion=f"{CONFIG.proof.tables}/confusion.csv",
         power=f"{CONFIG.proof.tables}/power.csv",
@@ -195,7 +200,9 @@ rule chapter_proof:
         methods="results/report/proof/methods.csv",
         studies="results/report/proof/studies.csv",
         published="results/report/proof/published.csv",
+        drawn="results/report/proof/drawn.csv",
     params:
+        present=code_of("judge"),
         code=code_of_chapter("proof"),
     log:
         "results/logs/chapter_proof/run.log",

@@ -16,10 +16,9 @@ def main(cases: list[str], sets: str, answers: str, root: str) -> None:
     from tests.concealed import build
     from tests.concealed import cases as known
 
-    by_name = {case.name: case for case in known.all_cases()}
     Path(sets).mkdir(parents=True, exist_ok=True)
-    for name in cases:
-        build.build(by_name[name], Path(sets), Path(answers))
+    for case in known.with_names(cases):
+        build.build(case, Path(sets), Path(answers))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Verdicts on concealed sets.
 
 - Reads each set, knows nothing else, runs the mismatch stage on it.
-- Writes one verdict a set, and the time that each took.
+- Writes one verdict a set, the time that each took, and the hash of the code that judged it.
 """
 
 import sys
@@ -11,9 +11,9 @@ from rotorid import log
 from rotorid.proof.judge import judge_folder
 
 
-def main(sets: str, verdicts: str) -> None:
-    """Judge every set below `sets`."""
-    judge_folder(Path(sets), Path(verdicts), progress=report_progress)
+def main(sets: str, verdicts: str, code: str) -> None:
+    """Judge every set below `sets` by the code of this hash."""
+    judge_folder(Path(sets), Path(verdicts), progress=report_progress, code=code)
 
 
 def report_progress(text: str) -> None:
@@ -23,4 +23,4 @@ def report_progress(text: str) -> None:
 
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
-        main(sets=snakemake.input.sets, verdicts=snakemake.output.verdicts)
+        main(sets=snakemake.input.sets, verdicts=snakemake.output.verdicts, code=snakemake.params.code)

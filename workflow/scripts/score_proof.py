@@ -10,9 +10,9 @@ from rotorid import log
 from rotorid.proof.write import write_tables
 
 
-def main(verdicts: list[str], answers: list[str], peers: list[str], out: str) -> None:
-    """Score what is in the folders and write the tables into `out`."""
-    write_tables([Path(p) for p in verdicts], [Path(p) for p in answers], [Path(p) for p in peers], Path(out))
+def main(verdicts: list[str], answers: list[str], peers: list[str], out: str, present: str) -> None:
+    """Score what is in the folders and write the tables into `out`; `present` is the hash of the code that judges."""
+    write_tables([Path(p) for p in verdicts], [Path(p) for p in answers], [Path(p) for p in peers], Path(out), present)
 
 
 if __name__ == "__main__":
@@ -22,4 +22,5 @@ if __name__ == "__main__":
             answers=snakemake.input.answers,
             peers=snakemake.input.get("peers", []),
             out=str(Path(snakemake.output.summary).parent),
+            present=snakemake.params.judging,
         )

@@ -16,7 +16,7 @@ LAST_COLUMNS = ("several", "a value", "nothing")
 
 
 def targets(summary: pd.DataFrame) -> Figure:
-    """Each rate that has a target, its 95 % interval, and the stretch that the target allows."""
+    """Each rate that has a target, its 95 % interval, and the stretch that the target allows; grey: not refuted."""
     rows = summary[summary["at_least"].notna() | summary["at_most"].notna()]
     rows = rows[rows["value"].notna() & ~rows["id"].str.endswith(("oracle", "better", "failed"))].iloc[::-1]
     fig, ax = style.figure(0.9 + 0.27 * len(rows))
@@ -24,7 +24,7 @@ def targets(summary: pd.DataFrame) -> Figure:
         low = row.at_least if np.isfinite(row.at_least) else 0.0
         high = row.at_most if np.isfinite(row.at_most) else 1.0
         ax.barh(k, high - low, left=low, height=0.8, color="#dcefe6", zorder=0)
-        colour = style.COLOUR["after"] if row.holds in (True, "True") else style.COLOUR["before"]
+        colour = {"holds": style.COLOUR["after"], "fails": style.COLOUR["before"]}.get(row.holds, style.GREY)
         ax.plot([row.low_95, row.high_95], [k, k], color=colour, lw=1.6)
         ax.plot(row.value, k, "o", color=colour)
     ax.set_yticks(range(len(rows)), [f"{r.what} ({int(r.cases)})" for r in rows.itertuples()])

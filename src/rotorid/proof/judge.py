@@ -12,9 +12,9 @@ from rotorid.mismatch.deliver import analysis_of, verdict_of
 from rotorid.recordings import read_set
 
 
-def judge_folder(sets: Path, out: Path, progress: Callable[[str], None]) -> None:
-    """Judge every set below `sets`: `out/<set>.json` each, and `out/seconds.json` with the time each took and how
-    many samples a row of its errors is the mean of.
+def judge_folder(sets: Path, out: Path, progress: Callable[[str], None], code: str = "") -> None:
+    """Judge every set below `sets`: `out/<set>.json` each, and `out/seconds.json` with the time each took, how many
+    samples a row of its errors is the mean of, and the hash of the code that judged it (`code`).
 
     A set on which the stage stops gets `{"failed": reason}`: that counts against it, and the others go on.
     """
@@ -35,6 +35,7 @@ def judge_folder(sets: Path, out: Path, progress: Callable[[str], None]) -> None
             "seconds": round(time.perf_counter() - start, 3),
             "flown_s": flown_s,
             "samples_per_row": averaged,
+            "code": code,
         }
         progress(f"{folder.name}: {seconds[folder.name]['seconds']:.1f} s")
     (out / "seconds.json").write_text(json.dumps(seconds, indent=1) + "\n", encoding="utf-8")

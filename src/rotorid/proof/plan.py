@@ -2,6 +2,8 @@
 
 The list of all cases is `tests/concealed/cases.tsv` (`case`, `set`, the recording set's name that says nothing). The
 first part of a case's name is its family (of an instrument the first two: `stand-clean`), its last number the seed.
+Cases drawn whole from a seed (`multibody/slung_load/development/003`) are the family `multibody`, clean ones
+`multibody-clean`; a release draws the same ones anew, with its date in place of `development`.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ import csv
 import difflib
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -21,6 +23,9 @@ BUILD_S, JUDGE_S, PEERS_S, START_S = 6.0, 8.0, 3.0, 4.0
 INSTRUMENT_S = 2.5
 """The same to record and judge a case of a stand or a bench, of which no peer is asked."""
 INSTRUMENTS = ("stand", "bench")
+DRAWN = ("multibody", "continuous", "stand-rig", "bench-rig")
+"""Simulators whose cases are drawn whole from one seed."""
+DEVELOPMENT = "/development/"
 
 
 @dataclass(frozen=True)
@@ -33,8 +38,11 @@ class Entry:
     @property
     def family(self) -> str:
         """Kind of case: `single`, `clean`, `stand-clean`, ..."""
-        first, second, *_ = self.case.split("/")
-        return f"{first}-{second}" if first in INSTRUMENTS else first
+        first, second, *rest = self.case.split("/")
+        family = f"{first}-{second}" if first in INSTRUMENTS else first
+        if family not in DRAWN:
+            return family
+        return f"{family}-clean" if (rest[0] if first in INSTRUMENTS else second) == "clean" else family
 
     @property
     def is_flight(self) -> bool:
@@ -68,6 +76,15 @@ def check_families(entries: Sequence[Entry], seeds: Mapping[str, int]) -> None:
             close = difflib.get_close_matches(family, families, n=1)
             hint = f"did you mean {close[0]}?" if close else f"known are {', '.join(families)}."
             raise InputError(f"config.yaml: proof.seeds.{family} is no family of concealed cases; {hint}")
+
+
+def released(entries: Sequence[Entry], date: str) -> list[Entry]:
+    """The drawn cases of the list as a release of this date draws them; none without a date.
+
+    Their sets are named when they are recorded, from seeds that hang on the date.
+    """
+    drawn = [e for e in entries if DEVELOPMENT in e.case] if date else []
+    return [replace(e, case=e.case.replace(DEVELOPMENT, f"/{date}/"), set="") for e in drawn]
 
 
 def batches(entries: Sequence[Entry], size: int) -> dict[str, list[Entry]]:

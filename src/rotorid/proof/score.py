@@ -5,7 +5,8 @@ Words used here:
 - A *claim* is an effect of status `established` or `ambiguous`; its *class* is the id alone, or the alternatives too.
 - A claim is *sharp* about a true effect if its class holds the effect and nothing but names that the answer lists as
   indistinguishable from it (`equivalent`).
-- A claim is *false* if its class holds no true effect and nothing that is indistinguishable from one.
+- A claim is *false* if its class holds no true effect, nothing that is indistinguishable from one, and nothing that the
+  answer calls `fair` to say beside (a filter's delay, a vibration that is in an autopilot's log).
 """
 
 from __future__ import annotations
@@ -229,7 +230,8 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any], samples_pe
         same.setdefault(effect, frozenset({effect}))
     outside = answer["outside_catalogue"]
     acceptable = set().union(*(o["acceptable"] for o in outside)) if outside else set()
-    near = set().union(*same.values(), acceptable) if same or acceptable else set()
+    fair = set(answer.get("fair", ()))
+    near = set().union(*same.values(), acceptable, fair)
     false = [c for c in claims if not c.members & near]
     covered = [e for e in truth if any(e in c.members for c in claims)]
     sharp = [e for e in truth if any(is_sharp(c, e, same[e]) for c in claims)]
@@ -247,6 +249,9 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any], samples_pe
     )
     values = set(verdict.get("parameters", {}))
     word = verdict.get("verdict")
+    alarm = any(not c.members & fair for c in claims) or bool(values - fair) or word not in answer["verdict"]
+    whole = not failed and len(sharp) == len(truth) and not false
+    nothing = not (truth or wrong or outside or answer["effects"])
     return {
         "set": answer["set"],
         "case": answer["case"],
@@ -261,7 +266,9 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any], samples_pe
         "named": named,
         "top_one": bool(claims) and bool(claims[0].members & set(truth)),
         "inside": not failed and len(covered) == len(truth),
-        "whole_set": not failed and len(sharp) == len(truth) and not false,
+        "whole_set": whole,
+        "right": not failed and not alarm if nothing else whole and values >= wrong and values <= wrong | fair,
+        "clean": nothing,
         "claim_count": len(claims),
         "false_count": len(false),
         "false_names": sorted(c.id for c in false),
@@ -270,7 +277,7 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any], samples_pe
         "values_claimed": sorted(values),
         "values_true": sorted(wrong),
         "values_right": values >= wrong if wrong else None,
-        "false_alarm": not failed and (bool(claims) or bool(values) or word != "no_mismatch"),
+        "false_alarm": not failed and alarm,
         "word": word,
         "word_right": word in answer["verdict"],
         "ambiguity_there": open_question,
@@ -282,4 +289,6 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any], samples_pe
         "held_out_refitted": held_out_ratio(verdict, oracle, "refitted"),
         "held_out_after": held_out_ratio(verdict, oracle, "after"),
         "size_over_noise": next((e["size_over_noise"] for e in answer["effects"]), None),
+        "grade": answer.get("grade", ""),
+        "released": answer.get("released", ""),
     }

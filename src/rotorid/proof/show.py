@@ -16,17 +16,22 @@ METHODS = {
 }
 
 
-def with_target(summary: pd.DataFrame) -> pd.DataFrame:
-    """`what`, `measured`, `interval`, `cases`, `target`, `holds` as text, rows that have a target."""
-    return _shown(summary[summary["at_least"].notna() | summary["at_most"].notna()])
+def with_target(summary: pd.DataFrame, present: str = "") -> pd.DataFrame:
+    """`what`, `measured`, `interval`, `cases`, `target`, `holds`, `by` as text, rows that have a target.
+
+    `by` says whether code older than that of hash `present` judged the row, and how many of its cases were looked at.
+    """
+    return _shown(present, summary[summary["at_least"].notna() | summary["at_most"].notna()])
 
 
-def without_target(summary: pd.DataFrame) -> pd.DataFrame:
+def without_target(summary: pd.DataFrame, present: str = "") -> pd.DataFrame:
     """The same for rows without one."""
-    return _shown(summary[summary["at_least"].isna() & summary["at_most"].isna()]).drop(columns=["target", "holds"])
+    return _shown(present, summary[summary["at_least"].isna() & summary["at_most"].isna()]).drop(
+        columns=["target", "holds"]
+    )
 
 
-def _shown(rows: pd.DataFrame) -> pd.DataFrame:
+def _shown(present: str, rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {
@@ -37,11 +42,30 @@ def _shown(rows: pd.DataFrame) -> pd.DataFrame:
                 else f"{number(row['id'], row['low_95'])} to {number(row['id'], row['high_95'])}",
                 "cases": "" if pd.isna(row["cases"]) else str(int(row["cases"])),
                 "target": target(row),
-                "holds": {"True": "yes", "False": "no"}.get(str(row["holds"]), ""),
+                "holds": "" if pd.isna(row["holds"]) else row["holds"],
+                "by": provenance(row, present),
             }
             for _, row in rows.iterrows()
         ]
     )
+
+
+def provenance(row: pd.Series, present: str) -> str:
+    """Whether older code judged a row's cases, and how many of them are development cases."""
+    said = [] if pd.isna(row["judged_by"]) or row["judged_by"] in ("", present) else ["older code"]
+    looked, cases = row["looked_at"], row["cases"]
+    if looked > 0 and pd.notna(cases):
+        said.append("looked at" if looked >= cases else f"{int(looked)} looked at")
+    return ", ".join(said)
+
+
+def of_families(families: pd.DataFrame) -> pd.DataFrame:
+    """Drawn cases, one row a family and date, as text."""
+    out = families.astype(object).fillna("").astype(str)
+    out["released"] = out["released"].replace("", "development")
+    for column in ("family", "wrong_names", "missed"):
+        out[column] = out[column].str.replace("_", " ")
+    return out
 
 
 def number(key: str, value: float) -> str:

@@ -46,18 +46,32 @@ def _is_well_sized(s: Score) -> bool:
 
 
 def rate(scores: Iterable[Score], hit: Callable[[Score], bool | None]) -> dict[str, Any]:
-    """Share of cases that hit (None: not counted), with Wilson's interval."""
-    hits = [bool(h) for h in map(hit, scores) if h is not None]
+    """Share of cases that hit (None: not counted), with Wilson's interval and who judged them."""
+    counted = [(s, bool(h)) for s, h in ((s, hit(s)) for s in scores) if h is not None]
+    return share([h for _, h in counted]) | provenance([s for s, _ in counted])
+
+
+def share(hits: Sequence[bool]) -> dict[str, Any]:
+    """Share of hits, with Wilson's interval."""
     low, high = wilson(sum(hits), len(hits))
-    value = sum(hits) / len(hits) if hits else None
-    return {"value": value, "low_95": low, "high_95": high, "cases": len(hits)}
+    return {"value": sum(hits) / len(hits) if hits else None, "low_95": low, "high_95": high, "cases": len(hits)}
 
 
-def mean(values: Sequence[float]) -> dict[str, Any]:
-    """Mean with its interval over cases."""
-    values = [v for v in values if v is not None and math.isfinite(v)]
+def provenance(scores: Iterable[Score]) -> dict[str, Any]:
+    """`judged_by`: hash of the code that judged these cases (all hashes, if several; "unknown" if none was kept);
+    `looked_at`: how many of them are development cases, which were or may have been looked at while mending."""
+    scores = list(scores)
+    codes = sorted({s.get("judged_by") or "unknown" for s in scores})
+    return {"judged_by": " ".join(codes), "looked_at": sum(not s.get("released") for s in scores)}
+
+
+def mean(scores: Sequence[Score], value_of: Callable[[Score], float | None]) -> dict[str, Any]:
+    """Mean with its interval over the cases that have a value."""
+    known = [(s, v) for s, v in ((s, value_of(s)) for s in scores) if v is not None and math.isfinite(v)]
+    values = [v for _, v in known]
     low, high = bootstrap_mean(values)
-    return {"value": float(np.mean(values)) if values else None, "low_95": low, "high_95": high, "cases": len(values)}
+    found = {"value": float(np.mean(values)) if values else None, "low_95": low, "high_95": high, "cases": len(values)}
+    return found | provenance([s for s, _ in known])
 
 
 def false_discoveries(scores: Sequence[Score]) -> dict[str, Any]:
@@ -65,8 +79,10 @@ def false_discoveries(scores: Sequence[Score]) -> dict[str, Any]:
     scores = list(scores)
     claims, false = sum(s["claim_count"] for s in scores), sum(s["false_count"] for s in scores)
     low, high = bootstrap_ratio([s["false_count"] for s in scores], [s["claim_count"] for s in scores])
+    if false in (0, claims):  # cases drawn again would give this one value only
+        low, high = wilson(false, claims)
     value = false / claims if claims else (0.0 if scores else None)
-    return {"value": value, "low_95": low, "high_95": high, "cases": len(scores)}
+    return {"value": value, "low_95": low, "high_95": high, "cases": len(scores), **provenance(scores)}
 
 
 def coverage(scores: Sequence[Score], physics: bool | None = None) -> dict[str, Any]:
@@ -77,17 +93,23 @@ def coverage(scores: Sequence[Score], physics: bool | None = None) -> dict[str, 
         for p in s["parameters"]
         if p["covered"] is not None and (physics is None or bool(p["effect"]) == physics)
     ]
-    return rate(held, lambda covered: covered)
+    return share(held) | provenance([s for s in scores if s["parameters"]])
 
 
 def oracle_excess(scores: Sequence[Score]) -> dict[str, Any]:
     """Median of the held-out error after over the true model's; its interval by drawing cases."""
-    ratios = np.array([s["held_out_after"] for s in scores if s["held_out_after"] is not None])
+    known = [s for s in scores if s["held_out_after"] is not None]
+    ratios = np.array([s["held_out_after"] for s in known])
     if not len(ratios):
-        return {"value": None, "low_95": math.nan, "high_95": math.nan, "cases": 0}
+        return {"value": None, "low_95": math.nan, "high_95": math.nan, "cases": 0, **provenance(known)}
     picks = np.random.default_rng(1).integers(len(ratios), size=(2000, len(ratios)))
     low, high = np.percentile(np.median(ratios[picks], axis=1), [2.5, 97.5])
-    return {"value": float(np.median(ratios)), "low_95": float(low), "high_95": float(high), "cases": len(ratios)}
+    return {
+        "value": float(np.median(ratios)),
+        "low_95": float(low),
+        "high_95": float(high),
+        "cases": len(ratios),
+    } | provenance(known)
 
 
 GROUND_ROWS = (
@@ -111,18 +133,20 @@ KINDS = ("flight", "stand", "bench")
 def summary(scores: Sequence[Score]) -> list[dict[str, Any]]:
     """The table of targets: one row each with what was measured, its interval, the target and whether it holds.
 
-    Flights first; then, where there are any, the rows that stands and benches share with them.
+    Flights first; then, where there are any, the rows that stands and benches share with them; then those of cases
+    that are drawn whole from a seed, which count nowhere else.
     """
-    rows = rows_of([s for s in scores if s["kind"] == "flight"])
+    listed = [s for s in scores if (s["kind"], s["family"]) not in SIMULATORS]
+    rows = rows_of([s for s in listed if s["kind"] == "flight"])
     for kind in KINDS[1:]:
-        own = [s for s in scores if s["kind"] == kind]
+        own = [s for s in listed if s["kind"] == kind]
         if own:
             picked = [row for row in rows_of(own) if row["id"] in GROUND_ROWS]
             rows += [
                 {**row, "id": f"{kind}_{row['id']}", "what": f"{kind.capitalize()}: {lower(row['what'])}"}
                 for row in picked
             ]
-    return rows
+    return rows + drawn_rows(scores)
 
 
 def lower(text: str) -> str:
@@ -141,7 +165,6 @@ def rows_of(scores: Sequence[Score]) -> list[dict[str, Any]]:
     confusable = [s for s in scores if s["family"] == "confusable"]
     sized = [s for s in scores if _is_well_sized(s)]
     fitted = [s for s in scores if strength(s) in WELL_SIZED and s["separable"]]
-    f1 = [s["location"]["f1"] for s in partial if s["location"]]
     rows = [
         ("single_named", "Single effects, moderate, separable: right one named", 0.95, None, rate(moderate, _named)),
         ("inside_class", "Truth inside the reported class", 0.98, None, rate(sized, lambda s: s["inside"])),
@@ -150,7 +173,7 @@ def rows_of(scores: Sequence[Score]) -> list[dict[str, Any]]:
         ("clean_alarms", "Clean recordings: false alarms", None, 0.01, rate(clean, lambda s: s["false_alarm"])),
         ("wrong_physics", "Wrong values only: physics claimed", None, 0.02, rate(wrong, lambda s: bool(s["claims"]))),
         ("coverage", "95 % intervals that cover", 0.92, 0.98, coverage(_fitting(scores))),
-        ("location_f1", "Location F1 (time), effects in part of the flight", 0.85, None, mean(f1)),
+        ("location_f1", "Location F1 (time), effects in part of the flight", 0.85, None, mean(partial, _f1)),
         ("oracle", "Held-out error after over the oracle's (median)", None, ORACLE_MARGIN, oracle_excess(fitted)),
         (
             "outside_unnamed",
@@ -230,17 +253,112 @@ def rows_of(scores: Sequence[Score]) -> list[dict[str, Any]]:
         ("regime", "Location: stated regime is the effect's", None, None, rate(fitted, lambda s: s["regime_right"])),
         ("failed", "Sets on which the stage stopped", None, 0.0, rate(scores, lambda s: s["failed"])),
     ]
+    return [finished(*row) for row in rows]
+
+
+def finished(key: str, what: str, low: float | None, high: float | None, found: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of the summary: what was found, beside its target and whether that holds."""
+    word = holds(found["value"], low, high, found["low_95"], found["high_95"])
+    return {"id": key, "what": what, "at_least": low, "at_most": high, **found, "holds": word}
+
+
+HOLDS, OPEN, FAILS = "holds", "not refuted", "fails"
+
+
+def holds(
+    value: float | None,
+    at_least: float | None,
+    at_most: float | None,
+    low_95: float = math.nan,
+    high_95: float = math.nan,
+) -> str | None:
+    """`holds` if the whole interval is inside the target, `fails` if all of it is outside, else `not refuted`.
+
+    Without an interval the value decides; None without a value or a target.
+    """
+    if value is None or (at_least is None and at_most is None):
+        return None
+    low, high = (x if x is not None and math.isfinite(x) else value for x in (low_95, high_95))
+    if (at_least is None or low >= at_least) and (at_most is None or high <= at_most):
+        return HOLDS
+    if (at_least is not None and high < at_least) or (at_most is not None and low > at_most):
+        return FAILS
+    return OPEN
+
+
+SIMULATORS = {
+    ("flight", "multibody"): "Drawn flights, multibody engine",
+    ("flight", "continuous"): "Drawn flights, differential equations",
+    ("stand", "rig"): "Drawn stands",
+    ("bench", "rig"): "Drawn benches",
+}
+"""Families of cases that are drawn whole from one seed, with their own rows."""
+
+
+def drawn_rows(scores: Sequence[Score]) -> list[dict[str, Any]]:
+    """Rows of the simulators whose cases are drawn, for development and for each release's date by themselves."""
+    rows = []
+    for (kind, name), what in SIMULATORS.items():
+        own = [s for s in scores if (s["kind"], s["family"]) == (kind, name)]
+        for date in sorted({s["released"] for s in own}):
+            part = [s for s in own if s["released"] == date]
+            clean = [s for s in part if s["clean"]]
+            hidden = [s for s in part if not s["clean"]]
+            when = f"released {date}" if date else "development"
+            key = "_".join(x for x in (kind if kind != "flight" else "", name, date) if x)
+            rows += [
+                finished(f"{key}_clean_alarms", f"{what}, {when}: false alarms", None, 0.01, rate(clean, _alarmed)),
+                finished(f"{key}_right", f"{what}, {when}: all that is hidden right", None, None, rate(hidden, _right)),
+                finished(f"{key}_false", f"{what}, {when}: false discoveries", None, 0.05, false_discoveries(part)),
+            ]
+    at_rates = _family(scores, "rate")
+    if at_rates:
+        what = "Clean flights at 25, 50, 100 and 1000 Hz: false alarms"
+        rows.append(finished("rate_alarms", what, None, 0.01, rate(at_rates, _alarmed)))
+    return rows
+
+
+def drawn_families(scores: Sequence[Score]) -> list[dict[str, Any]]:
+    """One row a family of drawn cases and a date: how many are right, what was wrongly said or missed, by count."""
+    groups: dict[tuple[str, str, str], list[Score]] = {}
+    for s in scores:
+        if (s["kind"], s["family"]) in SIMULATORS:
+            rest = kind_and_rest(s["case"])[1]
+            groups.setdefault((SIMULATORS[s["kind"], s["family"]], rest.split("/")[1], s["released"]), []).append(s)
     return [
-        {"id": key, "what": what, "at_least": low, "at_most": high, **found, "holds": holds(found["value"], low, high)}
-        for key, what, low, high, found in rows
+        {
+            "simulator": simulator,
+            "family": family_,
+            "released": date,
+            "cases": len(own),
+            "right": sum(s["right"] for s in own),
+            "false_alarms": sum(s["false_alarm"] for s in own if s["clean"]),
+            "wrong_names": counted(name for s in own for name in s["false_names"]),
+            "missed": counted(name for s in own for name in s["missed"]),
+            **provenance(own),
+        }
+        for (simulator, family_, date), own in sorted(groups.items())
     ]
 
 
-def holds(value: float | None, at_least: float | None, at_most: float | None) -> bool | None:
-    """Whether a value meets its target; None without a value or a target."""
-    if value is None or (at_least is None and at_most is None):
-        return None
-    return (at_least is None or value >= at_least) and (at_most is None or value <= at_most)
+def counted(names: Iterable[str]) -> str:
+    """Names with how often each occurs, the most frequent first: `gust 3, delay 1`."""
+    counts: dict[str, int] = {}
+    for name in names:
+        counts[name] = counts.get(name, 0) + 1
+    return ", ".join(f"{n} {k}" for n, k in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+
+
+def _alarmed(s: Score) -> bool:
+    return s["false_alarm"]
+
+
+def _right(s: Score) -> bool:
+    return s["right"]
+
+
+def _f1(s: Score) -> float | None:
+    return s["location"]["f1"] if s["location"] else None
 
 
 def _named(s: Score) -> bool:
@@ -313,7 +431,7 @@ def power(scores: Sequence[Score]) -> list[dict[str, Any]]:
         for name in (effect, "all"):
             points.setdefault((name, float(size)), []).append(s["inside"])
     return [
-        {"effect": effect, "size_over_noise": size, **_plain(rate(hits, lambda hit: hit))}
+        {"effect": effect, "size_over_noise": size, **_plain(share(hits))}
         for (effect, size), hits in sorted(points.items())
     ]
 

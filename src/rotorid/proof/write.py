@@ -18,6 +18,7 @@ COLUMNS = {
     "confusion": ["kind", "truth", "claimed", "share", "cases"],
     "power": ["effect", "size_over_noise", "detected", "low_95", "high_95", "cases"],
     "parameters": ["case", "effect", "symbol", "true", "estimate", "relative_error", "covered"],
+    "families": ["simulator", "family", "released", "cases", "right", "false_alarms", "wrong_names", "missed"],
     "effects": ["kind", "effect", "strong", "moderate", "weak", "instead"],
 }
 """Headings of tables that may have no row."""
@@ -30,9 +31,10 @@ def read_json(path: Path) -> Any:
 
 
 def write_tables(
-    verdicts: Sequence[Path], answers: Sequence[Path], peers: Sequence[Path], out: Path
+    verdicts: Sequence[Path], answers: Sequence[Path], peers: Sequence[Path], out: Path, present: str = ""
 ) -> list[dict[str, Any]]:
-    """Score everything and write summary, cases, effects, confusion, power, parameters, peers (CSV) and state (JSON).
+    """Score everything and write summary, cases, families, effects, confusion, power, parameters, peers (CSV) and state
+    (JSON). `present` is the hash of the code that judges now: rows that other code judged are marked as older.
 
     Returns the scores of our verdicts, one a case.
     """
@@ -44,13 +46,17 @@ def write_tables(
     scores = [score_case(said[name], answer, seconds[name]["samples_per_row"]) for name, answer in truth.items()]
     for s in scores:
         s["seconds"], s["flown_s"] = seconds[s["set"]]["seconds"], seconds[s["set"]]["flown_s"]
+        s["judged_by"] = seconds[s["set"]].get("code", "")
     by_method = {OURS: [s for s in scores if s["kind"] == "flight"], **peer_scores(peers, truth)}
     rows = table.peer_rows(by_method)
     summary = table.summary(scores)
-    summary.append(better_row(rows))
+    summary.append(better_row(rows) | table.provenance(scores))
+    for row in summary:
+        row["older"] = row["judged_by"] not in ("", present)
     tables = {
         "summary": summary,
         "cases": table.case_rows(scores),
+        "families": table.drawn_families(scores),
         "effects": table.by_effect(scores),
         "confusion": table.confusion(scores),
         "power": table.power(scores),
@@ -86,7 +92,7 @@ def better_row(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "at_most": None,
         "value": None if better is None else float(better),
         "cases": rows[0]["cases"],
-        "holds": better,
+        "holds": None if better is None else (table.HOLDS if better else table.FAILS),
     }
 
 
@@ -101,8 +107,10 @@ def state(scores: Sequence[Mapping[str, Any]], summary: Sequence[Mapping[str, An
         "kinds": {kind: sum(s["kind"] == kind for s in scores) for kind in table.KINDS},
         "families": {f: own.count(f) for f in sorted(set(own))},
         "targets": len(asked),
-        "met": sum(bool(row["holds"]) for row in asked),
-        "missed": [row["what"] for row in asked if not row["holds"]],
+        "met": sum(row["holds"] == table.HOLDS for row in asked),
+        "open": sum(row["holds"] == table.OPEN for row in asked),
+        "missed": [row["what"] for row in asked if row["holds"] == table.FAILS],
+        "released": sorted({s["released"] for s in scores if s["released"]}),
         "stopped": [s["case"] for s in scores if s["failed"]],
         "seconds_median": float(np.median([s["seconds"] for s in timed])) if timed else None,
         "seconds_slowest": float(max(s["seconds"] for s in timed)) if timed else None,

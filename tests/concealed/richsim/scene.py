@@ -33,6 +33,7 @@ class Plan:
     hidden: tuple[Hidden, ...] = ()
     wrong: tuple[tuple[str, float], ...] = ()  # name of vehicle.yaml, believed over true
     late_fraction: float = 0.0  # motor columns late by this part of a sample: a nuisance, not a finding
+    flown_for_hz: float | None = None  # flown as for this rate of recording; None: as for `rate_hz`
     jitter_s: float = 0.0
     trim_s: float = 0.0  # left out at both ends of a flight
     pose_every: int = 1
@@ -48,12 +49,13 @@ def _rng(seed: int, *labels) -> np.random.Generator:
 
 
 def _references(plan: Plan, airframe: Airframe, seed: int):
-    slow = plan.rate_hz < 120
+    rate_hz = plan.flown_for_hz or plan.rate_hz
+    slow = rate_hz < 120
     out = []
     for i, run in enumerate(plan.runs):
         rng = _rng(seed, "flight", i)
         segments, altitude = programme(run.purpose, run.duration_s, airframe, rng, slow)
-        top = float(np.clip(plan.rate_hz / 20, 2.5, 8.0))
+        top = float(np.clip(rate_hz / 20, 2.5, 8.0))
         out.append(manoeuvres.build(segments, altitude, airframe.step_s, airframe.n, rng, top_hz=top))
     return out
 
@@ -85,7 +87,7 @@ def _fly(plan: Plan, airframe: Airframe, world: World, reference, i: int, seed: 
         ring = sensors.lfilter([1 - a], [1, -a], raw, axis=0)
         ring = sensors.lfilter([1 - a], [1, -a], ring, axis=0)
         ring /= ring.std()
-    values = flying.tuned(world.values, plan.rate_hz)
+    values = flying.tuned(world.values, plan.flown_for_hz or plan.rate_hz)
     charge = 0.9 - world.discharge * (0.16 * i + 0.02 * _rng(seed, "charge", i).random())
     return manoeuvres.flown(lambda r: flying.fly(airframe, values, r, wind, ring, charge), reference)
 

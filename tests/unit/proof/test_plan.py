@@ -7,6 +7,7 @@ import yaml
 
 from rotorid.proof import plan
 from tests.concealed.build import index_text
+from tests.concealed.cases import with_names
 
 ROOT = Path(__file__).parents[3]
 INDEX = ROOT / "tests/concealed/cases.tsv"
@@ -48,6 +49,25 @@ def test_the_small_proof_holds_stands_and_benches() -> None:
     seeds = yaml.safe_load((ROOT / "config.yaml").read_text())["proof"]["seeds"]
     chosen = {e.family for e in plan.choose(plan.read_index(INDEX), seeds, patterns)}
     assert {"stand-single", "stand-clean", "bench-single"} <= chosen
+
+
+def test_a_release_draws_the_listed_families_anew_with_its_date() -> None:
+    entries = plan.read_index(INDEX)
+    drawn = plan.released(entries, "2026-11-30")
+    assert {e.family for e in drawn} == {f"{s}{c}" for s in plan.DRAWN for c in ("", "-clean")}
+    assert all("/2026-11-30/" in e.case for e in drawn) and not {e.case for e in drawn} & {e.case for e in entries}
+    assert plan.released(entries, "") == []
+    cases = with_names([drawn[0].case, entries[0].case])
+    assert [c.name for c in cases] == [drawn[0].case, entries[0].case]
+
+
+@pytest.mark.parametrize("part", ["seeds", "released"])
+def test_a_quarter_of_the_drawn_cases_is_clean(part: str) -> None:
+    settings = yaml.safe_load((ROOT / "config.yaml").read_text())["proof"]
+    entries = [e for e in plan.read_index(INDEX) if plan.DEVELOPMENT in e.case]
+    for simulator in plan.DRAWN:
+        own = [e for e in plan.choose(entries, settings[part], ["*"]) if e.family.startswith(simulator)]
+        assert 4 * sum(e.family.endswith("clean") for e in own) >= len(own) > 0
 
 
 def test_time_is_foretold_by_kind() -> None:

@@ -208,13 +208,60 @@ def test_the_table_of_targets() -> None:
         ),
     ]
     rows = {row["id"]: row for row in table.summary(scores)}
-    assert rows["single_named"]["value"] == 0.5 and rows["single_named"]["holds"] is False
-    assert rows["clean_alarms"]["value"] == 0.0 and rows["clean_alarms"]["holds"] is True
+    assert rows["single_named"]["value"] == 0.5 and rows["single_named"]["holds"] == "fails"
+    assert rows["clean_alarms"]["value"] == 0.0 and rows["clean_alarms"]["holds"] == "not refuted"
     assert rows["mixture_whole"]["value"] == 0.0
     assert rows["mixture_false"]["value"] == pytest.approx(1 / 3)
     assert rows["location_f1"]["holds"] is None
     confusion = {(r["truth"], r["claimed"]): r["share"] for r in table.confusion(scores)}
     assert confusion == {("rotor_drag", "rotor_drag"): 0.5, ("rotor_drag", "gust"): 0.5, ("nothing", "nothing"): 1.0}
+
+
+def test_a_target_holds_only_if_the_whole_interval_is_inside() -> None:
+    assert table.holds(0.0, None, 0.01, *wilson(0, 20)) == "not refuted"  # up to 0.16
+    assert table.holds(0.0, None, 0.01, *wilson(0, 400)) == "holds"  # up to 0.0095
+    assert table.holds(0.5, 0.95, None, *wilson(10, 20)) == "fails"
+    assert table.holds(0.95, 0.92, 0.98, 0.93, 0.97) == "holds"
+    assert table.holds(0.95, 0.92, 0.98, 0.93, 0.99) == "not refuted"
+    assert table.holds(1.0, 1.0, None) == "holds" and table.holds(None, 1.0, None) is None
+
+
+def test_rows_carry_the_code_that_judged_and_what_was_looked_at() -> None:
+    def clean(case, released, code):
+        s = score_case(
+            verdict(word="no_mismatch"), answer(case=case, verdicts=["no_mismatch"]) | {"released": released}
+        )
+        return s | {"judged_by": code}
+
+    scores = [
+        clean("multibody/clean/2026-11-30/000", "2026-11-30", "aa"),
+        clean("multibody/clean/2026-11-30/001", "2026-11-30", "bb"),
+        clean("multibody/clean/development/000", "", ""),
+    ]
+    rows = {row["id"]: row for row in table.drawn_rows(scores)}
+    fresh, own = rows["multibody_2026-11-30_clean_alarms"], rows["multibody_clean_alarms"]
+    assert (fresh["cases"], fresh["judged_by"], fresh["looked_at"]) == (2, "aa bb", 0)
+    assert (own["cases"], own["judged_by"], own["looked_at"]) == (1, "unknown", 1)
+    # drawn cases count in no other row
+    assert {row["id"]: row["cases"] for row in table.summary(scores)}["clean_alarms"] == 0
+
+
+def test_what_is_fair_to_say_is_no_false_alarm() -> None:
+    log = answer(case="continuous/clean/development/000", verdicts=["no_mismatch", "explained"]) | {
+        "fair": ["vibration"]
+    }
+    assert not score_case(verdict(effect("vibration")), log)["false_alarm"]
+    assert score_case(verdict(effect("delay")), log)["false_alarm"]
+    assert score_case(verdict(values={"mass_kg": {}}), log)["false_alarm"]
+
+
+def test_a_drawn_case_is_right_with_all_its_effects_and_values() -> None:
+    truth = answer(hidden("payload"), case="multibody/slung_load/development/000") | {"fair": ["mass_kg"]}
+    assert score_case(verdict(effect("payload"), values={"mass_kg": {}}), truth)["right"]
+    assert not score_case(verdict(effect("payload"), values={"inertia_xx_kg_m2": {}}), truth)["right"]
+    assert not score_case(verdict(effect("payload"), effect("gust")), truth)["right"]
+    row = table.drawn_families([score_case(verdict(effect("gust")), truth) | {"judged_by": "aa"}])[0]
+    assert (row["family"], row["right"], row["wrong_names"], row["missed"]) == ("slung_load", 0, "gust 1", "payload 1")
 
 
 def test_power_is_pooled_over_effects() -> None:
