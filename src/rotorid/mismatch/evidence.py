@@ -30,6 +30,8 @@ LEAST_SHARE = 0.005
 by another cause hold less than 0.7 % of what a model explains."""
 PLAIN_RATIO = 0.9
 """Error with an effect over that without up to which it is plain in some channel, however small its share of all."""
+WORSE_RATIO = 1.01
+"""Error with an effect over that without from which a channel is worse."""
 LEAST_EXCITED = 0.1
 """Size of a contribution on the runs held out, beside that on the fitted ones, below which they are silent."""
 
@@ -58,12 +60,10 @@ class Evidence:
         """Why the effect is not established; empty where it is."""
         if not self.ratios:
             return "the runs held out say nothing about it"
-        worse = next((r for r in self.ratios if r.low > 1.0), None)
+        worse = next((r for r in self.ratios if r.low > WORSE_RATIO), None)
         if worse is not None:
-            return (
-                f"on the runs held out the error of the {channel_words(worse.channel)} is {worse.value:.2f} times what "
-                "it is without"
-            )
+            percent = f"{100 * (worse.value - 1):.0f} %"
+            return f"on the runs held out the error of the {channel_words(worse.channel)} is {percent} larger with it"
         if self.ratios[0].high >= 1.0:
             return "on the runs held out no channel is surely better with it"
         if not self.beyond_leftover:
