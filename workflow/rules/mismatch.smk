@@ -20,7 +20,9 @@ def set_files(wildcards):
         raise WorkflowError(f"{folder}: no such recording set (a folder with vehicle.yaml and runs)")
     for path in files:
         if "{" in path or "}" in path:
-            raise WorkflowError(f"{path}: Snakemake takes braces in a name for a wildcard; rename it without them")
+            raise WorkflowError(
+                f"{path}: Snakemake takes braces in a name for a wildcard; rename it without them"
+            )
     return files
 
 
