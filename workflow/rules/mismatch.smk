@@ -41,6 +41,7 @@ rule mismatch:
         verdict="results/mismatch/{set}/verdict.json",
         page="results/mismatch/{set}/report.html",
         improved="results/mismatch/{set}/improved_vehicle.yaml",
+        ledger="results/mismatch/{set}/ledger.json",
     params:
         folder=set_folder_of,
         code=code_of("mismatch"),

@@ -27,6 +27,7 @@ from rotorid.mismatch.channel_errors import (
 )
 from rotorid.mismatch.decide import coefficients, estimates, main_channels, suggested
 from rotorid.mismatch.delivered import Values, believed_residuals, delivered_residuals, judged_rows, nuisances_in
+from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import refitted_left_out
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -35,9 +36,12 @@ from rotorid.mismatch.wrench import WrenchModel
 HELP_Z = 0.5
 """Standard errors by which the squares of one channel that an effect acts in must grow without it: it has been found
 already, in the runs fitted, so doubt is not held against it beyond the coin's."""
-REASON = "where it was not fitted, what is delivered with it is worse than the believed vehicle, or that one refitted"
-USELESS = "where it was not fitted, the error without it is no larger in any channel that it acts in"
-UNSURE = "none of it at all is within its interval"
+REASON = Reason(
+    "harm",
+    "where it was not fitted, what is delivered with it is worse than the believed vehicle, or that one refitted",
+)
+USELESS = Reason("use", "where it was not fitted, the error without it is no larger in any channel that it acts in")
+UNSURE = Reason("unsure", "none of it at all is within its interval")
 
 ValuesOf = Callable[[WrenchModel, Sequence[str]], Values]
 """The believed values that a model's recordings contradict, less those refused."""

@@ -176,7 +176,12 @@ def wrench_findings(
             continue
         effect = effects[effect_id]
         findings.append(
-            Finding(id=effect_id, status="not_established", sentence=f"{effect.name} did not hold: {reason}")
+            Finding(
+                id=effect_id,
+                status="not_established",
+                sentence=f"{effect.name} did not hold: {reason}",
+                rule=getattr(reason, "rule", ""),
+            )
         )
     return findings
 

@@ -1,4 +1,4 @@
-"""From a recording set to the three files of its verdict."""
+"""From a recording set to the files of its verdict: the three of the contract, and the ledger beside them."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rotorid.mismatch.forward import Forward, forward_channels, prove
 from rotorid.mismatch.improve import improved_vehicle
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.predict import prove as prove_reading
+from rotorid.mismatch.ledger import ledger, text_of
 from rotorid.mismatch.locate import locate
 from rotorid.mismatch.page import make_page
 from rotorid.mismatch.verdict import Verdict, make_verdict
@@ -82,7 +83,9 @@ def write_files(
     progress("locating")
     locations = locate(analysis)
     improved = improved_vehicle(analysis)
-    with all_or_none(verdict_path, page_path, improved_path) as (verdict_part, page_part, improved_part):
+    ledger_path = verdict_path.with_name("ledger.json")
+    with all_or_none(verdict_path, page_path, improved_path, ledger_path) as parts:
+        verdict_part, page_part, improved_part, ledger_part = parts
         write_vehicle(improved, improved_part)
         if analysis.instrument is None:
             progress("running the simulation forward")
@@ -93,7 +96,9 @@ def write_files(
             prove_reading(analysis, improved, read_vehicle(improved_part))
         verdict = with_runs_left_out(make_verdict(analysis, locations, forward.channels), analysis)
         verdict_part.write_text(verdict.text(), encoding="utf-8")
+        decided = ledger(analysis, verdict)
+        ledger_part.write_text(text_of(decided), encoding="utf-8")
         progress("drawing")
-        page_part.write_text(make_page(analysis, verdict, forward.notes), encoding="utf-8")
+        page_part.write_text(make_page(analysis, verdict, forward.notes, decided), encoding="utf-8")
     progress(verdict.sentence)
     return verdict

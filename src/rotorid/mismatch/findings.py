@@ -18,6 +18,18 @@ CLAIMED = ("established", "ambiguous")
 Status = Literal["established", "ambiguous", "suggested", "absorbed", "not_established"]
 
 
+class Reason(str):
+    """Why an effect is not stated, in words, and the rule that says so."""
+
+    rule: str
+
+    def __new__(cls, rule: str, text: str) -> Reason:
+        """The words of a rule."""
+        made = super().__new__(cls, text)
+        made.rule = rule
+        return made
+
+
 @dataclass(frozen=True)
 class Estimate:
     """A fitted number with its 95 % interval."""
@@ -49,6 +61,8 @@ class Finding:
     """For `ambiguous`: the whole class, itself included."""
     gain: tuple[float, float, float] | None = None
     """Held-out rmse ratio (with / without the effect) and its 95 % interval, block bootstrap."""
+    rule: str = ""
+    """Of one that is not established: the rule that took it out."""
     objection: str = ""
     """Of a `suggested` one: why it is not established."""
     windows: tuple[tuple[str, float, float], ...] = ()

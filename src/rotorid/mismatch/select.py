@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
@@ -306,11 +307,11 @@ class Search:
         size = self.weight(key, judged.beta, active)
         reason = None
         if judged.p_value > KEEP_P:
-            reason = f"p = {judged.p_value:.2g} beside the others"
+            reason = Reason("significance", f"p = {judged.p_value:.2g} beside the others")
         elif not judged.physical:
-            reason = "its coefficients are outside physical bounds"
+            reason = Reason("physical_bounds", "its coefficients are outside physical bounds")
         elif size < SMALLEST_SIZE:
-            reason = f"its size is {size:.2g} of the noise"
+            reason = Reason("size", f"its size is {size:.2g} of the noise")
         return reason, judged.score
 
     def weak(self, active: list[str]) -> tuple[str, str] | None:
@@ -355,13 +356,13 @@ class Search:
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
                 for key in active:
                     if self.terms[key].once not in {self.terms[k].once for k in simpler}:
-                        dropped[self.terms[key].once] = "the others explain as much in other forms"
+                        dropped[self.terms[key].once] = Reason("simpler", "the others explain as much in other forms")
                 active = simpler
             exchanged = None if added else self.swapped(active, dropped)
             if exchanged is not None:
                 trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
                 for gone in set(active) - set(exchanged):
-                    dropped[self.terms[gone].once] = "another explains more in its place"
+                    dropped[self.terms[gone].once] = Reason("exchange", "another explains more in its place")
                 active = exchanged
             while (weak := self.weak(active)) is not None:
                 key, reason = weak
@@ -385,7 +386,7 @@ class Search:
             size = self.weight(candidate.key, candidate.beta, active)
             if size >= SMALLEST_SIZE:
                 return [candidate.key]
-            dropped.setdefault(effect, f"its size is {size:.2g} of the noise")
+            dropped.setdefault(effect, Reason("size", f"its size is {size:.2g} of the noise"))
         return None
 
     def _turn(self, candidate: Candidate) -> int:
@@ -397,15 +398,15 @@ class Search:
         if self.ask.contradicted is not None:
             fit = self.regression.fit(self.always + active)
             if (none := next((k for k in active if self.ask.contradicted(k, fit)), None)) is not None:
-                return none, "the comparison of two sensors shows nothing of it"
+                return none, Reason("two_sensors", "the comparison of two sensors shows nothing of it")
         if (failed := self.refuted_elsewhere(active)) is not None:
-            return failed, "where it was not fitted it does not keep what it promises"
+            return failed, Reason("transfer", "where it was not fitted it does not keep what it promises")
         if (unsteady := self.unsteady(active)) is not None:
-            return unsteady, "it differs from run to run"
+            return unsteady, Reason("steady", "it differs from run to run")
         if (leaning := self.leaning(active)) is not None:
-            return leaning, "it only cancels a cause without a name"
+            return leaning, Reason("cancels_unnamed", "it only cancels a cause without a name")
         if (cancelling := self.cancelling(active)) is not None:
-            return cancelling, "where it is strongest it only cancels another"
+            return cancelling, Reason("cancels", "where it is strongest it only cancels another")
         return None
 
     def cancelling(self, active: list[str]) -> str | None:
@@ -442,7 +443,9 @@ class Search:
             if doubtful is None or final[doubtful] <= FINAL_P:
                 return fit, final
             active.remove(doubtful)
-            dropped[self.terms[doubtful].once] = f"p = {final[doubtful]:.2g} where each block has its say"
+            dropped[self.terms[doubtful].once] = Reason(
+                "jackknife", f"p = {final[doubtful]:.2g} where each block has its say"
+            )
             trail.append(f"- {doubtful}: fails the jackknife")
 
     def refuted_elsewhere(self, active: list[str]) -> str | None:

@@ -12,6 +12,7 @@ import pytest
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.mismatch.deliver import verdict_of
+from rotorid.mismatch.ledger import ledger, text_of
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run
@@ -116,3 +117,12 @@ def test_the_runs_held_out_share_what_was_flown():
     whole = RecordingSet("made", calm.vehicle, runs)
     assert split_runs(whole).held_out != ("run02",)
     assert split_runs(whole) == split_runs(whole)
+
+
+def test_the_ledger_says_which_rule_decided_on_what():
+    entries = ledger(analysed(30.0), verdict_of(analysed(30.0)))
+    lowered = {e["on"]: e for e in entries}["rotor_drag"]
+    assert lowered["rule"] == "report_runs" and "held out" in lowered["sentence"] and lowered["numbers"]
+    kept = {e["on"]: e for e in ledger(analysed(0.0), verdict_of(analysed(0.0)))}["rotor_drag"]
+    assert kept["rule"] == "established" and kept["numbers"]["high_95"] < 1.0
+    assert json.loads(text_of(entries)) == entries

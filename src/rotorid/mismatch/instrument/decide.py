@@ -87,7 +87,8 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
         if effect_id in named or effect_id in UNKNOWNS:
             continue
         name = effects[effect_id].name
-        out.append(Finding(id=effect_id, status="not_established", sentence=f"{name} did not hold: {reason}"))
+        text, rule = f"{name} did not hold: {reason}", getattr(reason, "rule", "")
+        out.append(Finding(id=effect_id, status="not_established", sentence=text, rule=rule))
     return out
 
 

@@ -15,13 +15,16 @@ import numpy as np
 
 from rotorid.mismatch.channel_errors import excited, growth, helps
 from rotorid.mismatch.channel_harm import HELP_Z
+from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.instrument.decide import main_channels
 from rotorid.mismatch.instrument.model import REFUTED, ReadingModel, block_length, of_single_runs
 from rotorid.mismatch.instrument.values import Values, delivered, held_out, settled
 from rotorid.mismatch.unknowns import UNKNOWNS
 
-USELESS = "without it the error on the runs held out is no larger in any channel that it acts in"
-OF_OTHER_RUNS = "something else explains the runs held out, of which its numbers for single runs say nothing"
+USELESS = Reason("use", "without it the error on the runs held out is no larger in any channel that it acts in")
+OF_OTHER_RUNS = Reason(
+    "other_runs", "something else explains the runs held out, of which its numbers for single runs say nothing"
+)
 
 Again = Callable[[list[str], dict[str, str]], ReadingModel]
 """Searches once more from the terms of a list, without the ids refused."""
