@@ -22,6 +22,7 @@ include: "workflow/rules/grey_box.smk"
 include: "workflow/rules/black_box.smk"
 include: "workflow/rules/mismatch.smk"
 include: "workflow/rules/proof.smk"
+include: "workflow/rules/plantings.smk"
 include: "workflow/rules/report.smk"
 
 
