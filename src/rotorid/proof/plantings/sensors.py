@@ -73,7 +73,7 @@ def accelerometer_turned(recordings: RecordingSet, angle: float, rng: np.random.
 
 def angular_acceleration(run: Run) -> np.ndarray:
     """Derivative of the low-passed body rates, (n, 3), rad/s²; the ends, which the filter does not reach, are held."""
-    rates = run.array(c.ANGULAR_VELOCITY)
+    rates = run.array(c.ANGULAR_VELOCITY).copy()
     t = run.time_s
     for k in range(3):
         good = np.isfinite(rates[:, k])
