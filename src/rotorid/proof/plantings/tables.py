@@ -149,7 +149,7 @@ def _lines(group: str, size: str, rows: pd.DataFrame, code: str) -> list[dict[st
 
 
 def _count(column: pd.Series) -> pd.Series:
-    return column.fillna("").map(lambda text: len(text.split("; ")) if text else 0)
+    return column.fillna("").map(lambda text: len(text.split("; ")) if text else 0).astype(int)
 
 
 def _mean(counts: pd.Series) -> tuple[float | None, tuple[float, float], int]:
