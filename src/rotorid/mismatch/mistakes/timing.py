@@ -26,9 +26,9 @@ from rotorid.recordings import RecordingSet, Run, Vehicle
 COMMANDED = ("commands", "throttle")
 LEAST_ALONE = 0.9
 TELLS_A_DRIFT = 0.95
-"""Share of the motion that commands must explain to tell a drift: disturbances come and go, their lateness too.
+"""Share of the motion that commands must explain to tell a drift: disturbances come and go, and their lateness too.
 
-Of measured speeds the bound on what disturbances do to the lateness takes the place of both (`bias_s`)."""
+Of measured speeds the bound on what disturbances can feign (`disturbed_s`) takes the place of both."""
 LEAST_SHARE = 0.1
 """A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
 SHARE_STEP_S = 0.004
