@@ -35,7 +35,7 @@ SHARE_STEP_S = 0.004
 """By how much a sensor is made late to see how far a comparison's lateness follows."""
 LEAST_EXPLAINED = 0.6
 P_LIMIT, P_LATE = 1e-6, 1e-4
-"""Chance of a growth of lateness, and of a constant one beyond a sample, which has to bring LEAST_LIKELIHOOD as well."""
+"""Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
 LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
 MOTOR_FORM = 0.15
