@@ -37,6 +37,11 @@ def plantings_of(wildcards):
     return [p.name for p in PLANTED[wildcards.batch]]
 
 
+def mistakes_of(wildcards):
+    """Names of a flight's plantings that the search for mistakes has to tell."""
+    return [p.name for p in planted.mistakes(PLANTINGS, wildcards.flight)]
+
+
 def kept_plantings(wildcards):
     """The table of plantings that were judged before, where there is one."""
     return [CONFIG.plantings.kept] if Path(CONFIG.plantings.kept).is_file() else []
@@ -106,3 +111,28 @@ rule plantings:
         "The plantings are in results/plantings: plantings_summary.csv first"
     input:
         results_behind(*rules.tabulate_plantings.output),
+
+
+rule search_mistakes:
+    """What the search for mistakes alone tells of those planted in one flight."""
+    message:
+        "Plantings: the search for mistakes, {wildcards.flight}"
+    input:
+        recordings=set_of_flight,
+    output:
+        table="results/plantings/mistakes/{flight}.csv",
+    params:
+        plantings=mistakes_of,
+        code=code_of("search_mistakes"),
+    log:
+        "results/logs/search_mistakes/{flight}.log",
+    script:
+        "../scripts/search_mistakes.py"
+
+
+rule planted_mistakes:
+    """Mistakes planted in real flights, by the search for mistakes alone: results/plantings/mistakes."""
+    message:
+        "The tables are in results/plantings/mistakes"
+    input:
+        expand("results/plantings/mistakes/{flight}.csv", flight=PLANTED_FLIGHTS),

@@ -10,7 +10,6 @@ import pytest
 
 from rotorid.effects.motor_lag import lagged
 from rotorid.effects.throttle_curve import root
-from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.proof.plantings import judge, plan, score, sow, tables
 from rotorid.proof.plantings.flights import FLIGHTS, flight, taken
 from rotorid.proof.plantings.kinds import Ratio, Size, Truth, named
@@ -219,11 +218,11 @@ def test_every_kind_leaves_a_set_that_can_be_read_and_says_what_it_did(recorded:
 
 
 def test_mistakes_planted_in_a_made_up_set_are_told_by_the_search_for_them(recorded: RecordingSet) -> None:
-    """The scoring of the search for mistakes alone, on what needs no physics to be told."""
-    for name in ("rotors_in_rpm", "voltage_in_millivolt"):
-        out, truth = planted(recorded, name)
-        _, findings, _ = find_mistakes(out)
-        assert truth.names <= {f.id for f in findings}, name
+    known = [plan.Planting("made-up", "units", (k,), "large", 0) for k in ("rotors_in_rpm", "voltage_in_millivolt")]
+    rows = tables.mistake_rows(recorded, known, "now")
+    assert [r["told"] for r in rows] == [score.ALONE] * 2
+    assert "rpm" in rows[0]["said"] and rows[0]["code"] == "now"
+    assert plan.mistakes([*known, plan.Planting("made-up", "values", ("mass",), "large", 0)], "made-up") == known
 
 
 def test_the_list_is_long_drawn_once_and_read_as_it_was_written(tmp_path: Path) -> None:

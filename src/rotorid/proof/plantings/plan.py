@@ -13,6 +13,9 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 PAIR = "pair"
+MISTAKES = ("clocks", "axes", "units", "stuck")
+MISTAKEN_KINDS = ("rotors_swapped", "spins_reversed")
+"""Families, and kinds of another, that the search for mistakes has to tell before any physics is asked for."""
 SECONDS = {"neurobem": 40.0, "imrc": 60.0, "arpl-10": 50.0, "arpl-15": 40.0, "crazypad": 25.0, "appius": 5.0}
 """Usual seconds of one core to judge a set of each flight."""
 START_S = 6.0
@@ -67,6 +70,13 @@ def batches(plantings: Sequence[Planting], size: int) -> dict[str, list[Planting
             content = hashlib.sha256("\n".join(p.name for p in part).encode()).hexdigest()[:8]
             out[f"{flight}-{start // size:03d}-{content}"] = part
     return out
+
+
+def mistakes(plantings: Sequence[Planting], flight: str) -> list[Planting]:
+    """Single plantings of a flight that the search for mistakes has to tell."""
+    return [
+        p for p in plantings if p.flight == flight and (p.family in MISTAKES or set(p.kinds) <= set(MISTAKEN_KINDS))
+    ]
 
 
 def announcement(chosen: Mapping[str, Sequence[Planting]], done: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ import pandas as pd
 from scipy.stats import chi2
 
 from rotorid.proof.intervals import wilson
+from rotorid.proof.plantings.judge import of_mistakes
 from rotorid.proof.plantings.kinds import LARGE
 from rotorid.proof.plantings.plan import PAIR, Planting
 from rotorid.proof.plantings.score import ALONE, IN_CLASS, UNSEEN, beside, score_truth
@@ -58,6 +59,19 @@ def rows_of(planting: Planting, recordings: RecordingSet, result: Mapping, untou
         {**common, "family": kind(name).family, "kind": name, **score_truth(verdict, untouched, truth)}
         for name, truth in zip(planting.kinds, truths, strict=True)
     ]
+
+
+def mistake_rows(recordings: RecordingSet, plantings: Sequence[Planting], code: str) -> list[dict[str, Any]]:
+    """One row a planted mistake, by the search for mistakes alone (seconds a set, where a verdict takes a minute)."""
+    untouched, out = of_mistakes(recordings), []
+    for planting in plantings:
+        changed, (truth,) = plant(recordings, planting)
+        found = of_mistakes(changed)
+        sentences = " ".join(e["sentence"] for e in found.get("effects", ()))
+        row = {"planting": planting.name, "flight": planting.flight, "family": planting.family}
+        row |= {"kind": planting.kinds[0], "size": planting.size, **score_truth(found, untouched, truth)}
+        out.append({**row, "said": sentences, "failed": found.get("failed", ""), "code": code})
+    return out
 
 
 def kept_with(new: pd.DataFrame, kept: pd.DataFrame | None) -> pd.DataFrame:
@@ -175,8 +189,3 @@ def differing_names(rows: pd.DataFrame) -> pd.DataFrame:
                 out[planted, what, name] = out.get((planted, what, name), 0) + 1
     lines = [{"kind": k, "what": w, "name": n, "sets": v} for (k, w, n), v in sorted(out.items())]
     return pd.DataFrame(lines, columns=["kind", "what", "name", "sets"])
-
-
-def misses(rows: pd.DataFrame, told: Sequence[str] = (ALONE, IN_CLASS, UNSEEN)) -> pd.DataFrame:
-    """Rows of causes that were not told and could have been."""
-    return rows[~rows["told"].isin(told)]
