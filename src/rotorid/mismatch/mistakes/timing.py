@@ -624,7 +624,7 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
     small = min(FILTER_S, FILTER_SAMPLES * sample)
     relative = relative_to_most(solved, periods, 2.0, small)
     late = {n: value for n, (value, _, _) in relative.items()}
-    tolerance = {n: max(periods[n], 2 * sd) for n, (_, sd, _) in relative.items()}
+    tolerance = {n: max(periods[n], 3 * sd) for n, (_, sd, _) in relative.items()}
     wrong, notes, limits = [], [], {}
     for n, (value, sd, bound) in relative.items():
         touching = [d for d in found if abs(d.part([n])) > LEAST_SHARE]
