@@ -18,7 +18,7 @@ SOURCES := $(shell find Snakefile config.yaml pyproject.toml README.md .pre-comm
 	src acquire workflow notebooks tests raw docs \
 	-type f ! -path '*/__pycache__/*' ! -name '* *' 2>/dev/null)
 
-.PHONY: help report proof campaign test check environment lock
+.PHONY: help report proof plantings campaign test check environment lock
 .DEFAULT_GOAL := help
 
 help: ## say what there is
@@ -35,6 +35,11 @@ proof: $(READY) ## hide, find, score: about two hours; what is done stays done (
 	@$(BIN)/snakemake --cores $(CORES) proof $(OPTIONS)
 	@mkdir -p docs/proof && cp results/proof/*.csv results/proof/state.json docs/proof/
 	@echo "The proof: results/proof/summary.csv; its tables are kept in docs/proof for the report"
+
+plantings: $(READY) ## put something exact into real flights and score what is told of it; kept in docs/proof
+	@$(BIN)/snakemake --cores $(CORES) plantings $(OPTIONS)
+	@mkdir -p docs/proof && cp results/plantings/plantings*.csv docs/proof/
+	@echo "The plantings: results/plantings/plantings_summary.csv; their tables are kept in docs/proof"
 
 test: $(TESTED) ## run every check; does nothing when nothing has changed since it last passed
 	@echo "Every check has passed on these files."

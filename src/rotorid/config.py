@@ -210,6 +210,19 @@ class Proof(Section):
     )
 
 
+class Plantings(Section):
+    """Something exact put into real flights."""
+
+    cases: list[Text] = Field(
+        min_length=1, description="Shell patterns on the names in workflow/plantings.tsv; one must fit [names]."
+    )
+    batch: int = Field(ge=1, description="Sets that one job judges [1].")
+    kept: Text = Field(
+        description="Table whose rows are kept beside new ones, marked where older code judged them; a file that does "
+        "not exist keeps none [path]."
+    )
+
+
 class Config(Section):
     """The whole of `config.yaml`."""
 
@@ -224,6 +237,7 @@ class Config(Section):
     grey_box: GreyBox = Field(description="Parameters of the equations of motion from data.")
     black_box: BlackBox = Field(description="The stand's wrench without knowledge of the vehicle.")
     proof: Proof = Field(description="The proof on concealed recordings.")
+    plantings: Plantings = Field(description="Plantings in real flights.")
     report: Report = Field(description="The report.")
 
 

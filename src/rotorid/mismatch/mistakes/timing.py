@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import permutations
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -22,12 +23,19 @@ from rotorid.mismatch.mistakes.signals import Signals, replace_columns, sensor_c
 from rotorid.mismatch.motion import fresh_samples
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
-THROUGH_AIR = ("rotors", "commands", "throttle")
+COMMANDED = ("commands", "throttle")
 LEAST_ALONE = 0.9
 TELLS_A_DRIFT = 0.95
-"""Share of the motion the rotors must explain to tell a drift: disturbances come and go, and so does their lateness."""
+"""Share of the motion that commands must explain to tell a drift: disturbances come and go, and their lateness too.
+
+Of measured speeds the bound on what disturbances can feign (`disturbed_s`) takes the place of both."""
+LEAST_SHARE = 0.1
+"""A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
+SHARE_STEP_S = 0.004
+"""By how much a sensor is made late to see how far a comparison's lateness follows."""
 LEAST_EXPLAINED = 0.6
-P_LIMIT = 1e-6
+P_LIMIT, P_LATE = 1e-6, 1e-4
+"""Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
 LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
 MOTOR_FORM = 0.15
@@ -73,6 +81,27 @@ class Difference:
     """Motor lag taken out of the command first."""
     gained: float
     """Rise of the log-likelihood by the growth over the best constant."""
+    shares: tuple[tuple[str, float], ...]
+    """Earlier sensors, and by which share of its own lateness each moves this one; the shares sum to one."""
+    bias_s: float = 0.0
+    """The most that disturbances, which the rotors answer in a closed loop, can feign of lateness."""
+    longest_s: float = 0.0
+    """Length of the longest run."""
+
+    def sd(self, key: int) -> float:
+        """One sigma of lateness (key 0) or growth (1)."""
+        return float(np.sqrt(max(self.covariance[key, key], 1e-16)))
+
+    def bound(self, key: int) -> float:
+        """The most that is feigned of lateness (key 0), or of growth from a run's start to its end (1).
+
+        By disturbances, or by a motor that is not exactly first order.
+        """
+        return max(self.bias_s, MOTOR_FORM * self.motor_s) if key == 0 else 2 * self.bias_s / max(self.longest_s, 1e-9)
+
+    def part(self, sensors: list[str]) -> float:
+        """By which share of their own lateness some sensors, late together, move this one."""
+        return float(self.late in sensors) - sum(share for name, share in self.shares if name in sensors)
 
 
 def find(recordings: RecordingSet) -> Result:
@@ -87,8 +116,13 @@ def find(recordings: RecordingSet) -> Result:
     return Result(found.recordings, result.findings + found.findings, result.notes + found.notes)
 
 
-def comparisons(all_signals: list[Signals], vehicle: Vehicle) -> list[tuple[str, str, Blocks, LaggedFit, float]]:
-    """Every comparison that may tell time: later sensor, earlier sensor, spectra, fit, motor lag taken out (s)."""
+Shares = tuple[tuple[str, float], ...]
+
+
+def comparisons(
+    all_signals: list[Signals], vehicle: Vehicle
+) -> list[tuple[str, str, Blocks, LaggedFit, float, Shares]]:
+    """Every comparison that may tell time: later and earlier sensor, spectra, fit, motor lag taken out (s), shares."""
     have = set().union(*(s.values for s in all_signals))
     speeds = next((n for n in map(compare.speeds_of, all_signals) if n), None)
     force = "accelerometer" if "accelerometer" in have else None
@@ -114,14 +148,46 @@ def comparisons(all_signals: list[Signals], vehicle: Vehicle) -> list[tuple[str,
     for late, over, blocks in pairs:
         if blocks is None:
             continue
+        shares: Shares = ((over, 1.0),)
         motor_s = 0.0
         if over in ("commands", "throttle"):
             motor_s, blocks = _through_motor(blocks)
         found = lagged.fit(blocks)
         if found is None:
             continue
-        out.append((late, over, blocks, found, motor_s))
+        if late == "velocity":
+            shares = shares_of(all_signals, vehicle, force or speeds, [0, 1] if over == "attitude" else [2], found)
+        out.append((late, over, blocks, found, motor_s, shares))
     return out
+
+
+def shares_of(
+    all_signals: list[Signals], vehicle: Vehicle, source: str, outputs: list[int], found: LaggedFit
+) -> Shares:
+    """By how much the lateness of the velocity follows that of the attitude, and that of the force turned by it.
+
+    In gentle flight level motion follows the tilt; in a fast one the force itself changes more. Both late together move
+    the velocity's lateness by all of it, so that the shares sum to one.
+    """
+    steps = max(1, round(SHARE_STEP_S * all_signals[0].rate_hz))
+    moved = [_late(s, "attitude", steps) for s in all_signals]
+    blocks = compare.accelerating(moved, vehicle, source)
+    again = lagged.fit(blocks.outputs(outputs)) if blocks is not None else None
+    if again is None:
+        return (("attitude", 1.0),) if outputs == [0, 1] else ((source, 1.0),)
+    attitude = float(np.clip((found.lag_s - again.lag_s) * all_signals[0].rate_hz / steps, 0.0, 1.0))
+    if attitude < LEAST_SHARE or attitude > 1.0 - LEAST_SHARE:
+        attitude = round(attitude)
+    return tuple((n, x) for n, x in (("attitude", attitude), (source, 1.0 - attitude)) if x > 0)
+
+
+def _late(signals: Signals, sensor: str, steps: int) -> Signals:
+    """Signals with one sensor written some samples late."""
+    if sensor not in signals.values:
+        return signals
+    values = np.full_like(signals.values[sensor], np.nan)
+    values[steps:] = signals.values[sensor][:-steps]
+    return replace(signals, values={**signals.values, sensor: values})
 
 
 def _through_motor(blocks: Blocks) -> tuple[float, Blocks]:
@@ -166,7 +232,9 @@ def _weighted(found: LaggedFit, base: LaggedFit) -> LaggedFit:
     )
 
 
-def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: float, drifting: bool) -> Difference:
+def difference(
+    late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: float, shares: Shares, drifting: bool
+) -> Difference:
     """Lateness, and its growth if asked for, at the likelihood's peak.
 
     Gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the first fit.
@@ -210,7 +278,25 @@ def difference(late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: 
         drift = likelihood(replace(blocks, x=blocks.x * phase[:, :, None]), found, np.zeros(1)).sum()
         gained = float(drift - likelihood(blocks, found, lags).sum(axis=0).max())
     explained = float(np.min(found.explained))
-    return Difference(late, over, start, growth, covariance, rise, blocks.count, explained, motor_s, gained)
+    bias = disturbed_s(blocks, found) if over == "rotors" else 0.0
+    longest = float(blocks.time_s.max()) + lagged.BLOCK_S / 2
+    return Difference(
+        late, over, start, growth, covariance, rise, blocks.count, explained, motor_s, gained, shares, bias, longest
+    )
+
+
+def disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
+    """The most lateness that disturbances can feign where the rotors explain a share E of the motion, s.
+
+    What disturbs a vehicle makes its controller answer, so that what is left of the motion is not independent of the
+    rotors. At worst all of it stands a quarter of a period off them: the phase between both is then off by
+    arcsin √((1 − E)/E), and the lateness by that over the mean angular frequency, weighted as the fit weighs it.
+    """
+    share = np.clip(found.explained, 0.5, 1.0)
+    phase = np.arcsin(np.sqrt((1.0 - share) / share))
+    power = found.weight * np.mean(np.abs(blocks.x @ found.gain.T) ** 2, axis=0).T
+    angular = 2 * np.pi * blocks.frequency_hz
+    return float((phase[:, None] * power * angular).sum() / (power * angular**2).sum())
 
 
 def unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
@@ -241,36 +327,46 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
     return np.cos(angle), np.sin(angle)
 
 
+def telling_differences(known: list, drifting: bool) -> tuple[list[Difference], list]:
+    """Every difference of lateness that a comparison is good enough to tell, and those comparisons."""
+    found = [(difference(*c, drifting=drifting), c) for c in known]
+    # What disturbs the vehicle makes its rotors answer late, which is no clock: there commands must explain all.
+    kept = [(d, c) for d, c in found if d.explained > (LEAST_ALONE if d.over in COMMANDED else LEAST_EXPLAINED)]
+    return [d for d, _ in kept], [c for _, c in kept]
+
+
 def differences(known: list, drifting: bool) -> list[Difference]:
-    """Every difference of lateness that a comparison is good enough to tell."""
-    found = [difference(*c, drifting=drifting) for c in known]
-    # What disturbs the vehicle makes its rotors answer late, which is no clock: there the rotors must explain all.
-    return [d for d in found if d.explained > (LEAST_ALONE if d.over in THROUGH_AIR else LEAST_EXPLAINED)]
+    """The differences of `telling_differences` alone."""
+    return telling_differences(known, drifting)[0]
 
 
 def across(differences: list[Difference], wrong: list[str], key: int) -> tuple[float, float]:
-    """Lateness (key 0) or growth (1) of some sensors over the rest, and one sigma, from comparisons between the two."""
+    """Lateness (key 0) or growth (1) of some sensors over the rest, and one sigma, from comparisons between the two.
+
+    What disturbances can feign counts as another one sigma: it is a bound, and seldom met.
+    """
     values, weights = [], []
     for d in differences:
-        if (d.late in wrong) != (d.over in wrong):
-            sign = 1.0 if d.late in wrong else -1.0
-            values.append(sign * (d.growth if key else d.start_s))
-            weights.append(1.0 / max(d.covariance[key, key], 1e-18))
+        part = d.part(wrong)
+        if abs(part) > LEAST_SHARE:
+            values.append((d.growth if key else d.start_s) / part)
+            weights.append(part**2 / (d.sd(key) ** 2 + d.bound(key) ** 2))
     return float(np.average(values, weights=weights)), float(1.0 / np.sqrt(np.sum(weights)))
 
 
 def in_every_run(whole: Difference, comparison: tuple) -> bool:
     """Whether each run by itself shows the growth: what acts in part of a flight only must not pass for a clock."""
-    late, over, blocks, found, motor_s = comparison
+    late, over, blocks, found, motor_s, shares = comparison
     agree, shown = [], []
     for run in np.unique(blocks.run):
         own = blocks.part(blocks.run == run)
-        if own.count < 2 * lagged.FEWEST_BLOCKS:
+        if own.count < lagged.FEWEST_BLOCKS:
             continue
-        d = difference(late, over, own, found, motor_s, drifting=True)
-        sd = float(np.sqrt(d.covariance[1, 1]))
+        d = difference(late, over, own, found, motor_s, shares, drifting=True)
+        sd = d.sd(1)
         agree.append(abs(d.growth - whole.growth) < RUN_SIGMAS * sd + RUN_AGREEMENT * abs(whole.growth))
-        shown.append(d.growth * whole.growth > 0 and abs(d.growth) > 3 * sd and d.gained > LEAST_LIKELIHOOD / 4)
+        due = min(LEAST_LIKELIHOOD, whole.gained * own.count / blocks.count) / 4
+        shown.append(d.growth * whole.growth > 0 and abs(d.growth) > 2 * sd and d.gained > due)
     return bool(agree) and all(agree) and np.mean(shown) >= 0.6
 
 
@@ -305,57 +401,124 @@ def _peak(lags: np.ndarray, curves: np.ndarray, time_s: np.ndarray, guess: float
     return start, growth
 
 
-def lateness(differences: list[Difference], key: int) -> tuple[dict[str, float], dict[str, float]]:
-    """Lateness (key 0) or growth (key 1) of every sensor, and one sigma, the largest agreeing group at zero."""
-    names = sorted({d.late for d in differences} | {d.over for d in differences})
-    values, sds = {}, {}
-    for group in _connected(names, differences):
-        inside = [d for d in differences if d.late in group]
-        rows = np.zeros((len(inside), len(group)))
-        target, sd = np.zeros(len(inside)), np.zeros(len(inside))
-        for k, d in enumerate(inside):
-            rows[k, group.index(d.late)], rows[k, group.index(d.over)] = 1.0, -1.0
-            target[k] = d.start_s if key == 0 else d.growth
-            sd[k] = np.sqrt(max(d.covariance[key, key], 1e-16))
-        scaled_rows = rows / sd[:, None]
-        solution = np.linalg.pinv(scaled_rows) @ (target / sd)
-        covariance = np.linalg.pinv(scaled_rows.T @ scaled_rows)
-        for name, value, variance in zip(group, solution, np.diag(covariance), strict=True):
-            values[name], sds[name] = float(value), float(np.sqrt(variance))
-    return values, sds
+@dataclass(frozen=True)
+class Lateness:
+    """Lateness (or growth) of every sensor, up to what all sensors that are connected share."""
+
+    names: list[str]
+    values: np.ndarray
+    """(n,)."""
+    operator: np.ndarray
+    """(n, comparisons): what each comparison adds to a value."""
+    sd: np.ndarray
+    """One sigma of each comparison, (comparisons,)."""
+    bound: np.ndarray
+    """The most that disturbances can feign in each, (comparisons,)."""
+    groups: list[list[str]]
+    """Sensors that comparisons connect."""
+
+    def over(self, name: str, others: list[str]) -> tuple[float, float, float]:
+        """A sensor's value over the mean of others: itself, one sigma, and the most that disturbances can feign."""
+        rows = [self.names.index(n) for n in others]
+        at = self.names.index(name)
+        row = self.operator[at] - self.operator[rows].mean(axis=0)
+        value = float(self.values[at] - self.values[rows].mean())
+        return value, float(np.sqrt(np.sum((row * self.sd) ** 2))), float(np.abs(row) @ self.bound)
+
+
+def lateness(differences: list[Difference], key: int) -> Lateness:
+    """Lateness (key 0) or growth (key 1) of every sensor by weighted least squares."""
+    names = sorted({d.late for d in differences} | {n for d in differences for n, _ in d.shares})
+    rows = np.zeros((len(differences), len(names)))
+    for k, d in enumerate(differences):
+        rows[k, names.index(d.late)] = 1.0
+        for name, share in d.shares:
+            rows[k, names.index(name)] -= share
+    target = np.array([d.growth if key else d.start_s for d in differences])
+    sd, bound = (np.array([f(key) for f in fs]) for fs in zip(*((d.sd, d.bound) for d in differences), strict=True))
+    scale = 1.0 / np.hypot(sd, bound)
+    operator = np.linalg.pinv(rows * scale[:, None]) * scale
+    return Lateness(names, operator @ target, operator, sd, bound, _connected(names, differences))
 
 
 def _connected(names: list[str], differences: list[Difference]) -> list[list[str]]:
     groups = [{n} for n in names]
     for d in differences:
-        a = next(g for g in groups if d.late in g)
-        b = next(g for g in groups if d.over in g)
-        if a is not b:
-            a |= b
-            groups.remove(b)
+        for name, _ in d.shares:
+            a = next(g for g in groups if d.late in g)
+            b = next(g for g in groups if name in g)
+            if a is not b:
+                a |= b
+                groups.remove(b)
     return [sorted(g) for g in groups]
 
 
 PREFERRED = ("gyroscope", "attitude", "accelerometer", "velocity", "rotors")
+INERTIAL = ("gyroscope", "accelerometer")
+
+
+def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], sigmas: float, filter_s: float):
+    """The largest set of a group's sensors that agree, without those of it that a filter of their own makes late.
+
+    `least` is what each may be off in any case; an inertial sensor is late by its own filter's `filter_s` at most.
+    """
+
+    def near(n: str, c: str) -> bool:
+        value, sd, _ = solved.over(n, [c])
+        return abs(value) <= max(least[n], least[c], sigmas * sd)
+
+    def filtered(n: str, c: str) -> bool:
+        return n in INERTIAL and c not in INERTIAL and 0.0 < solved.over(n, [c])[0] < filter_s
+
+    best = None
+    for candidate in group:
+        own = [n for n in group if near(n, candidate)]
+        late = [n for n in group if n not in own and (filtered(n, candidate) or filtered(candidate, n))]
+        preferred = -min((PREFERRED.index(n) for n in own if n in PREFERRED), default=len(PREFERRED))
+        rank = (len(own) + len(late), len(own), preferred)
+        if best is None or rank > best[0]:
+            kept = own
+            if late and any(filtered(candidate, n) for n in late):
+                kept = [n for n in late if filtered(candidate, n)]
+            best = (rank, kept)
+    return best[1]
 
 
 def relative_to_most(
-    values: dict[str, float], groups: list[list[str]], tolerance: dict[str, float]
-) -> dict[str, float]:
-    """Values with the largest group of agreeing sensors of every connected part at zero."""
+    solved: Lateness, least: dict[str, float], sigmas: float, filter_s: float = 0.0
+) -> dict[str, tuple[float, float, float]]:
+    """Value of each sensor over the largest set of sensors that agree, its sigma, and what disturbances can feign.
+
+    Over the one of the set against which it is known best. Every connected part has its own zero; of two that would
+    blame a sensor each, late in one and early by as much in the other, the zeros are chosen so that one clock does.
+    """
+    zeros = [in_agreement(solved, group, least, sigmas, filter_s) for group in solved.groups]
+    found = [_over_known(solved, group, right) for group, right in zip(solved.groups, zeros, strict=True)]
+    off = [{n: v for n, v in part.items() if _stands_out(n, v, least, sigmas)} for part in found]
+    for a, b in permutations(range(len(off)), 2):
+        same = [n for n, v in off[b].items() if any(_opposite(v, w, sigmas, filter_s) for w in off[a].values())]
+        if same and len(off[b]) == len(same) and len(off[a]) >= len(off[b]):
+            found[b] = _over_known(solved, solved.groups[b], same)
+            break
+    return {n: v for part in found for n, v in part.items()}
+
+
+def _over_known(solved: Lateness, group: list[str], right: list[str]) -> dict[str, tuple[float, float, float]]:
+    """Each sensor over the one of `right` against which it is known best; those of `right` over their mean."""
     out = {}
-    for group in groups:
-        best = None
-        for candidate in group:
-            near = [n for n in group if abs(values[n] - values[candidate]) <= max(tolerance[n], tolerance[candidate])]
-            preferred = -min((PREFERRED.index(n) for n in near if n in PREFERRED), default=len(PREFERRED))
-            rank = (len(near), preferred)
-            if best is None or rank > best[0]:
-                best = (rank, near)
-        zero = float(np.mean([values[n] for n in best[1]]))
-        for n in group:
-            out[n] = values[n] - zero
+    for n in group:
+        against = [solved.over(n, [c]) for c in right if c != n]
+        out[n] = solved.over(n, right) if n in right else min(against, key=lambda v: v[1] + v[2])
     return out
+
+
+def _stands_out(name: str, value: tuple[float, float, float], least: dict[str, float], sigmas: float) -> bool:
+    return abs(value[0]) > max(least[name], sigmas * value[1], value[2])
+
+
+def _opposite(one: tuple[float, float, float], other: tuple[float, float, float], sigmas: float, slack: float) -> bool:
+    """Whether two values differ in nothing but their sign."""
+    return one[0] * other[0] < 0 and abs(one[0] + other[0]) < max(slack, sigmas * np.hypot(one[1], other[1]))
 
 
 def own_period_s(all_signals: list[Signals]) -> dict[str, float]:
@@ -388,39 +551,43 @@ def _listed(sensors: list[str]) -> str:
 def _skew(recordings: RecordingSet, known: list) -> Result:
     """Sensors whose lateness grows."""
     signals = signals_of(recordings)
-    found = differences(known, drifting=True)
-    sources = {(late, over): (late, over, *rest) for late, over, *rest in known}
+    found, sources = telling_differences(known, drifting=True)
     longest = max((s.time_s[-1] - s.time_s[0] for s in signals), default=0.0)
     periods = own_period_s(signals)
     telling = []
-    for d in found:
-        if d.over in THROUGH_AIR and d.explained < TELLS_A_DRIFT:
+    for d, source in zip(found, sources, strict=True):
+        if d.over in COMMANDED and d.explained < TELLS_A_DRIFT:
             continue
-        sd = float(np.sqrt(d.covariance[1, 1]))
-        p = float(2 * student.sf(abs(d.growth) / max(sd, 1e-12), max(d.blocks - 2, 1)))
-        drift = abs(d.growth) * longest
-        if p < P_LIMIT and drift > max(periods[d.late], periods[d.over]) and d.gained > LEAST_LIKELIHOOD:
-            if not in_every_run(d, sources[d.late, d.over]):
+        beyond = abs(d.growth) - d.bound(1)
+        p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.blocks - 2, 1)))
+        slowest = max(periods[n] for n in (d.late, *(name for name, _ in d.shares)))
+        if p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > LEAST_LIKELIHOOD:
+            if not in_every_run(d, source):
                 continue
             telling.append((p, d))
     if not telling:
         return Result(recordings)
-    names = sorted({d.late for d in found} | {d.over for d in found})
-    values, sds = lateness(found, 1)
-    groups = _connected(names, found)
-    tolerance = {n: 0.5 * max(periods[n], 2e-3) / longest + 3 * sds[n] for n in names}
-    drift = relative_to_most(values, groups, tolerance)
-    wrong = [n for n in names if abs(drift[n]) > tolerance[n] and abs(drift[n]) * longest > periods[n]]
+    solved = lateness(found, 1)
+    drift = relative_to_most(solved, {n: 0.5 * max(periods[n], 2e-3) / longest for n in solved.names}, 3.0)
+    wrong = [
+        n
+        for n, (value, sd, bound) in drift.items()
+        if abs(value) > 0.5 * max(periods[n], 2e-3) / longest + 3 * sd + bound and abs(value) * longest > periods[n]
+    ]
     wrong = [n for n in wrong if n != "position" or {"velocity", "attitude"} & set(wrong)]
     if not wrong:
         return Result(recordings)
+    # One clock at a time, the one most sensors go by first: what a second one did is measured anew.
+    rates = {n: value for n, (value, _, _) in drift.items()}
+    sides = [[n for n in wrong if rates[n] > 0], [n for n in wrong if rates[n] < 0]]
+    wrong = max(sides, key=len)
     rate, sd = across(found, wrong, 1)
     # Large drifts move the motion out of its block: measured once more with the first estimate taken out.
     nearly = recordings
     for sensor in wrong:
         nearly = shifted(nearly, sensor, 0.0, rate)
     again = differences(comparisons(signals_of(nearly), recordings.vehicle), drifting=True)
-    if any((d.late in wrong) != (d.over in wrong) for d in again):
+    if any(abs(d.part(wrong)) > LEAST_SHARE for d in again):
         rest, sd = across(again, wrong, 1)
         rate += rest
     everywhere = wrong + (["position"] if {"velocity", "attitude"} <= set(wrong) and "position" not in wrong else [])
@@ -452,19 +619,19 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
     found = differences(known, drifting=False)
     if not found:
         return Result(recordings)
-    names = sorted({d.late for d in found} | {d.over for d in found})
-    values, sds = lateness(found, 0)
-    groups = _connected(names, found)
+    solved = lateness(found, 0)
     sample = max(1.0 / s.rate_hz for s in signals)
-    tolerance = {n: max(periods[n], 2 * sds[n]) for n in names}
-    late = relative_to_most(values, groups, tolerance)
+    small = min(FILTER_S, FILTER_SAMPLES * sample)
+    relative = relative_to_most(solved, periods, 2.0, small)
+    late = {n: value for n, (value, _, _) in relative.items()}
+    tolerance = {n: max(periods[n], 3 * sd) for n, (_, sd, _) in relative.items()}
     wrong, notes, limits = [], [], {}
-    for n in names:
-        touching = [d for d in found if n in (d.late, d.over)]
-        limit = limits[n] = max(periods[n], sample, *(MOTOR_FORM * d.motor_s for d in touching))
+    for n, (value, sd, bound) in relative.items():
+        touching = [d for d in found if abs(d.part([n])) > LEAST_SHARE]
+        limit = limits[n] = max(periods[n], sample, bound)
         blocks = max(d.blocks for d in touching)
-        p = float(student.sf((abs(late[n]) - limit) / sds[n], max(blocks - 2, 1)))
-        if p > P_LIMIT or max(d.likelihood for d in touching) < LEAST_LIKELIHOOD:
+        p = float(student.sf((abs(value) - limit) / max(sd, 1e-9), max(blocks - 2, 1)))
+        if p > P_LATE or max(d.likelihood for d in touching) < LEAST_LIKELIHOOD:
             continue
         if n == "position":
             notes.append(
@@ -473,32 +640,27 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
             )
             continue
         wrong.append((n, p))
-    fixed = recordings
-    if (
-        len(wrong) == 1
-        and wrong[0][0] in SMALL_LAGS
-        and abs(late[wrong[0][0]]) < min(FILTER_S, FILTER_SAMPLES * sample)
-    ):
-        sensor = wrong[0][0]
-        wrong = []
+    fixed, findings, clusters = recordings, [], _clusters([n for n, _ in wrong], late, tolerance)
+    own = [c[0] for c in clusters if len(c) == 1 and c[0] in SMALL_LAGS and abs(late[c[0]]) < small]
+    for sensor in own:
         notes.append(
             f"{WORDS[sensor].capitalize()}: {1e3 * late[sensor]:+.1f} ms against the rest, {SMALL_LAGS[sensor]}."
         )
-        if sensor in ("gyroscope", "accelerometer"):
+        if sensor in INERTIAL:
             fixed = shifted(fixed, sensor, late[sensor], 0.0)
-    if not wrong:
-        return Result(fixed, (), tuple(notes))
-    findings = []
-    for cluster in _clusters([n for n, _ in wrong], late, tolerance):
-        right = [d for d in found if not ({d.late, d.over} & ({n for n, _ in wrong} - set(cluster)))]
-        amount, sd = across(right or found, cluster, 0)
+    unfiltered = fixed
+    for cluster in clusters:
+        if cluster[0] in own:
+            continue
+        others = [n for n, _ in wrong if n not in cluster and n not in own]
+        amount, sd = float(np.mean([late[n] for n in cluster])), max(relative[n][1] for n in cluster)
         everywhere = cluster + (["position"] if {"velocity", "attitude"} <= set(cluster) else [])
-        nearly, steps = recordings, round(amount / sample) * sample
+        nearly, steps = unfiltered, round(amount / sample) * sample
         for sensor in everywhere:
             nearly = shifted(nearly, sensor, steps, 0.0)
         again = differences(comparisons(signals_of(nearly), recordings.vehicle), drifting=False)
-        again = [d for d in again if not ({d.late, d.over} & ({n for n, _ in wrong} - set(cluster)))]
-        if any((d.late in cluster) != (d.over in cluster) for d in again):
+        again = [d for d in again if not _touches(d, others)]
+        if any(abs(d.part(cluster)) > LEAST_SHARE for d in again):
             # Measured once more from close by, where the blocks of the two sensors hold the same motion.
             rest, sd = across(again, cluster, 0)
             amount = steps + rest
@@ -523,6 +685,11 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
             )
         )
     return Result(fixed, tuple(findings), tuple(notes))
+
+
+def _touches(d: Difference, sensors: list[str]) -> bool:
+    """Whether a comparison has one of some sensors on either side."""
+    return d.late in sensors or any(name in sensors for name, _ in d.shares)
 
 
 def _clusters(names: list[str], values: dict[str, float], tolerance: dict[str, float]) -> list[list[str]]:

@@ -1,0 +1,59 @@
+"""The real flights in which something is planted, cut short so that many can be judged. Light: read at every start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rotorid.recordings import RecordingSet
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A public set and how much of it is taken."""
+
+    name: str
+    set: str
+    seconds: float
+    """Longest stretch taken from each run, about its middle."""
+    runs: tuple[str, ...] = ()
+    """Runs taken; all where empty."""
+    held_out: tuple[str, ...] | None = None
+    has: str = ""
+    """What is recorded, in words."""
+
+
+FLIGHTS = (
+    Flight("neurobem", "neurobem", 12.0, has="motion capture, body rates, accelerometer, rotor speeds, voltage"),
+    Flight(
+        "imrc",
+        "imrc-brushless",
+        8.0,
+        runs=("eckart00", "eckart01", "eckart12", "eckart13"),
+        has="estimated state, gyroscope, accelerometer, commands, rotor speeds, voltage",
+    ),
+    Flight("arpl-10", "crazyflie-arpl-log10", 30.0, has="gyroscope, accelerometer, throttle"),
+    Flight("arpl-15", "crazyflie-arpl-log15", 20.0, has="gyroscope, accelerometer, throttle"),
+    Flight(
+        "crazypad", "crazypad-normal", 8.0, has="estimated state without pitch, two accelerometers, throttle, voltage"
+    ),
+    Flight("appius", "appius-ground-effect", 60.0, has="motion capture at 9 Hz, rotor speeds at 3 Hz, voltage"),
+)
+
+
+def flight(name: str) -> Flight:
+    """The flight of that name."""
+    return next(f for f in FLIGHTS if f.name == name)
+
+
+def taken(recordings: RecordingSet, wanted: Flight) -> RecordingSet:
+    """The runs and the stretches of a set that a flight takes, each from the middle of its run."""
+    runs = []
+    for run in recordings.runs:
+        if wanted.runs and run.name not in wanted.runs:
+            continue
+        t = run.time_s
+        inside = abs(t - 0.5 * (t[0] + t[-1])) <= 0.5 * wanted.seconds
+        runs.append(replace(run, table=run.table[inside].reset_index(drop=True)))
+    return replace(recordings, name=wanted.name, runs=tuple(runs), held_out=wanted.held_out)
