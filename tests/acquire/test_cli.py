@@ -51,7 +51,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess:
 
 def test_static_test_in_two_terminals(emulator, tmp_path):
     (port,) = emulator("bench", "ttyBENCH", more=("--load", "z:500.48@3", "--speed", "20"))
-    out = tmp_path / "raw" / "local"
+    out = tmp_path / "raw" / "campaign" / "local"
     done = run(
         *(
             "bench",

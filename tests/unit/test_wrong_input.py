@@ -51,12 +51,13 @@ BY_COMMAND = (
     "loop of links as vehicle",
 )
 CHECK = """
-import resource, sys
+import re, sys
 from rotorid.cli import app
 try:
     app(["check", sys.argv[1]])
 finally:
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    # Not resource.getrusage: its maximum is inherited from the process that started this one.
+    print(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1])
 """
 
 

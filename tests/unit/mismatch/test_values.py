@@ -37,9 +37,7 @@ def columns(size: int, rng) -> np.ndarray:
     return x
 
 
-def judged(
-    changes: dict[str, float], seed: int = 0, reverse: bool = True, size: int = 4000, harms=None, refused=()
-) -> dict:
+def judged(changes: dict[str, float], seed: int = 0, reverse: bool = True, size: int = 4000, refused=()) -> dict:
     """What is said of a recording in which some values are off by relative changes."""
     rng = np.random.default_rng(seed)
     x = columns(size, rng)
@@ -59,7 +57,7 @@ def judged(
         column = x[:, :, list(TRUST).index(key)]
         return float(np.sqrt((column**2).mean(axis=0)).max() * abs(change) / NOISE)
 
-    search = Search(made, Questions(lambda key, b: np.full(12, size_of(key, b[0])), harms=harms))
+    search = Search(made, Questions(lambda key, b: np.full(12, size_of(key, b[0]))))
     return wrong_values(made, search, Selection([], made.fit(list(TRUST))), back, size_of, refused=refused)
 
 
@@ -95,14 +93,6 @@ def test_a_change_that_no_laboratory_could_tell_is_not_named():
 
 def test_a_value_that_the_other_side_contradicts_is_not_named():
     assert judged({"torque": 0.12}, reverse=False) == {}
-
-
-def test_a_value_that_spoils_a_channel_is_not_named():
-    """The other one that is wrong too, and spoils none, still is."""
-    changes = {"torque": 0.1, "thrust": -0.05}
-    assert sorted(judged(changes, harms=lambda key, with_it, without: False)) == ["thrust", "torque"]
-    spoils = ("thrust", "mass")
-    assert list(judged(changes, harms=lambda key, with_it, without: key in spoils)) == ["torque"]
 
 
 def test_a_value_that_was_refused_is_not_named_again():
@@ -148,18 +138,18 @@ def test_the_coefficient_of_a_mass_is_its_share_of_the_true_one():
     assert relative_change("thrust", 0.1, 0.009) == (0.1, 0.009)
 
 
-def test_a_value_that_only_the_fitted_runs_need_is_not_called_wrong():
-    """A torque coefficient 12 % off in the fitted run and right in the one held out is no property of the vehicle."""
+def test_a_value_that_one_run_alone_needs_is_not_called_wrong():
+    """A torque coefficient 25 % off in one of three fitted runs and right in the others is not the vehicle's."""
     rng = np.random.default_rng(3)
     rows = []
-    for name, off in (("a", 0.12), ("b", 0.0)):
+    for name, off in (("a", 0.25), ("b", 0.0), ("c", 0.0)):
         x = columns(4000, rng)
         y = np.full((4000, 12), np.nan)
         for channel in (2, 5):
             y[:, channel] = x[:, channel] @ np.array([0.0, off, 0.0, 0.0]) + coloured(4000, NOISE, rng, pole=0.0)
         rows.append(Rows(name, np.arange(4000) / RATE_HZ, y, x))
     terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
-    made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: run == "a", 1.0, RATE_HZ)
+    made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: True, 1.0, RATE_HZ)
     search = Search(made, Questions(lambda key, b: np.ones(12)))
     assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
 
