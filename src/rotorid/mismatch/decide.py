@@ -42,7 +42,6 @@ SMALLEST_CHANGE = 0.015
 """A relative change below this is no wrong value: no laboratory knows its numbers better."""
 BEST_KNOWN = 0.004
 """Relative one-sigma that no believed value is taken to be better known than, while others are called wrong."""
-BOOTSTRAPS = 400
 
 
 def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray, np.ndarray]:
@@ -84,31 +83,6 @@ def estimates(
 def predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
     """What columns add to the residual, (n, 12)."""
     return rows.x[:, :, cols] @ beta
-
-
-def held_out_gain(
-    contributions: Contributions, with_it: Fit, without: Fit, channel: int, held: list[np.ndarray]
-) -> tuple[float, float, float] | None:
-    """rmse with / without a term in its main channel on held-out samples, with a block-bootstrap interval."""
-    energies = []
-    parts = (contributions.of(fit.columns, fit.beta) for fit in (with_it, without))
-    for r, mask, more, less in zip(contributions.rows, held, *parts, strict=True):
-        if not mask.any():
-            continue
-        a, b = (r.y - more)[mask, channel], (r.y - less)[mask, channel]
-        count = max(1, len(a) // 40)
-        energies += [
-            (float(x @ x), float(y @ y))
-            for x, y in zip(np.array_split(a, count), np.array_split(b, count), strict=True)
-        ]
-    if len(energies) < 4:
-        return None
-    e = np.array(energies)
-    rng = np.random.default_rng(1)
-    draws = e[rng.integers(0, len(e), (BOOTSTRAPS, len(e)))].sum(axis=1)
-    ratios = np.sqrt(draws[:, 0] / draws[:, 1])
-    low, high = np.quantile(ratios, [0.025, 0.975])
-    return float(np.sqrt(e[:, 0].sum() / e[:, 1].sum())), float(low), float(high)
 
 
 def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray) -> list[int]:

@@ -413,15 +413,6 @@ class Regression:
         part = np.where(np.isin(fit.columns, own), fit.beta, 0.0)
         return float(2 * part @ (cross - gram @ rest) - part @ gram @ part)
 
-    def held_out_gain(self, with_it: Fit, without: Fit) -> float:
-        """Whitened squares that a fit explains beyond another on the held-out blocks, the outermost eighths aside.
-
-        A gust in a held-out run must not decide about everything else.
-        """
-        gains = np.sort((without.residual_square - with_it.residual_square)[self.held_out])
-        cut = max(1, len(gains) // 8)
-        return float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
-
     def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
         """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
 
@@ -461,16 +452,6 @@ class Regression:
         spread = np.maximum(0.0, (q - degrees) / np.maximum(scale, 1e-300))
         p = float(min(1.0, len(cols) * chi2.sf(q, degrees).min()))
         return spread / len(b), p
-
-    def expected_gain(self, with_it: Fit, without: Fit, mask: np.ndarray) -> float:
-        """Whitened squares that the larger model should explain on masked blocks if its coefficients are right."""
-        shift = with_it.beta.copy()
-        for i, column in enumerate(with_it.columns):
-            where = np.flatnonzero(without.columns == column)
-            if len(where):
-                shift[i] -= without.beta[where[0]]
-        gram = self.gram[:, with_it.columns[:, None], with_it.columns][mask].sum(axis=0)
-        return float(shift @ gram @ shift)
 
     def beyond(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Columns and coefficients of a term's own part: what `keys` would absorb of it is taken off.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ import pytest
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.mismatch.deliver import verdict_of
+from rotorid.mismatch.evidence import ratio_of
+from rotorid.mismatch.findings import Trace
 from rotorid.mismatch.ledger import ledger, text_of
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.split import split_runs
@@ -126,3 +129,18 @@ def test_the_ledger_says_which_rule_decided_on_what():
     kept = {e["on"]: e for e in ledger(analysed(0.0), verdict_of(analysed(0.0)))}["rotor_drag"]
     assert kept["rule"] == "established" and kept["numbers"]["high_95"] < 1.0
     assert json.loads(text_of(entries)) == entries
+
+
+def test_the_ratio_is_that_of_errors_with_and_without_where_the_effect_acts():
+    """Noise of one sigma; without the effect a movement of one sigma more for the last third: there 1/√2."""
+    rng = np.random.default_rng(1)
+    time_s = np.arange(0.0, 120.0, 0.025)
+    noise = rng.standard_normal(len(time_s))
+    added = np.where(time_s > 80.0, rng.standard_normal(len(time_s)), 0.0)
+    trace = Trace("a", "force_x", "N", time_s, noise + added, noise + added, noise)
+    analysis = SimpleNamespace(traces=(trace,))
+    every, nothing = np.ones(len(time_s), bool), np.zeros(len(time_s), bool)
+    ratio = ratio_of(analysis, (noise + added,), [every], "force_x")
+    assert ratio.value == pytest.approx(np.sqrt(0.5), abs=0.02)
+    assert ratio.low < np.sqrt(0.5) < ratio.high and ratio.high - ratio.low < 0.1
+    assert ratio_of(analysis, (noise + added,), [nothing], "force_x") is None

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import (
     SMALLEST_CHANGE,
     WIDEST_TRUST,
     exchangeable,
-    held_out_gain,
     main_channels,
     relative_change,
     spare,
@@ -99,25 +97,6 @@ def test_a_value_that_was_refused_is_not_named_again():
     """Without the thrust the mass stands for it: the two share a column."""
     assert list(judged({"torque": 0.1, "thrust": -0.05}, refused=("torque",))) == ["thrust"]
     assert sorted(judged({"torque": 0.1, "thrust": -0.05}, refused=("thrust",))) == ["mass", "torque"]
-
-
-def test_the_held_out_gain_is_the_ratio_of_errors_with_and_without():
-    """Residual 0.5 x + noise 1, x of variance 4: without 1.414, with 1; on the samples held out alone."""
-    rng = np.random.default_rng(1)
-    size = 20_000
-    x = np.zeros((size, 12, 1))
-    x[:, 0, 0] = coloured(size, 2.0, rng, pole=0.9)
-    y = np.full((size, 12), np.nan)
-    y[:, 0] = 0.5 * x[:, 0, 0] + rng.standard_normal(size)
-    rows = Rows("a", np.arange(size) / RATE_HZ, y, x)
-    half = size / RATE_HZ / 2
-    made = build([rows], [Term("x", "effect")], {0: np.array([1.0])}, lambda run, t: t < half, 1.0, RATE_HZ)
-    held = [rows.time_s > half]
-    contributions = Contributions([rows])
-    ratio, low, high = held_out_gain(contributions, made.fit(["x"]), made.fit([]), 0, held)
-    assert ratio == pytest.approx(np.sqrt(0.5), abs=0.02)
-    assert low < np.sqrt(0.5) < high and high - low < 0.06
-    assert held_out_gain(contributions, made.fit(["x"]), made.fit([]), 0, [np.zeros(size, bool)]) is None
 
 
 def test_the_channels_of_a_finding_are_those_it_is_strongest_in():

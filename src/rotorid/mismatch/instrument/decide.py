@@ -8,18 +8,15 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS
-from rotorid.mismatch.contributions import Contributions
-from rotorid.mismatch.decide import estimates, held_out_gain
+from rotorid.mismatch.decide import estimates
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.instrument.approximate import Companion
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     active_values,
     doubt_of_form,
-    kept_values,
     nonlinear_deviation,
 )
-from rotorid.mismatch.instrument.values import held_out
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 SHOWS = 0.33
@@ -45,16 +42,12 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
     alternative to it.
     """
     effects, search, selection = catalogue(), model.search, model.selection
-    held = held_out(model)
-    always = kept_values(search, selection.active)
-    with_it, contributions = model.regression.fit(always + selection.active), Contributions(model.rows)
     out = []
     for key in selection.active:
         if search.terms[key].effect in UNKNOWNS:
             continue  # told as unexplained
         term, effect = search.terms[key], effects[search.terms[key].effect]
         channels = main_channels(model, key)
-        without = model.regression.fit(always + [k for k in selection.active if k != key])
         values = active_values(model, key)
         if term.form.nonlinear:
             sd = nonlinear_deviation(model, key, model.loadings)
@@ -79,7 +72,6 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
                 p_value=selection.p_values[key],
                 channels=tuple(CHANNELS[c] for c in channels),
                 alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
-                gain=held_out_gain(contributions, with_it, without, channels[0], held),
             )
         )
     named = {a for f in out for a in f.alternatives}
