@@ -319,6 +319,8 @@ def test_a_terminal_that_goes_away_stops_the_device(plugged, tmp_path):
     ports = plugged("bench", speed=20.0)
     child, terminal = pty.fork()
     if child == 0:
+        # Started under nohup the tests ignore the signal, and so would the recorder, rightly.
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
         os.execv(
             sys.executable,
             [sys.executable, "-m", "acquire", "bench", "--port", ports.names[0], "--out", str(tmp_path), "--id", "run"],

@@ -337,6 +337,11 @@ def test_stop_asked_from_outside(plugged, recorder_on):
     assert log.session.ended == Ended.INTERRUPTED
 
 
+def hang_up_as_usual() -> None:
+    """Let SIGHUP end the process: started under nohup the tests ignore it, and so would the recorder, rightly."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 def start_recorder(port: str, folder: Path, *more: str) -> subprocess.Popen:
     """The command line in a process of its own."""
     command = [
@@ -352,7 +357,9 @@ def start_recorder(port: str, folder: Path, *more: str) -> subprocess.Popen:
         "run",
         *more,
     ]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        command, preexec_fn=hang_up_as_usual, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
 
 
 def wait_for_bytes(process: subprocess.Popen, path: Path, count: int) -> None:
