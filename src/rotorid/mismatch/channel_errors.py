@@ -4,11 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-HARM_RATIO = 1.1
-"""Held-out error beside another's from which a channel counts as worse."""
-HARM_Z = 2.0
-"""Standard errors over blocks of a second by which its squares must have grown, too: the burden of proof is the
-effect's, and squares of a short flight are widely spread."""
 LEAST_EXCITED = 0.1
 """Mean square of an effect on the held-out part, beside that on the fitted one, from which the former can judge it."""
 LEAST_BLOCKS = 8
@@ -51,23 +46,9 @@ def inverted(masks: list[np.ndarray]) -> list[np.ndarray]:
     return [~mask for mask in masks]
 
 
-def about_means(runs: list[str], parts: list[np.ndarray], held: list[np.ndarray]) -> list[np.ndarray]:
-    """Residuals (n, 12) of stretches less the mean of the held-out rows of their run."""
-    means = {}
-    for run in dict.fromkeys(runs):
-        rows = [p[mask] for r, p, mask in zip(runs, parts, held, strict=True) if r == run and mask.any()]
-        means[run] = np.concatenate(rows).mean(axis=0) if rows else 0.0
-    return [p - means[r] for r, p in zip(runs, parts, strict=True)]
-
-
 def long_enough(held: list[np.ndarray], per: int) -> bool:
     """Whether there are LEAST_BLOCKS of `per` rows held out."""
     return sum(int(mask.sum()) // per for mask in held) >= LEAST_BLOCKS
-
-
-def harmed(ratio: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Mask of the channels that are worse."""
-    return (ratio > HARM_RATIO) & (z > HARM_Z)
 
 
 def helps(ratio: np.ndarray, z: np.ndarray, channels: list[int]) -> float:
@@ -77,9 +58,3 @@ def helps(ratio: np.ndarray, z: np.ndarray, channels: list[int]) -> float:
     does not act on the held-out part.
     """
     return max((float(z[c]) if ratio[c] > 1.0 else 0.0 for c in channels), default=np.inf)
-
-
-def smaller(one: list[np.ndarray], other: list[np.ndarray], held: list[np.ndarray]) -> list[np.ndarray]:
-    """Residuals (n, 12) of every stretch, in each channel those of the two whose held-out squares are smaller."""
-    sums = [sum((x[mask] ** 2).sum(axis=0) for x, mask in zip(parts, held, strict=True)) for parts in (one, other)]
-    return [np.where(sums[1] < sums[0], b, a) for a, b in zip(one, other, strict=True)]

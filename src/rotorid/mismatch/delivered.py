@@ -22,11 +22,6 @@ Values = dict[str, tuple[float, float]]
 """Relative change and one-sigma of believed values, by the key of their term."""
 
 
-def delivered_fit(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
-    """The fit of some effects, the wrong values, winds and those nuisances that are sure."""
-    return with_sure_nuisances(model, [*values, *active], values)
-
-
 def with_sure_nuisances(model: WrenchModel, keys: Sequence[str], values: Values) -> Fit:
     """The fit of terms, those of `values` held by the widest trust, beside winds and the nuisances that are sure.
 
@@ -73,22 +68,11 @@ def surely_there(beta: np.ndarray, covariance: np.ndarray) -> bool:
     return abs(float(beta[0])) > SURE_Z * float(np.sqrt(covariance[0, 0]))
 
 
-def nuisances_in(model: WrenchModel, values: Values) -> list[str]:
-    """The nuisances that are delivered."""
-    regression, fit = model.regression, delivered_fit(model, values, model.selection.active)
-    return [k for k in regression.keys_of("nuisance") if np.isin(regression.columns([k]), fit.columns).all()]
-
-
 def residuals_of(model: WrenchModel, fit: Fit) -> list[np.ndarray]:
     """What values and named effects of a fit leave of every stretch, (n, 12); empirical terms stay out."""
     named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
     added = model.contributions.of(fit.columns, named)
     return [r.y - part for r, part in zip(model.rows, added, strict=True)]
-
-
-def delivered_residuals(model: WrenchModel, values: Values) -> list[np.ndarray]:
-    """What wrong values and named effects leave of every stretch where they were not fitted, (n, 12)."""
-    return left_out_residuals(model, with_sure(model, [*values, *model.selection.active], values), values)
 
 
 def believed_residuals(prepared: Prepared, model: WrenchModel, commanded: bool) -> list[np.ndarray]:

@@ -2,8 +2,7 @@
 
 1. the chain from command to speed, 2. the grouped search over force, moment and sensor effects with the believed
 values free, refined in its nonlinear parameters, the wind and the gusts, 3. the chain once more with the effects found
-known, and without it where the rotors' differences explain as much, 4. what does harm or no good on held-out runs taken
-back.
+known, and without it where the rotors' differences explain as much, 4. less what may as well be nothing.
 """
 
 from __future__ import annotations
@@ -15,8 +14,6 @@ import numpy as np
 
 from rotorid.effects.contract import Form
 from rotorid.mismatch.carried import Windows, carried_windows, changes, laden
-from rotorid.mismatch.channel_harm import REASON as HARM
-from rotorid.mismatch.channel_harm import ValuesOf, without_harm, without_unsure, without_useless
 from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.gusts import with_gusts
@@ -24,7 +21,8 @@ from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
-from rotorid.mismatch.speedpath import SpeedResult, nothing_between, taken_back
+from rotorid.mismatch.speedpath import SpeedResult, nothing_between
+from rotorid.mismatch.unsure import without_unsure
 from rotorid.mismatch.wrench import (
     WrenchModel,
     after_residual,
@@ -71,32 +69,15 @@ class Fitted:
 
 
 def fitted(prepared: Prepared) -> Fitted:
-    """The model of a set, less what does harm or no good on the runs held out."""
+    """The model of a set."""
     measured = all(s.measured_speed for s in prepared.segments)
     chain = speed_path(prepared)
     if chain is None or measured:
         model = refined_model(prepared, *turning(prepared))
-        model, values, values_of, _ = without_harm(prepared, model, values_called_wrong, False)
     else:
         chain, model = with_chain(prepared, chain)
-        chain, model, values, values_of = harmless_chain(prepared, chain, model)
-    model, values = borne_out(prepared, model, values, values_of, commanded=chain is not None and not measured)
+    model, values = without_unsure(model, values_called_wrong(model, ()), values_called_wrong)
     return Fitted(model, values, chain, measured)
-
-
-def borne_out(prepared: Prepared, model: WrenchModel, values: Values, values_of: ValuesOf, commanded: bool):
-    """The model, and its wrong values, less what the runs held out do not bear out.
-
-    What is right only beside an effect of no use (a thrust curve beside a mass that it called for) does harm without.
-    """
-    while True:
-        harmless = model.selection.active
-        model, values = without_useless(prepared, model, values, values_of)
-        useful = model.selection.active
-        if useful != harmless:
-            model, values, values_of, _ = without_harm(prepared, model, values_of, commanded)
-        if model.selection.active == useful:
-            return without_unsure(model, values, values_of)
 
 
 def turning(prepared: Prepared, chain: Chain | None = None):
@@ -123,21 +104,6 @@ def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
         if not renamed and cost_of(plain, model.regression.filters) < limit:
             return (nothing_between(chain[0]), *chain[1:]), plain
     return chain, model
-
-
-def harmless_chain(prepared: Prepared, chain: Chain, model: WrenchModel):
-    """Chain, model, its wrong values and the function that finds them, less what does harm on the runs held out.
-
-    Fitted with every value free, a curve of the throttle may need values that nothing else bears out.
-    """
-    model, values, values_of, harm = without_harm(prepared, model, values_called_wrong, True)
-    for result in taken_back(chain[0], HARM) if harm and chain[0].fit.chain else ():
-        chain = (result, *chain[1:])
-        model = refined_model(prepared, *turning(prepared, chain if result.fit.chain else None))
-        model, values, values_of, harm = without_harm(prepared, model, values_called_wrong, True)
-        if not harm:
-            break
-    return chain, model, values, values_of
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:

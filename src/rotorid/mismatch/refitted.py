@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from rotorid.mismatch.decide import wrong_values
-from rotorid.mismatch.delivered import Values, left_out_residuals
+from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
-from rotorid.mismatch.within_trust import settled, settled_keys
+from rotorid.mismatch.within_trust import settled
 from rotorid.mismatch.wrench import WrenchModel
 
 
@@ -20,12 +20,6 @@ def refitted(prepared: Prepared, model: WrenchModel) -> tuple[Fit, Values]:
     values = values_alone(model)
     fit, moved = settled(prepared, model, values, ())
     return fit, {**moved, **values}
-
-
-def refitted_left_out(prepared: Prepared, model: WrenchModel) -> list[np.ndarray]:
-    """What the refitted vehicle leaves of every stretch where it was not fitted, (n, 12)."""
-    values = values_alone(model)
-    return left_out_residuals(model, settled_keys(prepared, model, values, ())[0], values)
 
 
 def values_alone(model: WrenchModel) -> Values:

@@ -33,8 +33,6 @@ AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
 MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
-HELD = 1e30
-"""Precision of a coefficient that is held at nothing."""
 MOST_REMEMBERED = 2000
 MOST_EXPLAINED = 200_000
 MOST_DISTRUST = 3.0
@@ -159,13 +157,6 @@ class Regression:
         wider = replace(self)  # fits remembered are those of the narrower limits
         wider.limit = np.maximum(self.limit, least)
         return wider
-
-    def holding(self, key: str) -> Regression:
-        """The same with a term held at nothing."""
-        held = replace(self, precision=self.precision.copy())
-        held.precision[self.columns([key])] = HELD
-        held.limit = self.limit
-        return held
 
     def without_winds(self) -> Regression:
         """The same without the winds of single runs: every other column less what they take of it.

@@ -111,20 +111,6 @@ def nothing_between(result: SpeedResult, why: str = "the differences between the
     return SpeedResult(fit, {}, {}, {}, {**result.dropped, **{k: why for k, _ in result.fit.chain}}, None)
 
 
-def taken_back(result: SpeedResult, why: str) -> list[SpeedResult]:
-    """The result without its shift in time, with one id less, the least sure first, and at last with nothing between
-    command and speed."""
-    ids = sorted((k for k, _ in result.fit.chain), key=lambda k: -result.p_values[k])
-    fewer = [replace(result, fit=replace(result.fit, shift_s=0.0))] if result.fit.shift_s else []
-    for gone in ids if len(ids) > 1 else []:
-        p_values, alternatives, sizes = (
-            {k: v for k, v in of.items() if k != gone} for of in (result.p_values, result.alternatives, result.sizes)
-        )
-        dropped = {**result.dropped, gone: why}
-        fewer.append(SpeedResult(result.without[gone], p_values, alternatives, sizes, dropped, result.noise_rad_s))
-    return [*fewer, nothing_between(result, why)]
-
-
 class SpeedProblem:
     """Whitened residual of a chain over the training segments; subclasses say what the response is."""
 

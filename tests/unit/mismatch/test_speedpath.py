@@ -20,7 +20,6 @@ from rotorid.mismatch.speedpath import (
     commanded_path,
     smoothed_acceleration,
     starts_of,
-    taken_back,
 )
 
 from .test_rows import still
@@ -174,18 +173,6 @@ def test_a_curve_at_the_edge_of_what_is_physical_is_no_estimate():
     assert at_its_bounds(form("command_saturation", "upper limit"), np.array([0.3000001]))
     # A lag of nothing is the absence of one, and is judged by its size.
     assert not at_its_bounds(lag, np.array([lag.parameters[0].low]))
-
-
-def test_what_harms_is_taken_back_one_at_a_time_the_least_sure_first():
-    voltage = np.linspace(12.4, 10.0, 2000)
-    both = recorded(1, voltage=voltage, motor_lag=("one constant", [0.05]), battery_sag=("power of voltage", [1.0]))
-    result = replace(searched(both), p_values={"motor_lag": 1e-30, "battery_sag": 1e-9})
-    unshifted, *fewer = taken_back(result, "harm")
-    assert result.fit.shift_s != 0.0 == unshifted.fit.shift_s and unshifted.fit.chain == result.fit.chain
-    assert [[k for k, _ in r.fit.chain] for r in fewer] == [["motor_lag"], ["battery_sag"], []]
-    first = fewer[0]
-    assert first.dropped == {**result.dropped, "battery_sag": "harm"} and set(first.p_values) == {"motor_lag"}
-    assert first.fit.covariance.shape == (len(first.fit.values),) * 2
 
 
 def test_a_curve_without_thrust_does_not_carry_the_vehicle():

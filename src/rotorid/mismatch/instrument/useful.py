@@ -14,13 +14,15 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.mismatch.channel_errors import excited, growth, helps
-from rotorid.mismatch.channel_harm import HELP_Z
 from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.instrument.decide import main_channels
 from rotorid.mismatch.instrument.model import REFUTED, ReadingModel, block_length, of_single_runs
 from rotorid.mismatch.instrument.values import Values, delivered, held_out, settled
 from rotorid.mismatch.unknowns import UNKNOWNS
 
+HELP_Z = 0.5
+"""Standard errors by which the squares of one channel that an effect acts in must grow without it: it has been found
+already, in the runs fitted, so doubt is not held against it beyond the coin's."""
 USELESS = Reason("use", "without it the error on the runs held out is no larger in any channel that it acts in")
 OF_OTHER_RUNS = Reason(
     "other_runs", "something else explains the runs held out, of which its numbers for single runs say nothing"
