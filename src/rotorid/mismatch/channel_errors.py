@@ -1,4 +1,4 @@
-"""Errors on the held-out part, channel by channel: whether squares have grown, by blocks of a second."""
+"""Errors of channels compared on masked rows: whether squares have grown, by blocks of a second."""
 
 from __future__ import annotations
 

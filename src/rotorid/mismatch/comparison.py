@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
-from scipy.stats import t as student
 
 ENVIRONMENT_S = 5.0
 LEAST_ENVIRONMENTS = 6
@@ -89,15 +88,6 @@ class Comparison:
         """Share of the voting environments in which A is better if its coefficients are right, by white noise alone."""
         own = self.votes
         return float(norm.cdf(np.sqrt(self.promised[own]) / 2).mean()) if own.any() else 1.0
-
-    @property
-    def p_value(self) -> float:
-        """One-sided p-value that A is no better, environments being the independent things (Student's t)."""
-        own = self.gained[self.votes]
-        if len(own) < 2:
-            return 1.0
-        error = float(own.std(ddof=1)) / np.sqrt(len(own))
-        return float(student.sf(own.mean() / error, len(own) - 1)) if error > 0 else float(own.mean() <= 0)
 
 
 def environments(run: np.ndarray, seconds: float) -> np.ndarray:

@@ -22,17 +22,12 @@ Values = dict[str, tuple[float, float]]
 """Relative change and one-sigma of believed values, by the key of their term."""
 
 
-def with_sure_nuisances(model: WrenchModel, keys: Sequence[str], values: Values) -> Fit:
-    """The fit of terms, those of `values` held by the widest trust, beside winds and the nuisances that are sure.
+def with_sure(model: WrenchModel, keys: Sequence[str], values: Values) -> list[str]:
+    """Keys of the terms that are delivered with those of `keys`: winds, and the nuisances that are sure beside them.
 
     A calm flight does not know the offset between two sensors, and one that is nothing but noise where it was fitted
     is a mismatch in the first turn held out.
     """
-    return model.regression.fit(with_sure(model, keys, values), loose=widely(values))
-
-
-def with_sure(model: WrenchModel, keys: Sequence[str], values: Values) -> list[str]:
-    """Keys of the terms that are delivered with those of `keys`: winds, and the nuisances that are sure beside them."""
     regression = model.regression
     nuisances = regression.keys_of("nuisance")
     always = [*regression.keys_of("wind"), *keys]

@@ -19,7 +19,6 @@ from rotorid.mismatch.delivered import (
     left_out_residuals,
     widely,
     with_sure,
-    with_sure_nuisances,
 )
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
@@ -39,7 +38,8 @@ WORTH_A_WORD = 0.002
 
 def all_values(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
     """The fit with every value free: those called wrong (`values`) widely, the others within their trust."""
-    return with_sure_nuisances(model, [*model.regression.keys_of("value"), *active], values)
+    keys = with_sure(model, [*model.regression.keys_of("value"), *active], values)
+    return model.regression.fit(keys, loose=widely(values))
 
 
 def beyond_trust(model: WrenchModel, values: Values, active: Sequence[str]) -> bool:
@@ -63,29 +63,22 @@ def changes(model: WrenchModel, fit: Fit) -> Values:
 
 
 def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:
-    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong."""
-    keys, moved = settled_keys(prepared, model, values, active)
-    return model.regression.fit(keys, loose=widely(values)), moved
-
-
-def settled_keys(
-    prepared: Prepared, model: WrenchModel, values: Values, active: Sequence[str]
-) -> tuple[list[str], Values]:
-    """Keys of the terms to deliver with those of `active`, and the changes of values that are not called wrong.
+    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong.
 
     Those values move together, and only if where it was not fitted the error falls by it in some channel, grows in
     none, and none of them would move beyond its trust.
     """
     plain = with_sure(model, [*values, *active], values)
     free = with_sure(model, [*model.regression.keys_of("value"), *active], values)
-    moved = changes(model, model.regression.fit(free, loose=widely(values)))
+    fits = [model.regression.fit(keys, loose=widely(values)) for keys in (plain, free)]
+    moved = changes(model, fits[1])
     if strained(model, values, moved):
-        return plain, {}
+        return fits[0], {}
     per = max(2, int(prepared.thinner.rate_hz))
     left = (left_out_residuals(model, keys, values) for keys in (plain, free))
     if not pays(*left, judged_rows(model), per):
-        return plain, {}
-    return free, {k: change for k, change in moved.items() if k not in values}
+        return fits[0], {}
+    return fits[1], {k: change for k, change in moved.items() if k not in values}
 
 
 def pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray], per: int) -> bool:
