@@ -60,7 +60,8 @@ def verdict(
             return
         typer.echo(text)
         typer.echo(
-            f"{target / 'report.html'} (and verdict.json, improved_vehicle.yaml, ledger.json), {time.monotonic() - start:.0f} s"
+            f"{target / 'report.html'} (and verdict.json, improved_vehicle.yaml, ledger.json), "
+            f"{time.monotonic() - start:.0f} s"
         )
 
 
