@@ -247,7 +247,7 @@ def _turned_gyroscope(
     """A gyroscope with flipped or exchanged axes that takes no more changes than a layout's `cost`; None if none.
 
     For sets without an attitude. `enough` is the loss up to which it fits as well. Roll and pitch exchanged are, on a
-    square of rotors, two opposite rotors exchanged: with as many changes it is one of the two, and nobody can say which.
+    square of rotors, two opposite rotors exchanged: with as many changes it is either, and nobody can say which.
     """
     best = None
     for source, signs in product(((0, 1, 2), (1, 0, 2)), product((1, -1), repeat=3)):

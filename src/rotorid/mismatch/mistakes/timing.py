@@ -41,8 +41,8 @@ LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
 MOTOR_FORM = 0.15
 """A dead time up to this share of a motor's lag is the lag's form (no motor is exactly first order)."""
-MOTOR_SLOWS = 0.1
-"""Share by which a motor's lag grows over a run, as the voltage falls."""
+MOTOR_SLOWS_PER_S = 0.1 / 30.0
+"""Share of itself by which a motor's lag grows in a second: no battery loses a tenth of its voltage within 30 s."""
 FILTER_SAMPLES, FILTER_S = 2.6, 0.008
 """One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
 SMALL_LAGS = {
@@ -108,8 +108,8 @@ class Difference:
         """
         if key == 0:
             return max(self.bias_s, MOTOR_FORM * self.motor_s)
-        feigned_s = max(2 * self.bias_s / np.sqrt(self.runs), MOTOR_SLOWS * self.motor_s)
-        return feigned_s / max(self.longest_s, 1e-9)
+        disturbed = 2 * self.bias_s / np.sqrt(self.runs) / max(self.longest_s, 1e-9)
+        return max(disturbed, MOTOR_SLOWS_PER_S * self.motor_s)
 
     def part(self, sensors: list[str]) -> float:
         """By which share of their own lateness some sensors, late together, move this one."""
