@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from acquire.cli import app
-from acquire.clock import SystemClock
-from acquire.errors import BadName, DeviceSilent
-from acquire.lines import record_lines
-from acquire.transport import SerialTransport
+from rotorid.acquire.cli import app
+from rotorid.acquire.clock import SystemClock
+from rotorid.acquire.errors import BadName, DeviceSilent
+from rotorid.acquire.lines import record_lines
+from rotorid.acquire.transport import SerialTransport
 from rotorid.io.lines import Description, DescriptionError, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
 

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from acquire import procedures
-from acquire.emulators.faults import Faults
-from acquire.log_writer import LogWriter
+from rotorid.acquire import procedures
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.log_writer import LogWriter
 from rotorid.io import rawlog
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import COLUMNS, read_index, write_index

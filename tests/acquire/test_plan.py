@@ -12,12 +12,12 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from acquire import procedures
-from acquire.cli import app
-from acquire.errors import AcquireError, LimitExceeded
-from acquire.plan import Plan, PlanError, attempts, is_done, read_plan, steps_of
-from acquire.record import record
-from acquire.run_plan import Desk, check, emulated_ports, run
+from rotorid.acquire import procedures
+from rotorid.acquire.cli import app
+from rotorid.acquire.errors import AcquireError, LimitExceeded
+from rotorid.acquire.plan import Plan, PlanError, attempts, is_done, read_plan, steps_of
+from rotorid.acquire.record import record
+from rotorid.acquire.run_plan import Desk, check, emulated_ports, run
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
 from rotorid.io.session import Ended
@@ -100,7 +100,7 @@ def test_steps_one_by_one_one_skipped_one_again_and_the_index(tmp_path, emulated
 def test_a_campaign_of_twenty_steps_killed_twice(tmp_path):
     """By the command line; what was killed has left its log, and the next start goes on."""
     plan = plan_with(tmp_path, ports={"bench": "/dev/b"})
-    command = [sys.executable, "-m", "acquire", "campaign", str(tmp_path / "plan.yaml"), "--emulate"]
+    command = [sys.executable, "-m", "rotorid.acquire", "campaign", str(tmp_path / "plan.yaml"), "--emulate"]
     command += ["--speed", "50", "--place-s", "0.2"]
     for killed_at in (5, 12):
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from acquire.recorder import NAME
+from rotorid.acquire.recorder import NAME
 from rotorid.io.logs import LogError, read_log
 from rotorid.io.rawlog import NotALog
 from rotorid.io.session import Ended, SessionError, Setup, read_session
