@@ -293,7 +293,8 @@ def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
     from rotorid.io.session import Session
 
     write_session(
-        Session(id="run", instrument="bench", started="x", host_start_ns=0, log=path.name), tmp_path / "run.yaml"
+        Session(id="run", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log=path.name),
+        tmp_path / "run.yaml",
     )
     log = read_log(path)
     assert len(log.table) == 0 and log.malformed == 1 and "toaster" in log.faults[0]

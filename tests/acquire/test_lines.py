@@ -115,8 +115,8 @@ def test_a_silent_line_ends_with_a_sentence(line, tmp_path):
     [
         ("name: x\nform: fixed\ncolumns: {a_n: {field: 1}}", "columns.a_n: form `fixed` needs `start` and `stop`"),
         ("name: x\ncolumns: {a_n: {field: Fz}}", "needs `field`, the field's number from 0"),
-        ("name: x\ncolums: {}", "d.yaml: columns: Field required"),
-        ("{", "not YAML"),
+        ("name: x\ncolums: {}", "d.yaml: colums: no such key is known; did you mean columns?"),
+        ("{", "d.yaml, line 1: not valid YAML"),
     ],
 )
 def test_mistakes_in_a_description_get_one_sentence(tmp_path: Path, text, sentence):

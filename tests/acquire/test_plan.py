@@ -172,14 +172,21 @@ def test_checks_find_a_port_that_is_not_there_and_a_clock_that_is_behind(tmp_pat
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"steps": [GROUP | {"do": "stir"}]}, "plan.yaml: steps.0.do: Input should be 'stream', 'calibrate'"),
-        ({"steps": [GROUP | {"repeat": 3}]}, "plan.yaml: steps.0.repeat: Extra inputs"),
+        ({"steps": [GROUP | {"do": "stir"}]}, "plan.yaml: steps.0.do: found 'stir', expected 'stream', 'calibrate'"),
+        ({"steps": [GROUP | {"repeat": 3}]}, "plan.yaml: steps.0.repeat: no such key is known; did you mean repeats?"),
         ({"steps": [GROUP | {"name": "a"}]}, "two steps are called 'a'"),
         ({"steps": [GROUP | {"name": "{weight}"}]}, "uses 'weight', which is not in `over`"),
         ({"steps": [GROUP | {"name": "../{load_gf}-{repeat}"}]}, "cannot be called"),
         ({"steps": [{"name": "x", "do": "experiment"}]}, "experiment needs a quadrotor, and `ports` has none"),
         ({"ports": {"bensch": "x"}}, "there is no instrument 'bensch'"),
         ({"limits": {"speed": [0, 1]}}, "'speed' is none"),
+        ({"steps": [GROUP | {"settings": {"sample": 5}}]}, "stream has no such setting; did you mean samples?"),
+        (
+            {"steps": [GROUP | {"setup": {"platfrm": "al"}}]},
+            "setup.platfrm: no such key is known; did you mean platform?",
+        ),
+        ({"steps": [GROUP | {"setup": {"cell": True}}]}, "setup.cell: found True, expected a whole number"),
+        ({"steps": [GROUP | {"over": {"load_gf": [1], "waight": [2, 3]}}]}, "over.waight: nothing reads it"),
     ],
 )
 def test_mistakes_in_a_plan_get_one_sentence(tmp_path, change, sentence):

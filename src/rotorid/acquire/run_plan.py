@@ -65,7 +65,10 @@ def _clock(plan: Plan) -> list[str]:
     for path in plan.out.glob("*.yaml"):
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith("started: "):
-                started = datetime.fromisoformat(line.removeprefix("started: ").strip("'"))
+                try:
+                    started = datetime.fromisoformat(line.removeprefix("started: ").strip("'"))
+                except ValueError:  # whatever that file is, it says no time
+                    break
                 if started.astimezone() > latest:
                     return [f"this computer's clock is behind: {path.name} was recorded at {started}; set the clock"]
     return []
