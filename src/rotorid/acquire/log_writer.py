@@ -6,7 +6,7 @@ import errno
 import os
 from pathlib import Path
 
-from acquire.errors import DiskFull
+from rotorid.acquire.errors import DiskFull
 from rotorid.io import rawlog
 
 BALLAST_BYTES = 64 * 1024

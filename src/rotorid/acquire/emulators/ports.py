@@ -13,7 +13,7 @@ import time
 import tty
 from pathlib import Path
 
-from acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.emulators.wire import WireHalf, World
 
 MAX_PENDING = 1 << 16  # bytes a device keeps when nobody reads; older ones are overrun, as in a real UART
 IDLE_S = 0.02

@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from acquire.emulators.bench import BenchPhysics, CellClamp
-from acquire.emulators.rotor import Rotors, TesterPhysics
-from acquire.emulators.stand import LoadedSensor, StandPhysics
-from acquire.emulators.tensile import TensilePhysics
+from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
+from rotorid.acquire.emulators.rotor import Rotors, TesterPhysics
+from rotorid.acquire.emulators.stand import LoadedSensor, StandPhysics
+from rotorid.acquire.emulators.tensile import TensilePhysics
 from rotorid.io import wire
 from rotorid.io.wire import bench, jr3, quadrotor, rotor, tensile, wrench
 from rotorid.io.wire.base import GO, STOP

@@ -12,14 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from acquire.recorder import NAME
+from rotorid.acquire.recorder import NAME
+from rotorid.errors import InputError
 from rotorid.io.logs import LogError, read_log
+from rotorid.io.models import read_model
 from rotorid.io.rawlog import NotALog
 from rotorid.io.session import Ended, SessionError, Setup, read_session
 from rotorid.io.wire import INSTRUMENTS
+from rotorid.recordings.explain import explain
+from rotorid.recordings.names import hint
 
 Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]
 NEEDS: dict[str, tuple[str, ...]] = {
@@ -33,8 +36,21 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "tensile": ("tensile",),
 }
 
+SETTINGS: dict[str, tuple[str, ...]] = {
+    "stream": ("samples", "interval_s"),
+    "calibrate": ("samples",),
+    "static": ("samples", "axis", "load_gf"),
+    "dynamic": ("samples", "axis", "load_gf"),
+    "thrust": ("throttle", "rest_s", "hold_s"),
+    "torque": ("throttle", "rest_s", "hold_s"),
+    "wrench": ("interval_s", "offset", "samples"),
+    "experiment": ("experiment",),
+    "tensile": (),
+}
+"""What the procedures read, beside `tolerance` and `wait_s`."""
 
-class PlanError(ValueError):
+
+class PlanError(InputError):
     """The plan is not what it should be; the sentence names file and place."""
 
 
@@ -119,16 +135,7 @@ class Step:
 
 def read_plan(path: Path) -> Plan:
     """Read and validate. Raises PlanError naming the file and the first thing that is wrong."""
-    try:
-        return Plan.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise PlanError(f"{path}: cannot be read ({error.strerror})") from error
-    except yaml.YAMLError as error:
-        raise PlanError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the plan"
-        raise PlanError(f"{path}: {where}: {first['msg']}") from error
+    return read_model(path, Plan, PlanError)
 
 
 def steps_of(plan: Plan) -> list[Step]:
@@ -149,11 +156,13 @@ def steps_of(plan: Plan) -> list[Step]:
             try:
                 name = group.name.format(**values)
                 group.ask.format(**values)
-            except (KeyError, IndexError, ValueError) as error:
+            except (KeyError, IndexError, ValueError, AttributeError) as error:
                 raise PlanError(
                     f"steps.{place}: {group.name!r} or its `ask` uses {error}, which is not in `over`"
                 ) from error
-            steps.append(Step(len(steps) + 1, name, group, values, _instruments(plan, place, group)))
+            step = Step(len(steps) + 1, name, group, values, _instruments(plan, place, group))
+            _check_step(step, place, plan.operator)
+            steps.append(step)
     names = [step.name for step in steps]
     for name in names:
         if not NAME.fullmatch(name):
@@ -161,6 +170,21 @@ def steps_of(plan: Plan) -> list[Step]:
         if names.count(name) > 1:
             raise PlanError(f"two steps are called {name!r}; put {{repeat}} or a value of `over` into the name")
     return steps
+
+
+def _check_step(step: Step, place: int, operator: str | None) -> None:
+    """PlanError where a setup does not fit, or where a setting or a value of `over` is one that nothing reads."""
+    group, known = step.group, (*SETTINGS[step.group.do], "tolerance", "wait_s")
+    try:
+        step.setup(operator)
+    except ValidationError as error:
+        raise PlanError(f"steps.{place}: setup.{explain(error, Setup)}") from None
+    for name in group.settings:
+        if name not in known:
+            raise PlanError(f"steps.{place}: settings.{name}: {group.do} has no such setting{hint(name, known)}")
+    for name in group.over:
+        if name not in known and name not in Setup.model_fields and f"{{{name}}}" not in group.name + group.ask:
+            raise PlanError(f"steps.{place}: over.{name}: nothing reads it{hint(name, [*known, *Setup.model_fields])}")
 
 
 def _instruments(plan: Plan, place: int, group: Group) -> tuple[str, ...]:

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from acquire.errors import GaveUp
-from acquire.recorder import Recorder, Row
-from acquire.steady import LowPass, Steadiness
+from rotorid.acquire.errors import GaveUp
+from rotorid.acquire.recorder import Recorder, Row
+from rotorid.acquire.steady import LowPass, Steadiness
 from rotorid.io.wire import quadrotor, rotor, wrench
 
 SETTLING_SAMPLES = 10  # fig. 2.35: voltage spikes dissipate

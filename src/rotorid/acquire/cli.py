@@ -14,12 +14,12 @@ from typing import Annotated
 
 import typer
 
-from acquire import procedures, view
-from acquire.errors import AcquireError, Interrupted
-from acquire.options import Shared, with_shared
-from acquire.programmes import HOLD_S, RAMP_S, programme_of
-from acquire.record import recorders_for, run_with
-from acquire.recorder import Recorder
+from rotorid.acquire import procedures, view
+from rotorid.acquire.errors import AcquireError, Interrupted
+from rotorid.acquire.options import Shared, with_shared
+from rotorid.acquire.programmes import HOLD_S, RAMP_S, programme_of
+from rotorid.acquire.record import recorders_for, run_with
+from rotorid.acquire.recorder import Recorder
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.session import SessionError, Setup
 from rotorid.io.wire import INSTRUMENTS, quadrotor
@@ -43,7 +43,7 @@ def ports(
     """List the serial ports of this computer by names that stay the same, and who is on them."""
     from serial.tools import list_ports
 
-    from acquire.identify import stable_name, udev_rule, who_is_there
+    from rotorid.acquire.identify import stable_name, udev_rule, who_is_there
 
     found = sorted(list_ports.comports())
     if udev is not None:
@@ -320,7 +320,7 @@ def check(
 ) -> None:
     """Read a log as the pipeline does and say what is in it. A recording that was cut off is completed: its
     metadata then say how far it goes."""
-    from acquire.repair import repair
+    from rotorid.acquire.repair import repair
     from rotorid.io.logs import LogError, read_log
     from rotorid.io.rawlog import NotALog
 
@@ -382,9 +382,9 @@ def emulate(
     truth: Annotated[Path | None, typer.Option(help="a truth file of one's own instead")] = None,
 ) -> None:
     """Be an instrument: a pseudo-terminal that speaks like the real one. Ctrl-C ends it."""
-    from acquire.emulators.build import build, parse_load
-    from acquire.emulators.ports import EmulatedPorts
-    from acquire.emulators.truth import draw_truth, read_truth
+    from rotorid.acquire.emulators.build import build, parse_load
+    from rotorid.acquire.emulators.ports import EmulatedPorts
+    from rotorid.acquire.emulators.truth import draw_truth, read_truth
 
     try:
         chosen = read_truth(truth) if truth else draw_truth(seed)
@@ -415,9 +415,9 @@ def lines(
     shared: Shared,
 ) -> None:
     """Record an instrument that sends plain lines of text (CSV, key=value, fixed places) and knows no frames."""
-    from acquire.clock import SystemClock
-    from acquire.lines import record_lines
-    from acquire.transport import SerialTransport
+    from rotorid.acquire.clock import SystemClock
+    from rotorid.acquire.lines import record_lines
+    from rotorid.acquire.transport import SerialTransport
     from rotorid.io.lines import DescriptionError, read_description
 
     console = view.stderr_console()
@@ -458,8 +458,8 @@ def campaign(
     from functools import partial
     from tempfile import TemporaryDirectory
 
-    from acquire import run_plan
-    from acquire.plan import PlanError, is_done, read_plan, steps_of
+    from rotorid.acquire import run_plan
+    from rotorid.acquire.plan import PlanError, is_done, read_plan, steps_of
 
     console = view.stderr_console()
     stop = threading.Event()

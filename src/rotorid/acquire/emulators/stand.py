@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from acquire.emulators.loads import AXES, put_down
-from acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from acquire.emulators.sensor import SixAxis
-from acquire.emulators.truth import RotorTruth, SensorTruth, Truth, VehicleTruth
+from rotorid.acquire.emulators.loads import AXES, put_down
+from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
+from rotorid.acquire.emulators.sensor import SixAxis
+from rotorid.acquire.emulators.truth import RotorTruth, SensorTruth, Truth, VehicleTruth
 
 GRAVITY = 9.81
 SENSOR_POSITION_M = (0.0, 0.0, 0.045)  # believed, body axes, from the believed centre of mass

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from acquire.emulators.truth import BatteryTruth, RotorTruth, TesterTruth
+from rotorid.acquire.emulators.truth import BatteryTruth, RotorTruth, TesterTruth
 
 RPM = 60 / (2 * math.pi)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquire.emulators.bench import BenchPhysics
-from acquire.emulators.devices import (
+from rotorid.acquire.emulators.bench import BenchPhysics
+from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Jr3Device,
     QuadrotorDevice,
@@ -13,12 +13,12 @@ from acquire.emulators.devices import (
     TensileDevice,
     WrenchDevice,
 )
-from acquire.emulators.faults import Faults
-from acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from acquire.emulators.stand import LoadedSensor, StandPhysics, TorqueRig
-from acquire.emulators.tensile import TensilePhysics
-from acquire.emulators.truth import Truth
-from acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
+from rotorid.acquire.emulators.stand import LoadedSensor, StandPhysics, TorqueRig
+from rotorid.acquire.emulators.tensile import TensilePhysics
+from rotorid.acquire.emulators.truth import Truth
+from rotorid.acquire.emulators.wire import WireHalf, World
 from rotorid.io.experiments import EXPERIMENTS
 
 NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "torque", "jr3", "tensile")

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from acquire.emulators.load_cell import LoadCells
-from acquire.emulators.loads import direction_of, put_down
-from acquire.emulators.oscillator import Oscillator
-from acquire.emulators.truth import BenchTruth, CellsTruth
-from acquire.geometry import cell_response
+from rotorid.acquire.emulators.load_cell import LoadCells
+from rotorid.acquire.emulators.loads import direction_of, put_down
+from rotorid.acquire.emulators.oscillator import Oscillator
+from rotorid.acquire.emulators.truth import BenchTruth, CellsTruth
+from rotorid.acquire.geometry import cell_response
 
 
 class BenchPhysics:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from acquire.errors import PortBusy, PortLost, PortMissing
-from acquire.transport import SerialTransport
+from rotorid.acquire.errors import PortBusy, PortLost, PortMissing
+from rotorid.acquire.transport import SerialTransport
 from rotorid.io import wire
 from rotorid.io.frames import COMMAND, START, Frame, encode
 from rotorid.io.intake import Intake

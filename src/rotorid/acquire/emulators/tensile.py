@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquire.emulators.truth import PlasticTruth
+from rotorid.acquire.emulators.truth import PlasticTruth
 
 GAUGE_MM = 40.0
 SECTION_MM2 = 19.2  # type IV: 6.0 mm × 3.2 mm

@@ -1,6 +1,6 @@
 """The whole campaign of the thesis, recorded by the recorders from the emulators on a virtual clock.
 
-`python -m acquire.campaign` writes `raw/campaign/` (logs packed, metadata beside them), the index
+`python -m rotorid.acquire.campaign` writes `raw/campaign/` (logs packed, metadata beside them), the index
 `raw/sessions.tsv` and, outside `raw/`, the sealed truth. The same seed gives the same bytes.
 """
 
@@ -17,10 +17,10 @@ from zlib import crc32
 
 import numpy as np
 
-from acquire import procedures
-from acquire.clock import VirtualClock
-from acquire.emulators.bench import BenchPhysics, CellClamp
-from acquire.emulators.devices import (
+from rotorid.acquire import procedures
+from rotorid.acquire.clock import VirtualClock
+from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
+from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
     Jr3Device,
@@ -30,17 +30,17 @@ from acquire.emulators.devices import (
     TensileDevice,
     WrenchDevice,
 )
-from acquire.emulators.faults import Faults
-from acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
-from acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
-from acquire.emulators.truth import Truth, draw_truth, write_truth
-from acquire.emulators.wire import WireHalf, World
-from acquire.procedures import STEADY_JR3, SteadyRule
-from acquire.programmes import programme_of
-from acquire.recorder import Recorder, Timings
-from acquire.transport import LoopbackTransport
-from acquire.weights import COMBINATIONS, weight_gf
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
+from rotorid.acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
+from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
+from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
+from rotorid.acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.procedures import STEADY_JR3, SteadyRule
+from rotorid.acquire.programmes import programme_of
+from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.transport import LoopbackTransport
+from rotorid.acquire.weights import COMBINATIONS, weight_gf
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
 from rotorid.io.session import Air, Session, Setup, session_path, write_session
@@ -473,10 +473,10 @@ def run_campaign(
 
 
 def main() -> None:
-    """Command line: `python -m acquire.campaign [--raw DIR] [--sealed FILE] [--seed N] [--part NAME]`."""
+    """Command line: `python -m rotorid.acquire.campaign [--raw DIR] [--sealed FILE] [--seed N] [--part NAME]`."""
     import argparse
 
-    parser = argparse.ArgumentParser(prog="python -m acquire.campaign", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m rotorid.acquire.campaign", description=__doc__)
     parser.add_argument("--raw", type=Path, default=Path("raw"))
     parser.add_argument("--sealed", type=Path, default=Path("tests/sealed/campaign_truth.yaml"))
     parser.add_argument("--seed", type=int, default=SEED)

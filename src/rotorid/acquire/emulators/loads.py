@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquire.geometry import GF_N
+from rotorid.acquire.geometry import GF_N
 
 # a load "along z" pulls upwards, as thrust does
 AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, -1.0])}

@@ -1,7 +1,7 @@
 """Recording from Python, by the same way that the command line goes.
 
-from acquire import procedures
-from acquire.record import record
+from rotorid.acquire import procedures
+from rotorid.acquire.record import record
 
 record({"bench": "/dev/ttyACM0"}, lambda bench: procedures.stream(bench, 500), Path("raw/local"), "first")
 """
@@ -14,9 +14,9 @@ from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
 
-from acquire.clock import SystemClock
-from acquire.recorder import Recorder, Timings
-from acquire.transport import SerialTransport
+from rotorid.acquire.clock import SystemClock
+from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.transport import SerialTransport
 from rotorid.io.session import Session, Setup
 from rotorid.io.wire import INSTRUMENTS
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquire.emulators.truth import CellsTruth
-from acquire.geometry import GF_N
+from rotorid.acquire.emulators.truth import CellsTruth
+from rotorid.acquire.geometry import GF_N
 
 
 class LoadCells:

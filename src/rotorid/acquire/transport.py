@@ -12,8 +12,8 @@ from typing import Protocol
 
 import serial
 
-from acquire.clock import VirtualClock
-from acquire.errors import PortBusy, PortLost, PortMissing
+from rotorid.acquire.clock import VirtualClock
+from rotorid.acquire.errors import PortBusy, PortLost, PortMissing
 from rotorid.io.rawlog import RECEIVED, read_raw
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from acquire import procedures
-from acquire.errors import AcquireError
-from acquire.plan import Plan, Step, is_done, next_attempt, steps_of
-from acquire.programmes import programme_of
-from acquire.record import recorders_for, run_with
-from acquire.recorder import Recorder
+from rotorid.acquire import procedures
+from rotorid.acquire.errors import AcquireError
+from rotorid.acquire.plan import Plan, Step, is_done, next_attempt, steps_of
+from rotorid.acquire.programmes import programme_of
+from rotorid.acquire.record import recorders_for, run_with
+from rotorid.acquire.recorder import Recorder
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
 from rotorid.io.logs import read_log
@@ -65,7 +65,10 @@ def _clock(plan: Plan) -> list[str]:
     for path in plan.out.glob("*.yaml"):
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith("started: "):
-                started = datetime.fromisoformat(line.removeprefix("started: ").strip("'"))
+                try:
+                    started = datetime.fromisoformat(line.removeprefix("started: ").strip("'"))
+                except ValueError:  # whatever that file is, it says no time
+                    break
                 if started.astimezone() > latest:
                     return [f"this computer's clock is behind: {path.name} was recorded at {started}; set the clock"]
     return []
@@ -189,9 +192,9 @@ def emulated_ports(
     """Emulators under the plan's instruments; a weight that the step asks for is put on by itself."""
     from contextlib import ExitStack
 
-    from acquire.emulators.build import build
-    from acquire.emulators.ports import EmulatedPorts
-    from acquire.emulators.truth import draw_truth
+    from rotorid.acquire.emulators.build import build
+    from rotorid.acquire.emulators.ports import EmulatedPorts
+    from rotorid.acquire.emulators.truth import draw_truth
 
     together = {("quadrotor", "wrench"): "stand", ("rotor", "wrench"): "torque"}
     names = tuple(step.instruments) if step is not None else tuple(plan.ports)

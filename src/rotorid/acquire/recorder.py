@@ -19,8 +19,8 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import NamedTuple
 
-from acquire.clock import Clock
-from acquire.errors import (
+from rotorid.acquire.clock import Clock
+from rotorid.acquire.errors import (
     AcquireError,
     BadName,
     CannotWrite,
@@ -35,8 +35,8 @@ from acquire.errors import (
     PortMissing,
     Refused,
 )
-from acquire.log_writer import FULL, LogWriter
-from acquire.transport import Transport
+from rotorid.acquire.log_writer import FULL, LogWriter
+from rotorid.acquire.transport import Transport
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, encode
 from rotorid.io.intake import Intake, Taken

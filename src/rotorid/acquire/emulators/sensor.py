@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from acquire.emulators.oscillator import Oscillator
-from acquire.emulators.truth import SensorTruth
+from rotorid.acquire.emulators.oscillator import Oscillator
+from rotorid.acquire.emulators.truth import SensorTruth
 
 
 class SixAxis:

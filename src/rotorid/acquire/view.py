@@ -15,8 +15,8 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from acquire.geometry import body_forces, cell_forces
-from acquire.recorder import Recorder, Status
+from rotorid.acquire.geometry import body_forces, cell_forces
+from rotorid.acquire.recorder import Recorder, Status
 
 REFRESH_HZ = 5
 PLOT_SAMPLES = 600

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from hashlib import file_digest
 from pathlib import Path
 
-from acquire.clock import Clock
-from acquire.errors import AcquireError, DeviceSilent, Interrupted
-from acquire.recorder import Recorder
-from acquire.transport import Transport
+from rotorid.acquire.clock import Clock
+from rotorid.acquire.errors import AcquireError, DeviceSilent, Interrupted
+from rotorid.acquire.recorder import Recorder
+from rotorid.acquire.transport import Transport
 from rotorid.io import rawlog, wire
 from rotorid.io.lines import Description, LineDecoder
 from rotorid.io.session import Counts, Ended, Session, Setup, write_session

@@ -9,8 +9,8 @@ from zlib import crc32
 
 import numpy as np
 
-from acquire.emulators.devices import CommandRefused, Device, Physics
-from acquire.emulators.faults import Faults, FaultyLine
+from rotorid.acquire.emulators.devices import CommandRefused, Device, Physics
+from rotorid.acquire.emulators.faults import Faults, FaultyLine
 from rotorid.io import wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, StreamDecoder, encode
 from rotorid.io.wire.base import (

@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict
 
-from acquire.geometry import INTERCEPT, SLOPE
+from rotorid.acquire.geometry import INTERCEPT, SLOPE
 
 
 class _Truth(BaseModel):
