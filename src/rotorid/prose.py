@@ -75,11 +75,13 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
         made_of = MADE_OF["emulated" if emulated and kind == "campaign" else kind]
         return f"*{made_of}* {caption}" if made_of else caption
 
-    def figure(name: str, caption: str, kind: str, width: str = "100%") -> str:
-        if name not in files or Path(files[name]).suffix not in FIGURES:
-            raise ProseError(f"{path}: there is no figure called {name}.")
+    def figure(name: str, caption: str, kind: str, width: str = "100%", moving: str = "") -> str:
+        for shown in filter(None, (name, moving)):
+            if shown not in files or Path(files[shown]).suffix not in FIGURES:
+                raise ProseError(f"{path}: there is no figure called {shown}.")
         label = f"fig:{path.stem}-{name}".replace("_", "-")
-        return f"![{captioned(caption, kind)}]({files[name]}){{#{label} width={width}}}"
+        on_page = f' moving="{files[moving]}"' if moving else ""
+        return f"![{captioned(caption, kind)}]({files[name]}){{#{label} width={width}{on_page}}}"
 
     def table(name: str, caption: str, columns: Sequence[Sequence[str]], kind: str) -> str:
         rows = known.get(name)

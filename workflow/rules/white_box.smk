@@ -72,6 +72,7 @@ rule chapter_white_box:
         attitude="results/report/white_box/attitude.svg",
         motion="results/report/white_box/motion.svg",
         view="results/report/white_box/view.svg",
+        moving="results/report/white_box/moving.svg",
     params:
         code=code_of_chapter("white_box"),
     log:
