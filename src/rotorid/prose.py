@@ -95,13 +95,25 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
 
     try:
         template = environment.from_string(path.read_text(encoding="utf-8"))
-        return template.render(**known, figure=figure, table=table, emulated=emulated)
+        return _standing_alone(template.render(**known, figure=figure, table=table, emulated=emulated), path)
     except jinja2.TemplateSyntaxError as error:
         raise ProseError(f"{path}, line {error.lineno}: {error.message}.") from None
     except (jinja2.UndefinedError, TypeError, ValueError) as error:
         if isinstance(error, ProseError):
             raise
         raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
+
+
+def _standing_alone(markdown: str, path: Path) -> str:
+    """The markdown, if each figure is a paragraph of its own; inside of another it would have no number."""
+    lines = ["", *markdown.splitlines(), ""]
+    for before, line, after in zip(lines, lines[1:], lines[2:], strict=False):
+        if line.startswith("![") and (before.strip() or after.strip()):
+            name = line[line.rfind("{#") + 2 :].split()[0].rstrip("}")
+            raise ProseError(
+                f"{path}: the figure {name} stands inside a paragraph; it needs an empty line on both sides."
+            )
+    return markdown
 
 
 def not_recorded(path: str | Path, kinds: Sequence[str], index: str) -> str:

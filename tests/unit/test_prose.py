@@ -56,6 +56,19 @@ def test_a_figure_has_caption_path_and_label(tmp_path: Path, files: dict[str, st
     )
 
 
+def test_a_figure_inside_a_paragraph_stops_the_report(tmp_path: Path, files: dict[str, str]) -> None:
+    text = 'Said before.\n{{ figure("lines", "Lines.", kind="public") }}\n'
+    with pytest.raises(prose.ProseError, match="fig:hover-lines stands inside a paragraph"):
+        rendered(tmp_path, text, files)
+
+
+def test_a_figure_may_move_on_the_page(tmp_path: Path, files: dict[str, str]) -> None:
+    text = '{{ figure("lines", "Lines.", kind="public", moving="lines") }}'
+    assert 'moving="results/report/x/lines.svg"' in rendered(tmp_path, text, files)
+    with pytest.raises(prose.ProseError, match="no figure called film"):
+        rendered(tmp_path, '{{ figure("lines", "Lines.", kind="public", moving="film") }}', files)
+
+
 def test_a_caption_says_first_that_instruments_were_emulated(tmp_path: Path, files: dict[str, str]) -> None:
     path = tmp_path / "hover.md"
     path.write_text('{{ figure("lines", "All lines.", kind="campaign") }}{% if emulated %} Emulated.{% endif %}')

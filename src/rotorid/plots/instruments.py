@@ -76,7 +76,9 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
                 edgecolor=colour,
             )
         )
-        top.text(y, x, str(cell), ha="center", va="center", fontweight="bold", color=colour)
+        # The rings nearly cover each other: numbers stand outside of the upper ring and inside of the lower one.
+        out = 1 + (24 if upper else -24) / np.hypot(x, y)
+        top.text(out * y, out * x, str(cell), ha="center", va="center", fontweight="bold", color=colour)
     top.plot(0, 0, "o", color="black", markersize=5)
     top.text(6, -13, "foot {T}", fontsize=8.5)
     _arrow(top, (0, 0), (0, 38), "$x$")
@@ -90,9 +92,9 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
     side.add_patch(Rectangle((-6, 0), 12, length, facecolor="#eeeeee", edgecolor="black", lw=0.7))
     for height, colour, name in ((low, style.RED, "cells 1, 3, 5"), (high, style.BLUE, "cells 2, 4, 6")):
         side.plot([-60, 60], [height, height], color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
-        side.text(64, height, f"{name}: {height:.1f} mm", color=colour, va="center", fontsize=8.5)
+        side.text(68, height, f"{name}: {height:.1f} mm", color=colour, va="center", fontsize=8.5)
     side.plot([-62, 62], [length, length], color="black", lw=3)
-    side.text(64, length, f"vehicle {{B}}: $L$ = {length:.0f} mm", va="center", fontsize=8.5)
+    side.text(68, length, f"vehicle {{B}}: $L$ = {length:.0f} mm", va="center", fontsize=8.5)
     _arrow(side, (-90, 150), (-90, 95), "$z$")
     _arrow(side, (0, length + 8), (0, length + 50), "thrust", fontsize=8.5)
     side.set_xlim(-105, 190)

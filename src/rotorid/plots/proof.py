@@ -112,7 +112,7 @@ def oracle(cases: pd.DataFrame) -> Figure:
     ax.set_yscale("log")
     ax.set_xticks(range(len(families)), [plain(f) for f in families], rotation=45, ha="right")
     ax.set_ylabel("held-out error / true model's")
-    ax.legend(loc="upper right", ncols=3)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.0, markerscale=3)
     return fig
 
 

@@ -60,7 +60,7 @@ def experiment(run: pd.DataFrame, start_s: float, stop_s: float) -> Figure:
     for axis, label in zip(axes, ("throttle (%)", "force (N)", "moment (mN m)"), strict=True):
         axis.axvspan(start_s, stop_s, color=style.GREY, alpha=0.15, linewidth=0)
         axis.set_ylabel(label)
-        axis.legend(loc="upper right", ncols=4)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=4, borderaxespad=0.0)
     axes[-1].set_xlabel("time (s)")
     return fig
 
