@@ -1,6 +1,7 @@
 """A chapter's text: numbers, tables and figures from files, and a stop where one is missing."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,23 @@ def test_columns_of_long_text_get_more_room(tmp_path: Path) -> None:
     rows = [{"what": "a" * 60, "n": 1.0}, {"what": "b", "n": 22.0}]
     lines = prose.table_of(rows, "All.", [("what", "What"), ("n", "Number of them", "fix0")], "tbl:x")
     assert lines.splitlines()[1] == f"| :{'-' * 40} | {'-' * 6}: |"
+
+
+def test_no_column_of_a_wide_table_is_narrower_than_its_longest_word() -> None:
+    columns = [
+        ("study", "Recording"),
+        ("found", "What was found there"),
+        ("error", "Measured"),
+        ("rest", "Unexplained"),
+    ]
+    rows = [{"study": "appius-ground-effect", "found": "rotor drag; unequal rotors; " * 4, "error": "0.686 / 0.653 N",
+             "rest": "14 %"}]  # fmt: skip
+    table = prose.table_of(rows, "All.", columns, "tbl:x")
+    shares = [float(share) for share in re.search(r"widths=([\d.,]+)", table)[1].split(",")]
+    assert sum(shares) == pytest.approx(1, abs=0.01)
+    for share, word in zip(shares, ("appius-ground-effect", "unequal", "Measured", "Unexplained"), strict=True):
+        assert share * prose.LINE_PT > prose.LETTER_PT * len(word)
+    assert "widths" not in prose.table_of([{"a": "1"}], "All.", [("a", "A")], "tbl:x")
 
 
 def test_symbols_are_set_as_mathematics() -> None:

@@ -54,7 +54,7 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
     """The six cells from above (x up, y right), and the tube from the side with the distances of table 2.3 (mm)."""
     from matplotlib.patches import Circle, Rectangle
 
-    fig, (top, side) = style.figure(3.6, 1, 2, width_ratios=(1.25, 1))
+    fig, (top, side) = style.figure(3.0, 1, 2, width_ratios=(1.25, 1))
     for radius in (
         np.hypot(distances_mm["D_1x"], distances_mm["D_1y"]),
         np.hypot(distances_mm["D_2x"], distances_mm["D_2y"]),
@@ -108,7 +108,7 @@ def vehicle(flown: Vehicle) -> Figure:
     """Rotor numbers, spins and body axes from above, and the frames from behind and the side."""
     from matplotlib.patches import Arc, Circle
 
-    fig, (top, side) = style.figure(3.2, 1, 2, width_ratios=(1.15, 1))
+    fig, (top, side) = style.figure(2.7, 1, 2, width_ratios=(1.15, 1))
     places = 1000 * flown.rotor_positions_m()
     radius = 1000 * float(flown.rotor_radius_m or 0.0635)
     for number, ((x, y, _), spin) in enumerate(zip(places, flown.yaw_signs(), strict=True), 1):

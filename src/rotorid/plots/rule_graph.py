@@ -55,7 +55,7 @@ def columns(pairs: list[tuple[str, str]]) -> dict[str, int]:
 
 
 def heights(pairs: list[tuple[str, str]], place: dict[str, int]) -> dict[str, float]:
-    """Rule to its height, 0 to 1: columns are ordered again and again by the middle of what their rules are joined to."""
+    """Rule to its height, 0 to 1: columns are ordered again and again by the middle of what their rules join to."""
     by_column: dict[int, list[str]] = {}
     for rule in sorted(place):
         by_column.setdefault(place[rule], []).append(rule)

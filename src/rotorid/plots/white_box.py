@@ -21,7 +21,7 @@ def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figu
 
     `thrust` and `torque` have columns `speed_rad_s` and `value` (N, N m); `fits` has `c_f` and `c_q`.
     """
-    fig, axes = style.figure(3.9, 2, 2, sharex="col", height_ratios=(2.2, 1))
+    fig, axes = style.figure(3.2, 2, 2, sharex="col", height_ratios=(2.2, 1))
     for column, (points, fit, label, scale, unit) in enumerate(
         ((thrust, fits["c_f"], "thrust", 1.0, "N"), (torque, fits["c_q"], "torque", 1000.0, "mN m"))
     ):
@@ -43,7 +43,7 @@ def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figu
 
 def attitude(flight: pd.DataFrame) -> Figure:
     """Euler angles and their references over time (figure 4.9b)."""
-    fig, axes = style.figure(3.4, 3, 1, sharex=True)
+    fig, axes = style.figure(2.8, 3, 1, sharex=True)
     for axis, angle in zip(axes, ANGLES, strict=True):
         axis.plot(
             flight["time_s"],
@@ -61,7 +61,7 @@ def attitude(flight: pd.DataFrame) -> Figure:
 
 def motion(flight: pd.DataFrame) -> Figure:
     """Body rates, angular accelerations and moments (figure 4.9c-e)."""
-    fig, axes = style.figure(4.6, 3, 3, sharex=True)
+    fig, axes = style.figure(3.8, 3, 3, sharex=True)
     kinds = (
         ("angular_velocity_{}_rad_s", "rate (rad/s)", 1.0),
         ("angular_acceleration_{}_rad_s2", "acceleration (rad/s²)", 1.0),
