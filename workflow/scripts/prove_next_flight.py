@@ -1,0 +1,118 @@
+"""Prove the next flight on concealed sets: plan, record, judge both together.
+
+- Records sets in which pairs look alike, by code that shares nothing with the library.
+- Plans a flight for what each leaves open; the plan never sees an answer.
+- Has the same simulator record the planned flight, and a standard one of the same length, and judges each with the set.
+- Writes the row of every set as it comes, so that an interrupted proof goes on where it stopped.
+"""
+
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+import pandas as pd
+
+from rotorid import log
+from rotorid.errors import InputError
+from rotorid.experiment.limits import Limits, read_limits
+from rotorid.experiment.plan import plan
+from rotorid.experiment.questions import Known, known
+from rotorid.experiment.together import joined_sets
+from rotorid.experiment.write import sampled
+from rotorid.mismatch.analyse import analyse
+from rotorid.proof import next_flight as proof
+from rotorid.recordings import RecordingSet, read_set
+
+
+def as_read(recording, write_set, name: str) -> RecordingSet:
+    """A recording as a user's files would hand it over."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_set(recording, Path(folder) / name)
+        return read_set(Path(folder) / name)
+
+
+def judged(first: RecordingSet, second: RecordingSet, ids, truth):
+    """Outcome, sentence, and both sets as one."""
+    whole, _ = joined_sets(first, second)
+    return (*proof.outcome_of(ids, analyse(whole).findings, truth), whole)
+
+
+def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -> proof.Row:
+    """What becomes of one set."""
+    truth = {answer["effects"][0]["id"]}
+    named = next(iter(truth))
+    found: Known = known(first)
+    classes = [q.ids for q in found.questions] + [ids for ids, _ in found.unanswerable]
+    nan = float("nan")
+    if not classes:
+        return proof.Row(case.name, named, "", nan, nan, nan, False, "", "", "nothing was left open")
+    ids = classes[0]
+    made = plan(found, limits)
+    if not made.pieces:
+        said = made.unanswerable[0][1] if made.unanswerable else "no manoeuvre separates them"
+        return proof.Row(case.name, named, " ".join(ids), nan, nan, nan, False, "no plan", "", said)
+    sigma, true, rival = proof.predicted(made, ids, truth)
+    references = {
+        "planned": simulator.reference_of(sampled(made), *simulator.grid(case)),
+        "standard": simulator.standard(case, made.duration_s),
+    }
+    outcome, measured, said = {}, nan, ""
+    for name, reference in references.items():
+        second = as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
+        outcome[name], sentence, whole = judged(first, second, ids, truth)
+        if name == "planned":
+            said = sentence
+            measured = proof.measured(known(whole), true, rival) if true else nan
+    return proof.Row(
+        case=case.name,
+        truth=named,
+        open=" ".join(ids),
+        planned_s=made.duration_s,
+        predicted_sigma=sigma,
+        measured_sigma=measured,
+        promised=made.settles,
+        outcome=outcome["planned"],
+        standard_outcome=outcome["standard"],
+        said=said,
+    )
+
+
+def main(table: str, summary: str, limits: str, root: str, most: int | None = None) -> None:
+    """Write `table` (a row a set) and `summary`; `root` holds `tests`, `most` cases are taken at most."""
+    sys.path.insert(0, root)
+    warnings.simplefilter("ignore")
+    from tests.concealed import planned as simulator
+    from tests.concealed.richsim import scene
+
+    allowed = read_limits(Path(limits))
+    path = Path(table)
+    rows = pd.read_csv(path).to_dict("records") if path.is_file() else []
+    # Where speeds are commands alone a set takes minutes: those come last.
+    every = [*simulator.look_alikes(), *simulator.ambiguous()]
+    cases = sorted(every, key=lambda case: "speed" not in case.settings.groups)[:most]
+    done = {r["case"] for r in rows}
+    for case in cases:
+        if case.name in done:
+            continue
+        recording, answer, _ = scene.make(case.settings, case.seed)
+        first = as_read(recording, simulator.write_set, "first")
+        try:
+            rows += proof.table([row_of(case, answer, first, simulator, allowed)]).to_dict("records")
+        except InputError as error:
+            print(f"{case.name}: {error}", file=sys.stderr)
+            continue
+        pd.DataFrame(rows).to_csv(path, index=False)
+        print(rows[-1], file=sys.stderr, flush=True)
+    pd.DataFrame(rows).to_csv(path, index=False)
+    proof.summary(pd.DataFrame(rows)).to_csv(summary, index=False)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            table=snakemake.output.table,
+            summary=snakemake.output.summary,
+            limits=snakemake.input.limits,
+            root=str(Path.cwd()),
+        )
