@@ -21,6 +21,10 @@ FASTEST_HZ = 2.0
 ROOM = 0.9
 """Share of the tilt allowed that a reference asks for: drag and the controller take some."""
 PIECE_S = 10.0
+HEAVE_RAD_S = 3.0
+"""Rate of the waves: thrust then changes by a good part while the speed over ground stays."""
+LONGEST_S = 30.0
+"""A turn that the rotors' torque makes more slowly is no candidate."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +63,18 @@ def envelope(t: np.ndarray) -> np.ndarray:
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def phase(t: np.ndarray, rate_rad_s: float) -> np.ndarray:
-    """Phase that speeds up from rest and slows down to it, a whole number of turns in all, (n,), rad."""
-    raw = np.concatenate([[0.0], np.cumsum((envelope(t)[1:] + envelope(t)[:-1]) / 2 * np.diff(t))])
-    turns = max(1.0, np.floor(rate_rad_s * raw[-1] / (2 * np.pi)))
-    return 2 * np.pi * turns * raw / raw[-1]
+def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi) -> np.ndarray:
+    """Phase that speeds up from rest and slows down to it, a whole number of units in all, (n,), rad."""
+    speed = envelope(t)
+    raw = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
+    units = max(1.0, np.floor(rate_rad_s * raw[-1] / unit_rad + 0.02))
+    return unit_rad * units * raw / raw[-1]
+
+
+def whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi) -> float:
+    """Duration near `about_s`, s, in which a phase of that rate goes through a whole number of units."""
+    units = max(1, round(rate_rad_s * (about_s - RAMP_S) / unit_rad))
+    return RAMP_S + units * unit_rad / rate_rad_s
 
 
 def multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
@@ -131,7 +142,20 @@ def _passes(limits: Limits) -> list[Piece]:
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
-            out.append(Piece(f"pass {degrees} at {share:g}", words, make, 12.0))
+            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 12.0)))
+    for degrees, axis in ((0, 0), (90, 1)):
+        amplitude, rate = largest(limits, limits.room_m[axis], 0.8)
+        heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / HEAVE_RAD_S, 0.3 * GRAVITY_M_S2 / HEAVE_RAD_S**2)
+
+        def make(t, amplitude=amplitude, rate=rate, axis=axis, heave=heave):
+            out = np.zeros((len(t), 3))
+            out[:, axis] = amplitude * np.sin(phase(t, rate))
+            out[:, 2] = heave * np.sin(phase(t, HEAVE_RAD_S))
+            return out, np.zeros(len(t))
+
+        way = "along the nose" if axis == 0 else "sideways"
+        words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
+        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 12.0)))
     return out
 
 
@@ -142,8 +166,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
     yaw_rate = min(0.8 * np.radians(limits.yaw_rate_deg_s), most_rad_s2 * RAMP_S / 1.9)
 
     def spin(t):
-        turn = phase(t, yaw_rate)
-        return np.zeros((len(t), 3)), turn
+        return np.zeros((len(t), 3)), phase(t, yaw_rate, 2 * np.pi)
 
     def eight(t):
         angle = phase(t, rate / np.sqrt(2))
@@ -155,13 +178,22 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
         # To and fro over ground while the nose turns: body axes and world axes part.
         out = np.zeros((len(t), 3))
         out[:, 0] = amplitude * np.sin(phase(t, rate))
-        return out, phase(t, 0.6 * yaw_rate)
+        return out, phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
-    return [
-        Piece("spin", f"turn on the spot at up to {np.degrees(yaw_rate):.0f} degrees a second", spin),
-        Piece("eight", f"a figure of eight, {amplitude:.1f} m each way, nose held", eight, 15.0),
-        Piece("drift", "to and fro over ground while the nose turns all round", drift, 15.0),
+    pieces = [
+        Piece(
+            "eight", f"a figure of eight, {amplitude:.1f} m each way, nose held", eight, whole(rate / np.sqrt(2), 15.0)
+        )
     ]
+    degrees = np.degrees(yaw_rate)
+    for name, words, make, speed in (
+        ("spin", f"turn on the spot at up to {degrees:.0f} degrees a second", spin, yaw_rate),
+        ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
+    ):
+        duration = whole(speed, 12.0, 2 * np.pi)
+        if duration <= LONGEST_S:
+            pieces.append(Piece(name, words, make, duration))
+    return pieces
 
 
 def _climbs(limits: Limits) -> list[Piece]:
@@ -177,7 +209,7 @@ def _climbs(limits: Limits) -> list[Piece]:
             return out, np.zeros(len(t))
 
         words = f"climb and descend by {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s"
-        out.append(Piece(f"climb at {share:g}", words, make))
+        out.append(Piece(f"climb at {share:g}", words, make, whole(rate, PIECE_S)))
     return out
 
 

@@ -52,7 +52,10 @@ def draw(plan: Plan, path: Path) -> None:
         ax.axvline(plan.limits.target_sigma, color=RED, lw=0.8)
         ax.set_yticks(rows, [f"{s.true} against {s.rival}".replace("_", " ") for s in found], fontsize=7)
         ax.set_xscale("symlog", linthresh=3)
-        ax.set(xlabel="separation [standard errors]: ring so far, dot with this flight", ylim=(-0.6, len(found) - 0.4))
+        ax.tick_params(axis="x", which="minor", bottom=False)
+        most = max(s.interval_95[1] for s in found)
+        ax.set(xlabel="separation [standard errors]", ylim=(-0.6, len(found) - 0.4), xlim=(-0.3, 1.3 * most))
+        ax.set_title("Ring: so far. Dot: with this flight. Line: wanted")
     else:
         ax.set_axis_off()
     fig.savefig(path, format="png")
