@@ -43,7 +43,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     truth = {answer["effects"][0]["id"]}
     named = next(iter(truth))
     found: Known = known(first)
-    classes = [q.ids for q in found.questions] + [ids for ids, _ in found.unanswerable]
+    classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
     nan = float("nan")
     if not classes:
         return proof.Row(case.name, named, "", nan, nan, nan, False, "", "", "nothing was left open")

@@ -28,7 +28,7 @@ def plan(
     """Find the flight that settles what a verdict left open, and write it for the vehicle.
 
     Writes `plan.json`, `plan.png`, `trajectory.csv` (north-east-down), `px4_offboard.csv` and `crazyflie.csv`. Fly it,
-    record it as a set of its own, and judge both by `rotorid together`.
+    record it as a set of its own, and judge both by `rotorid together`. The verdict's page shows the plan.
 
     Example: `rotorid plan flights-verdict --limits room.yaml`
     """
@@ -51,9 +51,22 @@ def plan(
             found = known(sufficient(read_set(source)), suggested)
             made = make_plan(found, allowed, wishes, step)
             files = write(made, out or folder / "plan")
+            onto_page(folder / "report.html", made, files[-1] if made.pieces else None)
         for line in text(made):
             typer.echo(line)
         typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
+
+
+def onto_page(page: Path, made, picture: Path | None) -> None:
+    """Put the plan on the verdict's page, where there is one."""
+    from rotorid.experiment.page import with_plan
+    from rotorid.writing import all_or_none
+
+    if not page.is_file():
+        return
+    content = with_plan(page.read_text(encoding="utf-8"), made, picture.read_bytes() if picture else None)
+    with all_or_none(page) as (part,):
+        part.write_text(content, encoding="utf-8")
 
 
 def wished(texts: list[str]) -> dict[str, float]:

@@ -22,6 +22,7 @@ from rotorid.experiment.separation import (
     Information,
     Separation,
     asked_terms,
+    chain_separations,
     flown,
     left_overs,
     of_flight,
@@ -142,6 +143,8 @@ def tried(known: Known, limits: Limits, progress: Callable[[str], None] = lambda
 def reached(known: Known, information: Information, target: float) -> float:
     """Share of the way to the goal: the mean over all models and rivals of their separation over that wanted."""
     found = [min(s / target, 1.0) for q in known.questions for s in left_overs(known, q, information)]
+    for _, own in chain_separations(known, information):
+        found += [min(s.sigma / target, 1.0) for s in own]
     return float(np.mean(found)) if found else 1.0
 
 
@@ -197,11 +200,11 @@ def plan(
     """The flight to fly next; without anything to settle, or any manoeuvre that helps, one without pieces."""
     reasons = tuple(sorted(known.prepared.not_testable.items()))
     nothing = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
-    if not known.questions and not wishes:
+    if not known.questions and not known.chains and not wishes:
         return Plan(known.recordings.name, limits, (), nothing, None, (), (), (), known.unanswerable, reasons)
     options = tried(known, limits, progress)
     progress("choosing")
-    taken, judged = chosen_pieces(known, limits, options) if known.questions else ([], options)
+    taken, judged = chosen_pieces(known, limits, options) if known.questions or known.chains else ([], options)
     base = of_set(known)
     if wishes:
         taken = with_wishes(known, limits, taken, judged, base, wishes)
@@ -226,6 +229,7 @@ def plan(
                     own = after
             found += [s for s in separations(known, question, base, own) if s.true == hypothesis.id]
         questions.append((question.ids, tuple(found)))
+    questions += chain_separations(known, after)
     return Plan(
         known.recordings.name,
         limits,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.experiment.between import ChainQuestion, chain_question, speeds_in_hover
 from rotorid.mismatch.analyse import findings_of
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted, fitted
@@ -53,6 +54,8 @@ class Known:
     fitted: Fitted
     findings: tuple[Finding, ...]
     questions: tuple[Question, ...]
+    chains: tuple[ChainQuestion, ...]
+    """The same of what lies between command and rotor speed."""
     unanswerable: tuple[tuple[tuple[str, ...], str], ...]
     """Classes that no flight with these columns can tell apart, with what it takes."""
 
@@ -79,7 +82,7 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
     found = fitted(prepared)
     findings = (*mistakes, *findings_of(found, prepared))
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
-    questions, unanswerable, seen = [], [], set()
+    questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if not ids and finding.id in suggested and finding.status == "established":
@@ -88,15 +91,24 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
             continue
         seen.add(frozenset(ids))
         if found.commanded and {"thrust_curve", "throttle_curve"} <= set(ids):
-            what = "where speeds are known from their commands alone both curves are one; record the rotor speeds"
+            throttle, thrust = speeds_in_hover(found)
+            what = (
+                "where speeds are known from their commands alone both curves are one; record the rotor speeds, or "
+                f"hold an optical tachometer to a rotor in hover: {throttle:.0f} rad/s if the throttle is curved, "
+                f"{thrust:.0f} rad/s if the thrust is"
+            )
             unanswerable.append((ids, what))
         elif finding.id in chain:
-            unanswerable.append((ids, "between command and rotor speed; record the rotor speeds beside the commands"))
+            if (between := chain_question(found, finding, ids)) is not None:
+                chains.append(between)
+            else:
+                what = "between command and rotor speed; record the rotor speeds beside the commands"
+                unanswerable.append((ids, what))
         elif (question := question_of(found, finding, ids)) is not None:
             questions.append(question)
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
-    return Known(recordings, prepared, found, findings, tuple(questions), tuple(unanswerable))
+    return Known(recordings, prepared, found, findings, tuple(questions), tuple(chains), tuple(unanswerable))
 
 
 def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Question | None:

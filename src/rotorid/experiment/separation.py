@@ -11,14 +11,17 @@ recorded plus those of the simulated flight, through the same filters (the instr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.experiment.between import interval as chain_interval
+from rotorid.experiment.between import squares
 from rotorid.experiment.candidates import Reference
 from rotorid.experiment.limits import Limits
 from rotorid.experiment.questions import Hypothesis, Known, Question
-from rotorid.experiment.simulate import Flown, World, fly, recorded
+from rotorid.experiment.simulate import Flown, World, commands, fly, recorded
+from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import assemble_rows, prepare_like
 from rotorid.mismatch.regression import Regression, build, ridge_inverse
 from rotorid.mismatch.rows import Term
@@ -32,12 +35,16 @@ LEAST_RATE_HZ = 400.0
 
 @dataclass(frozen=True)
 class Information:
-    """Normal equations (K, K) of the set's terms that some recordings hold, in the columns of the set's regression."""
+    """What some recordings hold about the open questions."""
 
     gram: np.ndarray
+    """Normal equations (K, K) of the set's terms, in the columns of the set's regression."""
+    squares: np.ndarray | None = None
+    """λ of every pair of competing chains; None for nothing."""
 
     def __add__(self, other: Information) -> Information:
-        return Information(self.gram + other.gram)
+        known = [i.squares for i in (self, other) if i.squares is not None]
+        return Information(self.gram + other.gram, np.sum(known, axis=0) if known else None)
 
 
 @dataclass(frozen=True)
@@ -134,9 +141,22 @@ def flown(known: Known, world: World, reference: Reference, limits: Limits) -> F
 def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) -> Information:
     """What a flight would hold, in the columns of the set's regression."""
     rate = 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
-    run = recorded(flight, world, columns_of(known), rate, "planned")
     model, prepared = known.fitted.model, known.prepared
-    segments, _ = prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))
+
+    def segments_of(flight: Flown) -> list[Segment]:
+        run = recorded(flight, world, columns_of(known), rate, "planned")
+        return prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
+
+    segments = segments_of(flight)
+    apart = []
+    for question in known.chains:
+        for true, rival in question.pairs:
+            at, chain = 0, []
+            for _, form in true.chain:
+                chain.append((form, true.values[at : at + len(form.parameters)]))
+                at += len(form.parameters)
+            told = commands(replace(world, chain=tuple(chain)), flight.motion)
+            apart.append(squares(known.fitted, segments_of(replace(flight, command_rad_s=told)), true, rival))
     if known.fitted.commanded:
         segments = path_segments(segments, *known.fitted.chain, prepared.thinner.cutoff_hz)
     effects = model.effects if model.effects is not None else chosen(model)
@@ -146,7 +166,7 @@ def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) 
     every = known.regression.columns([t.key for t in terms])
     gram = np.zeros_like(known.regression.gram[0])
     gram[np.ix_(every, every)] = own.gram.sum(axis=0)
-    return Information(gram)
+    return Information(gram, np.array(apart) if apart else None)
 
 
 def left_over(
@@ -221,3 +241,17 @@ def left_overs(known: Known, question: Question, information: Information) -> li
         if true.keys and rival != true.id
     ]
     return [float(np.sqrt(best[0])) for best in found if best is not None]
+
+
+def chain_separations(known: Known, information: Information) -> list[tuple[tuple[str, ...], tuple[Separation, ...]]]:
+    """Every chain of every question between command and speed against its nearest rival."""
+    out, at = [], 0
+    for question in known.chains:
+        found: dict[str, Separation] = {}
+        for true, rival in question.pairs:
+            sigma = 0.0 if information.squares is None else float(np.sqrt(information.squares[at]))
+            at += 1
+            if true.id not in found or sigma < found[true.id].sigma:
+                found[true.id] = Separation(true.id, rival.id, sigma, chain_interval(sigma, true.doubt), 0.0)
+        out.append((question.ids, tuple(found.values())))
+    return out

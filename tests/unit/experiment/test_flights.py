@@ -6,7 +6,7 @@ import pytest
 from rotorid import templates
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.experiment import write
+from rotorid.experiment import page, write
 from rotorid.experiment.candidates import Reference, candidates, joined
 from rotorid.experiment.limits import Limits
 from rotorid.experiment.plan import Plan, broken, yaw_acceleration
@@ -148,3 +148,18 @@ def test_a_plan_is_written_whole(a_plan: Plan, tmp_path) -> None:
     assert {f.name for f in files} == {"plan.json", "trajectory.csv", "px4_offboard.csv", "crazyflie.csv", "plan.png"}
     assert all(f.stat().st_size > 200 for f in files)
     assert not list((tmp_path / "plan").glob(".*"))
+
+
+def test_the_page_shows_the_last_plan_once(a_plan: Plan) -> None:
+    bare = '<h1>x</h1><section><h2>What to fly next</h2>\n<p class="next">Fly.</p></section><section>rest</section>'
+    once = page.with_plan(bare, a_plan, b"png")
+    assert once.count("<img") == 1 and once.count("waves") == 0
+    assert "Fly." in once and once.endswith("<section>rest</section>")
+    assert page.with_plan(once, a_plan) == page.with_plan(bare, a_plan)
+    assert page.with_plan("<p>another page</p>", a_plan) == "<p>another page</p>"
+
+
+def test_the_page_that_is_written_has_the_section() -> None:
+    from rotorid.mismatch.page import page_file
+
+    assert page.SECTION.search(page_file("page.html"))
