@@ -9,6 +9,7 @@
 import sys
 import tempfile
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -44,50 +45,58 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     named = next(iter(truth))
     found: Known = known(first)
     classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
-    nan = float("nan")
     if not classes:
-        return proof.Row(case.name, named, "", nan, nan, nan, False, "", "", "nothing was left open")
+        return proof.Row(case=case.name, truth=named, open="", said="nothing was left open")
     ids = classes[0]
     made = plan(found, limits)
     if not made.pieces:
         said = made.unanswerable[0][1] if made.unanswerable else "no manoeuvre separates them"
-        return proof.Row(case.name, named, " ".join(ids), nan, nan, nan, False, "no plan", "", said)
-    sigma, true, rival = proof.predicted(made, ids, truth)
+        return proof.Row(case=case.name, truth=named, open=" ".join(ids), outcome="no plan", said=said)
+    expected = proof.predicted(made, ids, truth)
     references = {
         "planned": simulator.reference_of(sampled(made), *simulator.grid(case)),
         "standard": simulator.standard(case, made.duration_s),
     }
-    outcome, measured, said = {}, nan, ""
+    outcome, measured, said = {}, {}, {}
     for name, reference in references.items():
         second = as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
-        outcome[name], sentence, whole = judged(first, second, ids, truth)
-        if name == "planned":
-            said = sentence
-            measured = proof.measured(known(whole), true, rival) if true else nan
-    return proof.Row(
+        outcome[name], said[name], whole = judged(first, second, ids, truth)
+        measured[name] = proof.measured(known(whole), expected)
+    row = proof.Row(
         case=case.name,
         truth=named,
         open=" ".join(ids),
         planned_s=made.duration_s,
-        predicted_sigma=sigma,
-        measured_sigma=measured,
+        measured_sigma=measured["planned"],
+        standard_sigma=measured["standard"],
         promised=made.settles,
         outcome=outcome["planned"],
         standard_outcome=outcome["standard"],
-        said=said,
+        said=said["planned"],
     )
+    if expected is None:
+        return row
+    low, high = expected.interval_95
+    return replace(row, predicted_sigma=expected.sigma, predicted_low=low, predicted_high=high)
 
 
-def main(table: str, summary: str, limits: str, root: str, most: int | None = None) -> None:
-    """Write `table` (a row a set) and `summary`; `root` holds `tests`, `most` cases are taken at most."""
+def main(
+    table: str, summary: str, so_far: str, limits: str, root: str, code: str = "", most: int | None = None
+) -> None:
+    """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
+
+    `root` holds `tests`; rows of another `code` are made anew; `most` cases are taken at most.
+    """
     sys.path.insert(0, root)
     warnings.simplefilter("ignore")
     from tests.concealed import planned as simulator
     from tests.concealed.richsim import scene
 
     allowed = read_limits(Path(limits))
-    path = Path(table)
-    rows = pd.read_csv(path).to_dict("records") if path.is_file() else []
+    kept = Path(so_far)
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
+    rows = [r for r in rows if str(r["judged_by"]) == code]
     # Where speeds are commands alone a set takes minutes: those come last.
     every = [*simulator.look_alikes(), *simulator.ambiguous()]
     cases = sorted(every, key=lambda case: "speed" not in case.settings.groups)[:most]
@@ -98,14 +107,16 @@ def main(table: str, summary: str, limits: str, root: str, most: int | None = No
         recording, answer, _ = scene.make(case.settings, case.seed)
         first = as_read(recording, simulator.write_set, "first")
         try:
-            rows += proof.table([row_of(case, answer, first, simulator, allowed)]).to_dict("records")
+            row = replace(row_of(case, answer, first, simulator, allowed), judged_by=code)
+            rows += proof.table([row]).to_dict("records")
         except InputError as error:
             print(f"{case.name}: {error}", file=sys.stderr)
             continue
-        pd.DataFrame(rows).to_csv(path, index=False)
+        pd.DataFrame(rows).to_csv(kept, index=False)
         print(rows[-1], file=sys.stderr, flush=True)
-    pd.DataFrame(rows).to_csv(path, index=False)
-    proof.summary(pd.DataFrame(rows)).to_csv(summary, index=False)
+    found = pd.DataFrame(rows)
+    found.to_csv(table, index=False)
+    proof.summary(found).to_csv(summary, index=False)
 
 
 if __name__ == "__main__":
@@ -113,6 +124,8 @@ if __name__ == "__main__":
         main(
             table=snakemake.output.table,
             summary=snakemake.output.summary,
+            so_far=snakemake.params.so_far,
             limits=snakemake.input.limits,
             root=str(Path.cwd()),
+            code=str(snakemake.params.code),
         )

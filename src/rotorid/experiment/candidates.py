@@ -18,7 +18,7 @@ GRAVITY_M_S2 = 9.81
 RAMP_S = 2.0
 FASTEST_HZ = 2.0
 """Fastest oscillation of a position reference; beyond it an attitude loop follows little."""
-ROOM = 0.9
+ROOM = 0.85
 """Share of the tilt allowed that a reference asks for: drag and the controller take some."""
 PIECE_S = 10.0
 HEAVE_RAD_S = 3.0

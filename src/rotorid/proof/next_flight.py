@@ -14,6 +14,7 @@ import pandas as pd
 
 from rotorid.experiment.plan import Plan
 from rotorid.experiment.questions import Known, best_of
+from rotorid.experiment.separation import Separation
 from rotorid.experiment.together import answers
 from rotorid.mismatch.findings import Finding
 from rotorid.proof.intervals import wilson
@@ -30,18 +31,25 @@ class Row:
     truth: str
     open: str
     """Ids that the set left open; empty where it left none."""
-    planned_s: float
-    predicted_sigma: float
+    planned_s: float = float("nan")
+    predicted_sigma: float = float("nan")
     """Of the true model against its nearest rival, both sets together; NaN where truth is none of the open ids."""
-    measured_sigma: float
-    """The same between the two as recorded."""
-    promised: bool
-    """Whether the plan said that all would be settled."""
-    outcome: str
-    """`right`, `wrong`, `open`, or `no plan` where it said that no flight settles this."""
-    standard_outcome: str
+    predicted_low: float = float("nan")
+    """Its 95 % interval as the plan states it."""
+    predicted_high: float = float("nan")
+    measured_sigma: float = float("nan")
+    """The same between the two as recorded: √ of the whitened squares that the true one explains more."""
+    standard_sigma: float = float("nan")
     """The same with the standard flight in the planned one's place."""
-    said: str
+    promised: bool = False
+    """Whether the plan said that all would be settled."""
+    outcome: str = ""
+    """`right`, `wrong`, `open`, or `no plan` where it said that no flight settles this."""
+    standard_outcome: str = ""
+    """The same with the standard flight in the planned one's place."""
+    said: str = ""
+    judged_by: str = ""
+    """Hash of the code that planned and judged it."""
 
 
 def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:
@@ -52,18 +60,20 @@ def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[s
     return ("right" if answer.answer in truth else "wrong"), answer.sentence
 
 
-def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> tuple[float, str, str]:
-    """Separation of the true model from its nearest rival, and the two ids."""
-    for own, found in plan.questions:
-        if set(own) == set(ids):
-            for s in found:
-                if s.true in truth:
-                    return s.sigma, s.true, s.rival
-    return float("nan"), "", ""
+def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
+    """Separation of the true model from its nearest rival; None where the truth is none of the class."""
+    found = [s for own, separations in plan.questions if set(own) == set(ids) for s in separations]
+    return next((s for s in found if s.true in truth), None)
 
 
-def measured(joint: Known, true: str, rival: str) -> float:
-    """√ of the whitened squares that the true model explains more than its rival in both sets together."""
+def measured(joint: Known, expected: Separation | None) -> float:
+    """√ of the whitened squares that the true model explains more than its rival in both sets together.
+
+    NaN where there is none, or where it is no term of forces and moments (between command and rotor speed).
+    """
+    if expected is None:
+        return float("nan")
+    true, rival = expected.true, expected.rival
     search, active = joint.fitted.model.search, joint.fitted.model.selection.active
     shared = [*search.always, *(k for k in active if search.terms[k].effect not in (true, rival))]
     explained = []
@@ -83,10 +93,15 @@ def table(rows: list[Row]) -> pd.DataFrame:
 
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
     """Shares over the sets that were open, with 95 % intervals (Wilson), and how many they are of."""
+    sigmas = ["predicted_sigma", "predicted_low", "predicted_high", "measured_sigma", "standard_sigma"]
+    rows = rows.assign(**{name: pd.to_numeric(rows[name], errors="coerce") for name in sigmas})
     asked = rows[rows["open"].fillna("") != ""]
     planned = asked[asked["outcome"] != "no plan"]
     both = asked.dropna(subset=["predicted_sigma", "measured_sigma"])
+    faster = planned.dropna(subset=["measured_sigma", "standard_sigma"])
     ratio = both["measured_sigma"] / both["predicted_sigma"].clip(lower=1e-9)
+    inside = both["measured_sigma"].between(both["predicted_low"], both["predicted_high"])
+    fast = faster["measured_sigma"] ** 2 >= 2 * faster["standard_sigma"] ** 2
     counted = (
         ("settled rightly, of all open", asked["outcome"] == "right"),
         ("settled wrongly, of all open", asked["outcome"] == "wrong"),
@@ -94,6 +109,14 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
         ("settled rightly by a standard flight as long", planned["standard_outcome"] == "right"),
         ("settled wrongly by a standard flight as long", planned["standard_outcome"] == "wrong"),
         (f"prediction within a factor of {WITHIN:g}", (ratio < WITHIN) & (ratio > 1 / WITHIN)),
+        (
+            "measured within the interval stated",
+            both["measured_sigma"].between(both["predicted_low"], both["predicted_high"]),
+        ),
+        (
+            "planned at least twice as fast (squares a second)",
+            faster["measured_sigma"] ** 2 >= 2 * faster["standard_sigma"] ** 2,
+        ),
     )
     out = []
     for name, hits in counted:

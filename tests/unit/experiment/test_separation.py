@@ -14,16 +14,16 @@ RATE = 40.0
 THETA = 0.3
 
 
-def terms() -> list[Term]:
+def terms(trust: float = 0.05) -> list[Term]:
     return [
-        Term("mass", "value", prior_sd=(0.05,)),
+        Term("mass", "value", prior_sd=(trust,)),
         Term("a/form", "effect", "a"),
         Term("b/form", "effect", "b"),
         Term("b/other", "effect", "b"),
     ]
 
 
-def regression(seed: int, noise: float, alike: float):
+def regression(seed: int, noise: float, alike: float, trust: float = 0.05):
     """Rows of one channel in which b is `alike` to a, and a with THETA is true."""
     rng = np.random.default_rng(seed)
     x = np.zeros((2000, 12, 4))
@@ -34,7 +34,7 @@ def regression(seed: int, noise: float, alike: float):
     x[:, 0, 3] = rng.standard_normal(2000)
     y[:, 0] = THETA * x[:, 0, 1] + noise * rng.standard_normal(2000)
     rows = [Rows("run", np.arange(2000) / RATE, y, x)]
-    return build(rows, terms(), {0: np.array([1.0])}, lambda run, t: True, 1.0, RATE)
+    return build(rows, terms(trust), {0: np.array([1.0])}, lambda run, t: True, 1.0, RATE)
 
 
 QUESTION = Question(
@@ -50,7 +50,8 @@ def known_of(reg):
 
 
 def test_prediction_is_the_difference_that_a_fit_finds() -> None:
-    reg = regression(1, 1e-9, 0.9)
+    # Trust enters the prediction as what it costs to move a value; `explained` counts the rows alone.
+    reg = regression(1, 1e-9, 0.9, trust=10.0)
     square, _, _ = against(known_of(reg), QUESTION, QUESTION.hypotheses[0], "b", Information(reg.gram.sum(axis=0)))
     found = reg.explained(["mass", "a/form"]) - reg.explained(["mass", "b/form"])
     assert square == pytest.approx(found, rel=1e-3)
