@@ -188,7 +188,7 @@ def text(plan: Plan) -> list[str]:
 
 def share(value: float, unit: str) -> str:
     """A half width with its unit; relative ones in percent."""
-    return f"{100 * value:.2g} %" if unit == "relative" else f"{value:.2g} {unit}"
+    return f"{100 * value:.2g} %" if unit == "relative" else f"{value:.2g} {unit if unit != '1' else ''}".rstrip()
 
 
 def write(plan: Plan, folder: Path) -> list[Path]:
