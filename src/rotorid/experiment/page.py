@@ -16,7 +16,11 @@ SECTION = re.compile(r"(<section><h2>What to fly next</h2>.*?)(?:" + OPEN + ".*?
 
 def section(plan: Plan, picture: bytes | None = None) -> Markup:
     """The plan as HTML: sentences, and the picture (PNG) where there is one."""
-    lines = Markup("").join(Markup("<li>{}</li>").format(line.strip()) for line in text(plan))
+    said = text(plan)
+    flown = [line.strip() for line in said if line.startswith("  ")]
+    first = Markup("<br>").join([said[0], *flown])
+    others = [line for line in said[1:] if not line.startswith("  ")]
+    lines = Markup("").join(Markup("<li>{}</li>").format(line) for line in (first, *others))
     out = Markup("<ul>{}</ul>").format(lines)
     if picture:
         data = base64.b64encode(picture).decode()

@@ -164,7 +164,7 @@ def text(plan: Plan) -> list[str]:
     out = []
     if plan.pieces:
         out.append(f"Fly for {plan.duration_s:.0f} s (without take-off and landing):")
-        out += [f"  {i}. {p.words} ({p.duration_s:.0f} s)" for i, p in enumerate(plan.pieces, 1)]
+        out += [f"  {line}" for line in steps(plan)]
     elif plan.questions:
         out.append("No manoeuvre within the limits separates what is open any further.")
     for _, found in plan.questions:
@@ -183,6 +183,20 @@ def text(plan: Plan) -> list[str]:
         out.append(f"No flight with these columns tells {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append("Nothing is open: no flight is needed to tell effects apart.")
+    return out
+
+
+def steps(plan: Plan) -> list[str]:
+    """The manoeuvres in their order, one that is flown several times in a row once."""
+    out, at = [], 0
+    while at < len(plan.pieces):
+        piece = plan.pieces[at]
+        times = 1
+        while at + times < len(plan.pieces) and plan.pieces[at + times] is piece:
+            times += 1
+        number = str(at + 1) if times == 1 else f"{at + 1} to {at + times}"
+        out.append(f"{number}. {piece.words} ({f'{times} × ' if times > 1 else ''}{piece.duration_s:.0f} s)")
+        at += times
     return out
 
 

@@ -15,7 +15,7 @@ STEP_S = 0.01
 LIMITS = Limits(x_m=(-5, 5), y_m=(-5, 5), height_m=(1, 5), speed_m_s=4, climb_m_s=2, tilt_deg=30)
 PLANS = (
     ("drift", "pass 90 at 1"),
-    ("shake all to 1 Hz", "climb at 1"),
+    ("shake sideways to 1 Hz", "climb at 1"),
     ("waves 0", "spin"),
 )
 
