@@ -223,6 +223,12 @@ class Plantings(Section):
     )
 
 
+class Fleet(Section):
+    """Every recording set of a folder, judged together."""
+
+    batch: int = Field(ge=1, description="Sets that one job judges [1].")
+
+
 class Config(Section):
     """The whole of `config.yaml`."""
 
@@ -238,6 +244,7 @@ class Config(Section):
     black_box: BlackBox = Field(description="The stand's wrench without knowledge of the vehicle.")
     proof: Proof = Field(description="The proof on concealed recordings.")
     plantings: Plantings = Field(description="Plantings in real flights.")
+    fleet: Fleet = Field(description="Every recording set of a folder, judged together.")
     report: Report = Field(description="The report.")
 
 
