@@ -33,7 +33,8 @@ svg { max-width: 100%; height: auto; }
 {% if looked %}<table><tr><th>set</th><th>vehicle</th><th>verdict</th><th>why</th><th>what it says</th></tr>
 {% for row in looked %}<tr><td>{% if row.verdict == "failed" %}{{ row.set }}{% else %}
 <a href="{{ row.link }}">{{ row.set }}</a>{% endif %}</td>
-<td>{{ row.vehicle }}</td><td class="{{ row.verdict }}">{{ row.verdict.replace("_", " ") }}</td><td>{{ row.person }}</td>
+<td>{{ row.vehicle }}</td><td class="{{ row.verdict }}">{{ row.verdict.replace("_", " ") }}</td>
+<td>{{ row.person }}</td>
 <td>{{ row.sentence }}</td></tr>
 {% endfor %}</table>{% else %}<p>None.</p>{% endif %}
 <h2>Stand by themselves</h2>
@@ -47,7 +48,7 @@ svg { max-width: 100%; height: auto; }
 
 def make_page(name: str, sets: pd.DataFrame, counts: pd.DataFrame, links: dict[str, str], figure: Path) -> str:
     """The page of a fleet from its tables (`rotorid.fleet.summary`); `links` lead to each set's own page."""
-    rows = [{**row, "link": links.get(row["set"], "")} for row in sets.fillna("").to_dict("records")]
+    rows = [{**row, "link": links.get(row["set"], "")} for row in sets.to_dict("records")]
     words = sets["verdict"].value_counts()
     drawn = figure.read_text(encoding="utf-8")
     return (

@@ -306,7 +306,7 @@ def fly(
     """Fly n vehicles over `steps` steps of `step_s`; arrays with a first axis of 1 hold for all vehicles.
 
     `body` (n,) BODY; `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
-    `closed` whether `loops` (LOOP) command by `references` (., steps + 1, 4: angles, thrust) and `more` (added squares),
+    `closed` whether `loops` (LOOP) command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
     else `commands` (., steps + 1, k) with their accelerations `following` (0 for none); `reading_errors`
     (., steps + 1, 3) rad; `pushes` (., steps + 1, 6); `winds` (., 3); `ground_z` (n,); `values` (., p). Each
     `every`-th instant is kept in `states`, `accelerations_out` (angular, specific force) and `commands_out`.

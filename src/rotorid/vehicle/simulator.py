@@ -213,8 +213,11 @@ def _known_commands(controller: Controller, time_s: np.ndarray) -> np.ndarray | 
     """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call can tell."""
     if isinstance(controller, Commands):
         return controller.rotor_speed[controller._index(time_s)]
-    plan = getattr(controller, "attitude_loop", None)
-    return None if plan is None else plan(time_s)
+    # The plan is that of the class that commands; who puts another command in its place is called.
+    commanding = next((c for c in type(controller).__mro__ if "rotor_command" in vars(c)), None)
+    if "rotor_command" in vars(controller) or commanding is None or "attitude_loop" not in vars(commanding):
+        return None
+    return controller.attitude_loop(time_s)
 
 
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
