@@ -166,7 +166,7 @@ def test_a_controller_flies_compiled_as_it_is_called(kind):
         pilot = ExcitedHold(VEHICLE, waves, (400.0, 2000.0))
     else:
         gains = Gains((0.25, 0.25, 0.5), (0.3, 0.3, 0.1), (0.04, 0.04, 0.07))
-        limit = (0.05, 0.05, 0.01) if kind == "limited pid" else None
+        limit = (0.1, 0.1, 0.02) if kind == "limited pid" else None
         pilot = AttitudePid(VEHICLE, training_reference(6.4), gains, 0.02, limit)
     begin = Start(
         euler_rad=np.array([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]]),
