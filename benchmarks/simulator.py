@@ -153,7 +153,7 @@ def main(out: Path | None, sets: int) -> None:
             "",
             "| simulator | seconds per simulated second | times RotorPy |",
             "| --- | ---: | ---: |",
-            *(f"| {name} | {value:.3g} | {peer_s / value:.0f} |" for name, value, peer_s in rows),
+            *(f"| {name} | {value:.3g} | {peer_s / value:.3g} |" for name, value, peer_s in rows),
             "",
             "Plain flight is compared with RotorPy's plain flight, all else with RotorPy's aerodynamics on. "
             f"With the same aerodynamics positions differ by {apart:.1e} m after 1 s "

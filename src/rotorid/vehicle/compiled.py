@@ -31,7 +31,7 @@ def _clear(w):
 
 @njit(cache=True, error_model="numpy")
 def _collect(v, w, wrench):
-    """Add what the kernels left in `w` to a force and moment (6,)."""
+    """Add what the kernels left in `w` to a force and moment (6,) of the scratch record."""
     for j in range(3):
         wrench[j] += w.force[j]
         wrench[3 + j] += w.moment[j]
@@ -62,18 +62,18 @@ def _solved(m, v, own, wrench):
 
 
 @njit(cache=True, error_model="numpy")
-def _implicit(m, v, w, base, addresses, explicit, offsets, values, at, wrench, own):
-    """Accelerations `own` (6,) that follow where the effects that read accelerations are told `at` (6,)."""
+def _implicit(m, v, w, x, addresses, explicit, offsets, values):
+    """Accelerations `x.own` that follow where the effects that read accelerations are told `x.at`."""
     for j in range(3):
-        m.angular_acceleration[j] = at[j]
-        m.specific_force[j] = at[3 + j]
+        m.angular_acceleration[j] = x.at[j]
+        m.specific_force[j] = x.at[3 + j]
     _clear(w)
     for e in range(explicit, addresses.shape[0]):
         call_kernel(addresses[e], m, v, values, offsets[e], w)
     for j in range(6):
-        wrench[j] = base[j]
-    _collect(v, w, wrench)
-    _solved(m, v, own, wrench)
+        x.wrench[j] = x.base[j]
+    _collect(v, w, x.wrench)
+    _solved(m, v, x.own, x.wrench)
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,71 +111,72 @@ def _invert(matrix):
 
 
 @njit(cache=True, error_model="numpy")
-def _relaxation(m, v, w, base, addresses, explicit, offsets, values, work, matrix):
+def _relaxation(m, v, w, x, addresses, explicit, offsets, values):
     """(I − A)⁻¹ of how the accelerations answer to themselves, A: added mass and inertia, constant in a flight."""
-    at, own, first, wrench = work[0], work[1], work[2], work[3]
     for j in range(6):
-        at[j] = 0.0
-    _implicit(m, v, w, base, addresses, explicit, offsets, values, at, wrench, first)
+        x.at[j] = 0.0
+    _implicit(m, v, w, x, addresses, explicit, offsets, values)
     for j in range(6):
-        at[j] = 1.0
-        _implicit(m, v, w, base, addresses, explicit, offsets, values, at, wrench, own)
-        at[j] = 0.0
+        x.first[j] = x.own[j]
+    for j in range(6):
+        x.at[j] = 1.0
+        _implicit(m, v, w, x, addresses, explicit, offsets, values)
+        x.at[j] = 0.0
         for i in range(6):
-            matrix[i, j] = (1.0 if i == j else 0.0) - (own[i] - first[i])
-    _invert(matrix)
+            x.matrix[i, j] = (1.0 if i == j else 0.0) - (x.own[i] - x.first[i])
+    _invert(x.matrix)
 
 
 @njit(cache=True, error_model="numpy")
-def _accelerate(m, v, w, push, addresses, explicit, offsets, values, known, work, matrix, accelerations):
-    """Accelerations (6,), angular then specific force, of a vehicle whose instant `m` is filled but for these.
+def _accelerate(m, v, w, x, pushes, p, j, addresses, explicit, offsets, values, known):
+    """Accelerations `x.now`, angular then specific force, of a vehicle whose instant `m` is filled but for these.
 
-    What reads the accelerations that it changes is solved for from the last ones, by steps that are exact where the
-    effects are linear in them; `known` says whether `matrix` is that of this flight already.
+    `pushes[p, j]` (6,) is added to force and moment. What reads the accelerations that it changes is solved for from
+    the last ones, by steps that are exact where the effects are linear in them; `known` says whether `x.matrix` is that
+    of this flight already.
     """
-    base, own, wrench = work[4], work[1], work[3]
-    for j in range(6):
-        base[j] = push[j]
+    for i in range(6):
+        x.base[i] = pushes[p, j, i]
     for i in range(v.rotors):
         square = m.rotor_speed[i] * m.rotor_speed[i]
-        base[2] -= v.mixer[0, i] * square
-        base[3] += v.mixer[1, i] * square
-        base[4] += v.mixer[2, i] * square
-        base[5] += v.mixer[3, i] * square
+        x.base[2] -= v.mixer[0, i] * square
+        x.base[3] += v.mixer[1, i] * square
+        x.base[4] += v.mixer[2, i] * square
+        x.base[5] += v.mixer[3, i] * square
     effects = addresses.shape[0]
     if explicit > 0:
         _clear(w)
         for e in range(explicit):
             call_kernel(addresses[e], m, v, values, offsets[e], w)
-        _collect(v, w, base)
+        _collect(v, w, x.base)
     if explicit == effects:
-        _solved(m, v, accelerations, base)
+        _solved(m, v, x.now, x.base)
         return
     if not known:
-        _relaxation(m, v, w, base, addresses, explicit, offsets, values, work, matrix)
+        _relaxation(m, v, w, x, addresses, explicit, offsets, values)
     for _ in range(MOST_ROUNDS):
-        _implicit(m, v, w, base, addresses, explicit, offsets, values, accelerations, wrench, own)
+        for i in range(6):
+            x.at[i] = x.now[i]
+        _implicit(m, v, w, x, addresses, explicit, offsets, values)
         turning = linear = 0.0
         most_turning = most_linear = 1.0
-        for j in range(3):
-            turning = max(turning, abs(own[j] - accelerations[j]))
-            linear = max(linear, abs(own[3 + j] - accelerations[3 + j]))
-            most_turning = max(most_turning, abs(own[j]))
-            most_linear = max(most_linear, abs(own[3 + j]))
-        for i in range(6):
-            wrench[i] = own[i] - accelerations[i]
+        for i in range(3):
+            turning = max(turning, abs(x.own[i] - x.at[i]))
+            linear = max(linear, abs(x.own[3 + i] - x.at[3 + i]))
+            most_turning = max(most_turning, abs(x.own[i]))
+            most_linear = max(most_linear, abs(x.own[3 + i]))
         for i in range(6):
             change = 0.0
-            for j in range(6):
-                change += matrix[i, j] * wrench[j]
-            accelerations[i] += change
+            for k in range(6):
+                change += x.matrix[i, k] * (x.own[k] - x.at[k])
+            x.now[i] = x.at[i] + change
         if turning <= CONVERGED * most_turning and linear <= CONVERGED * most_linear:
             break
 
 
 @njit(cache=True, error_model="numpy")
-def _enter(m, v, s, attitude, effects, wind, height_offset):
-    """Fill an instant from a state; rotor speeds and their accelerations are in it already."""
+def _enter(m, v, s, attitude, effects, winds, row, column, height_offset):
+    """Fill an instant from a state, in the wind `winds[row, column]`; what the rotors do is in it already."""
     p, q, r = s[0], s[1], s[2]
     m.angular_velocity[0] = p
     m.angular_velocity[1] = q
@@ -194,7 +195,7 @@ def _enter(m, v, s, attitude, effects, wind, height_offset):
     if not effects:
         return
     if s.shape[0] > 10:
-        north, east, down = s[7] - wind[0], s[8] - wind[1], s[9] - wind[2]
+        north, east, down = s[7] - winds[row, column, 0], s[8] - winds[row, column, 1], s[9] - winds[row, column, 2]
         for j in range(3):
             m.air_velocity[j] = m.rotation[0, j] * north + m.rotation[1, j] * east + m.rotation[2, j] * down
         m.height = height_offset - s[12]
@@ -210,25 +211,25 @@ def _enter(m, v, s, attitude, effects, wind, height_offset):
 
 
 @njit(cache=True, error_model="numpy")
-def _rates_of_change(m, v, s, accelerations, out):
-    """Time derivative of the rigid body's state."""
+def _rates_of_change(m, v, s, x, slopes, stage):
+    """Time derivative of the rigid body's state into a row of `slopes`."""
     p, q, r = s[0], s[1], s[2]
     for j in range(3):
-        out[j] = accelerations[j]
+        slopes[stage, j] = x.now[j]
     if s.shape[0] < 7:
         return
-    w, x, y, z = s[3], s[4], s[5], s[6]
-    out[3] = -0.5 * (x * p + y * q + z * r)
-    out[4] = 0.5 * (w * p + y * r - z * q)
-    out[5] = 0.5 * (w * q + z * p - x * r)
-    out[6] = 0.5 * (w * r + x * q - y * p)
+    a, b, c, d = s[3], s[4], s[5], s[6]
+    slopes[stage, 3] = -0.5 * (b * p + c * q + d * r)
+    slopes[stage, 4] = 0.5 * (a * p + c * r - d * q)
+    slopes[stage, 5] = 0.5 * (a * q + d * p - b * r)
+    slopes[stage, 6] = 0.5 * (a * r + b * q - c * p)
     if s.shape[0] < 13:
         return
-    fx, fy, fz = accelerations[3], accelerations[4], accelerations[5]
+    fx, fy, fz = x.now[3], x.now[4], x.now[5]
     for j in range(3):
-        out[7 + j] = m.rotation[j, 0] * fx + m.rotation[j, 1] * fy + m.rotation[j, 2] * fz
-        out[10 + j] = s[7 + j]
-    out[9] += v.gravity
+        slopes[stage, 7 + j] = m.rotation[j, 0] * fx + m.rotation[j, 1] * fy + m.rotation[j, 2] * fz
+        slopes[stage, 10 + j] = s[7 + j]
+    slopes[stage, 9] += v.gravity
 
 
 @njit(cache=True, error_model="numpy")
@@ -299,6 +300,7 @@ def fly(
     values,
     instant,
     added,
+    scratch,
     states,
     accelerations_out,
     commands_out,
@@ -308,15 +310,14 @@ def fly(
     `body` (n,) BODY; `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
     `closed` whether `loops` (LOOP) command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
     else `commands` (., steps + 1, k) with their accelerations `following` (0 for none); `reading_errors`
-    (., steps + 1, 3) rad; `pushes` (., steps + 1, 6); `winds` (., 3); `ground_z` (n,); `values` (., p). Each
+    (., steps + 1, 3) rad; `pushes` (., steps + 1, 6); `winds` (., 1, 3); `ground_z` (n,); `values` (., p). Each
     `every`-th instant is kept in `states`, `accelerations_out` (angular, specific force) and `commands_out`.
     """
     size = start.shape[1]
     k = size - 13
     slopes = np.zeros((4, size))
     trial, command, memory = np.empty(size), np.empty(k), np.empty((3, 3))
-    work, matrix, accelerations = np.empty((5, 6)), np.empty((6, 6)), np.empty(6)
-    m, w = instant[0], added[0]
+    m, w, x = instant[0], added[0], scratch[0]
     effects = addresses.shape[0] > 0
     for n in range(start.shape[0]):
         v = body[n]
@@ -324,16 +325,18 @@ def fly(
         up, down = lags[n, 0], lags[n, 1]
         at_once = up == 0.0
         own_values = values[n if values.shape[0] > 1 else 0]
-        wind = winds[n if winds.shape[0] > 1 else 0]
+        air = n if winds.shape[0] > 1 else 0
+        p = n if pushes.shape[0] > 1 else 0
         c = n if commands.shape[0] > 1 else 0
         f = n if following.shape[0] > 1 else 0
         loop = loops[n if loops.shape[0] > 1 else 0]
         reference = references[n if references.shape[0] > 1 else 0]
         reading_error = reading_errors[n if reading_errors.shape[0] > 1 else 0]
-        push = pushes[n if pushes.shape[0] > 1 else 0]
-        accelerations[:] = 0.0
+        for i in range(6):
+            x.now[i] = 0.0
         memory[:] = 0.0
         known = False
+        kept = 0
         for j in range(steps + 1):
             now_s = j * step_s
             if closed:
@@ -360,47 +363,34 @@ def fly(
                 if at_once:
                     m.rotor_acceleration[i] = following[f, j, i] if following.shape[0] > 0 else 0.0
             for stage in range(4):
-                if stage == 0:
-                    place = s
-                    m.time_s = now_s
-                else:
-                    share = 1.0 if stage == 3 else 0.5
-                    place = trial
-                    m.time_s = now_s + share * step_s
-                    for i in range(size):
-                        trial[i] = s[i] + share * step_s * slopes[stage - 1, i]
+                share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+                m.time_s = now_s + share * step_s
+                for i in range(size):
+                    trial[i] = s[i] if stage == 0 else s[i] + share * step_s * slopes[stage - 1, i]
                 for i in range(k):
-                    m.rotor_speed[i] = place[13 + i]
+                    m.rotor_speed[i] = trial[13 + i]
                     if at_once:
                         slopes[stage, 13 + i] = 0.0
                     else:
-                        gap = command[i] - place[13 + i]
+                        gap = command[i] - trial[13 + i]
                         m.rotor_acceleration[i] = gap * (up if gap > 0.0 else down)
                         slopes[stage, 13 + i] = m.rotor_acceleration[i]
-                _enter(m, v, place, True, effects, wind, ground_z[n])
-                _accelerate(
-                    m,
-                    v,
-                    w,
-                    push[j if push.shape[0] > 1 else 0],
-                    addresses,
-                    explicit,
-                    offsets,
-                    own_values,
-                    known,
-                    work,
-                    matrix,
-                    accelerations,
-                )
+                _enter(m, v, trial, True, effects, winds, air, 0, ground_z[n])
+                row = j if pushes.shape[1] > 1 else 0
+                _accelerate(m, v, w, x, pushes, p, row, addresses, explicit, offsets, own_values, known)
                 known = True
                 if stage == 0:
-                    if j % every == 0:
-                        states[n, j // every] = s
-                        accelerations_out[n, j // every] = accelerations
-                        commands_out[n, j // every] = command
+                    if j == kept * every:
+                        for i in range(size):
+                            states[n, kept, i] = s[i]
+                        for i in range(6):
+                            accelerations_out[n, kept, i] = x.now[i]
+                        for i in range(k):
+                            commands_out[n, kept, i] = command[i]
+                        kept += 1
                     if j == steps:
                         break
-                _rates_of_change(m, v, place, accelerations, slopes[stage])
+                _rates_of_change(m, v, trial, x, slopes, stage)
             if j < steps:
                 for i in range(size):
                     s[i] += step_s / 6.0 * (slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i])
@@ -427,6 +417,7 @@ def fly_windows(
     values,
     instant,
     added,
+    scratch,
     out,
 ):
     """States (w, m, 3, 7 or 13) of w windows from their `start`, driven by recorded inputs.
@@ -437,9 +428,8 @@ def fly_windows(
     size = start.shape[1]
     k = speed.shape[2]
     slopes, trial = np.zeros((4, size)), np.empty(size)
-    work, matrix, accelerations = np.empty((5, 6)), np.empty((6, 6)), np.empty(6)
-    still, none = np.zeros(3), np.zeros(6)
-    m, w = instant[0], added[0]
+    still, none = np.zeros((1, 1, 3)), np.zeros((1, 1, 6))
+    m, w, x = instant[0], added[0], scratch[0]
     v = body[0]
     effects = addresses.shape[0] > 0
     for i in range(3):
@@ -448,7 +438,8 @@ def fly_windows(
     for n in range(start.shape[0]):
         s = start[n].copy()
         out[n, 0] = s
-        accelerations[:] = 0.0
+        for i in range(6):
+            x.now[i] = 0.0
         known = False
         for j in range(time_s.shape[1] - 1):
             step_s = time_s[n, j + 1] - time_s[n, j]
@@ -466,16 +457,20 @@ def fly_windows(
                     m.rotor_speed[i] = speed_between[n, j, i] if between else speed[n, at, i]
                     if acceleration.shape[0] > 0:
                         m.rotor_acceleration[i] = acceleration_between[n, j, i] if between else acceleration[n, at, i]
-                air = still
-                if wind.shape[0] > 0:
-                    air = wind_between[n, j] if between else wind[n, at]
-                pushed = none
-                if push.shape[0] > 0:
-                    pushed = push_between[n, j] if between else push[n, at]
-                _enter(m, v, trial, size > 3, effects, air, height_offset[n])
-                _accelerate(m, v, w, pushed, addresses, explicit, offsets, values, known, work, matrix, accelerations)
+                if wind.shape[0] == 0:
+                    _enter(m, v, trial, size > 3, effects, still, 0, 0, height_offset[n])
+                elif between:
+                    _enter(m, v, trial, size > 3, effects, wind_between, n, j, height_offset[n])
+                else:
+                    _enter(m, v, trial, size > 3, effects, wind, n, at, height_offset[n])
+                if push.shape[0] == 0:
+                    _accelerate(m, v, w, x, none, 0, 0, addresses, explicit, offsets, values, known)
+                elif between:
+                    _accelerate(m, v, w, x, push_between, n, j, addresses, explicit, offsets, values, known)
+                else:
+                    _accelerate(m, v, w, x, push, n, at, addresses, explicit, offsets, values, known)
                 known = True
-                _rates_of_change(m, v, trial, accelerations, slopes[stage])
+                _rates_of_change(m, v, trial, x, slopes, stage)
             for i in range(size):
                 s[i] += step_s / 6.0 * (slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i])
             if size > 3:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.vehicle import compiled
-from rotorid.vehicle.kernels import ADDED, INSTANT, MOST_ROTORS, Kernels
+from rotorid.vehicle.kernels import ADDED, INSTANT, MOST_ROTORS, SCRATCH, Kernels
 
 LOOP = np.dtype(
     [
@@ -139,7 +139,7 @@ def fly(
         references=references,
         reading_errors=np.zeros((1, 1, 3)) if reading_errors is None else np.ascontiguousarray(reading_errors),
         pushes=np.zeros((1, 1, 6)) if pushes is None else np.ascontiguousarray(pushes),
-        winds=np.atleast_2d(np.ascontiguousarray(wind, float)),
+        winds=np.atleast_2d(np.ascontiguousarray(wind, float))[:, None],
         ground_z=np.full(n, np.nan if ground_z_m is None else ground_z_m),
         values=np.atleast_2d(kernels.values if values is None else np.ascontiguousarray(values, float)),
         states=np.empty((n, kept, 13 + k)),
@@ -149,7 +149,9 @@ def fly(
 
     def part(first: int, last: int) -> None:
         mine = {name: a[first:last] if len(a) == n else a for name, a in own.items()}
-        given = fixed | mine | dict(instant=np.zeros(1, INSTANT), added=np.zeros(1, ADDED))
+        given = (
+            fixed | mine | dict(instant=np.zeros(1, INSTANT), added=np.zeros(1, ADDED), scratch=np.zeros(1, SCRATCH))
+        )
         compiled.fly(*(given[name] for name in _ORDER))
 
     _spread(part, n, threads)
@@ -180,6 +182,7 @@ def fly_windows(
             kernels.values,
             np.zeros(1, INSTANT),
             np.zeros(1, ADDED),
+            np.zeros(1, SCRATCH),
             out[first:last],
         )
 

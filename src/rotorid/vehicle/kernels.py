@@ -69,6 +69,13 @@ the largest distance of a hub from the body's z axis, m."""
 ADDED = np.dtype([("force", "f8", 3), ("moment", "f8", 3), ("hub_force", "f8", (MOST_ROTORS, 3))], align=True)
 """`w` of a kernel: force, N, moment about the believed centre of mass, N m, and a force at each hub, N, body axes."""
 
+SCRATCH = np.dtype(
+    [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")] + [("matrix", "f8", (6, 6))],
+    align=True,
+)
+"""Room for forces with moments and for accelerations (angular, linear). In a record because a slice of an array costs
+two atomic counts of references, as long as a kernel."""
+
 _SIGNATURE = types.void(from_dtype(INSTANT), from_dtype(BODY), types.CPointer(types.float64), from_dtype(ADDED))
 _ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerometer"})
 
