@@ -254,6 +254,12 @@ class Ablation(Section):
     most: int = Field(ge=1, description="Sets that a rule is judged without, of those in which it fired [1].")
 
 
+class Fleet(Section):
+    """Every recording set of a folder, judged together."""
+
+    batch: int = Field(ge=1, description="Sets that one job judges [1].")
+
+
 class Config(Section):
     """The whole of `config.yaml`."""
 
@@ -271,6 +277,7 @@ class Config(Section):
     plantings: Plantings = Field(description="Plantings in real flights.")
     rules: Rules = Field(description="Rules of the mismatch stage.")
     ablation: Ablation = Field(description="What each of these rules is worth.")
+    fleet: Fleet = Field(description="Every recording set of a folder, judged together.")
     report: Report = Field(description="The report.")
 
 
