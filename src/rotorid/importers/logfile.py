@@ -28,8 +28,8 @@ NOT_YET = (
     (b"SQLite format 3", "a ROS 2 bag", "the export of Foxglove or PlotJuggler"),
 )
 """Formats that are recognised but not read: first bytes, name, what makes a CSV of them."""
-TEMPLATES = {"px4": "x500", "crazyflie": "crazyflie-2.1"}
-"""Template vehicle that stands in for what a log of an autopilot does not say."""
+TEMPLATES = {"px4": "x500", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
+"""Template vehicle that stands in for what a log of an autopilot or format does not say."""
 
 
 @dataclass(frozen=True)
