@@ -137,13 +137,15 @@ def commands_page() -> str:
     ]
     for name, command in group.commands.items():
         lines += [f"## rotorid {name}", "", textwrap.dedent(command.help or ""), "", "| | |", "| --- | --- |"]
-        for parameter in command.params:
-            if name != "help" and parameter.name != "help":
-                shown = ", ".join(f"`{o}`" for o in parameter.opts) if parameter.param_type_name == "option" else (
-                    f"`{parameter.make_metavar(command.make_context(name, [], resilient_parsing=True))}`"
-                )  # fmt: skip
-                told = " ".join((getattr(parameter, "help", "") or "").split()).replace("|", "\\|")
-                lines.append(f"| {shown} | {told} |")
+        for parameter in (p for p in command.params if p.name != "help"):
+            option = parameter.param_type_name == "option"
+            shown = (
+                ", ".join(f"`{o}`" for o in parameter.opts)
+                if option
+                else f"`{(parameter.metavar or parameter.name.upper())}`"
+            )
+            told = " ".join((getattr(parameter, "help", "") or "").split()).replace("|", "\\|")
+            lines.append(f"| {shown} | {told} |")
         lines.append("")
     return "\n".join(lines)
 

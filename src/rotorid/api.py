@@ -48,7 +48,8 @@ def verdict(
     ----------
     data
         Flights as a table (`pandas.DataFrame`) in the contract's columns, as tables by the name of their run, as a
-        list of tables, as a folder with `vehicle.yaml` and runs, or as one log or a list of logs that `rotorid import` knows.
+        list of tables, as a folder with `vehicle.yaml` and runs, or as one log or a list of logs that `rotorid import`
+        knows.
     vehicle
         What is believed: a `Vehicle`, a dictionary with the keys of `vehicle.yaml`, the path of one, or the name of a
         template. A folder and logs bring their own, or a proposal, where it is left out.
