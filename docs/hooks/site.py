@@ -129,21 +129,15 @@ def commands_page() -> str:
     from rotorid.cli import app
 
     group = typer.main.get_command(app)
-    lines = [
-        "# Commands",
-        "",
-        "What `rotorid COMMAND --help` says. `rotorid --install-completion` completes names in your shell.",
-        "",
-    ]
+    completion = "`rotorid --install-completion` completes names in your shell."
+    lines = ["# Commands", "", f"What `rotorid COMMAND --help` says. {completion}", ""]
     for name, command in group.commands.items():
-        lines += [f"## rotorid {name}", "", textwrap.dedent(command.help or ""), "", "| | |", "| --- | --- |"]
+        told = textwrap.dedent(command.help or "")
+        lines += [f"## rotorid {name}", "", told, "", "| option | what |", "| --- | --- |"]
         for parameter in (p for p in command.params if p.name != "help"):
             option = parameter.param_type_name == "option"
-            shown = (
-                ", ".join(f"`{o}`" for o in parameter.opts)
-                if option
-                else f"`{(parameter.metavar or parameter.name.upper())}`"
-            )
+            plain = parameter.metavar or parameter.name.upper()
+            shown = ", ".join(f"`{o}`" for o in parameter.opts) if option else f"`{plain}`"
             told = " ".join((getattr(parameter, "help", "") or "").split()).replace("|", "\\|")
             lines.append(f"| {shown} | {told} |")
         lines.append("")
@@ -199,7 +193,8 @@ def with_signatures(markdown: str) -> str:
         heading = re.match(r"### `(\w+)`", line)
         row = re.match(r"\| (?!form |---)([^|]+) \| ([^|]+) \|(.*)$", line)
         if row:
-            line = f"| {row[1]} | {equation(row[2])} |{row[3]}"
+            # Stars in names of columns are no emphasis.
+            line = f"| {row[1]} | {equation(row[2])} |{row[3]}".replace("*", r"\*")
         out.append(line)
         if heading and heading[1] in CAPTIONS:
             name = heading[1]
