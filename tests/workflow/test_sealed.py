@@ -9,7 +9,7 @@ from test_rules import RULES, WORKING
 from rotorid.codehash import Code
 
 ROOT = Path(__file__).parents[2]
-OPENS = {"score_proof"}
+OPENS = {"score_proof", "score_ablation"}
 WRITES = {"conceal"}
 
 
@@ -40,9 +40,11 @@ def test_the_mismatch_stage_does_not_know_that_there_are_answers() -> None:
         assert "sealed" not in text and "concealed" not in text, path
     judging = Code(ROOT).reached_modules(ROOT / "workflow/scripts/judge.py")
     assert {path.stem for path in judging if path.parent.name == "proof"} == {"__init__", "judge"}
+    ablating = Code(ROOT).reached_modules(ROOT / "workflow/scripts/ablate.py")
+    assert {path.stem for path in ablating if path.parent.name == "proof"} == {"__init__", "without_rules"}
 
 
 def test_judging_and_the_mismatch_rule_never_see_case_names() -> None:
-    for name in ("judge", "mismatch", "ask_peers"):
+    for name in ("judge", "mismatch", "ask_peers", "judge_with_all_rules", "judge_without_rule"):
         assert "cases_of" not in RULES[name]
         assert "answers" not in part(RULES[name], "input") + part(RULES[name], "params")

@@ -38,9 +38,8 @@ rule judge_with_all_rules:
         "Ablation: judging with all rules"
     input:
         sets="results/ablation/sets",
-        answers="results/ablation/sealed",
     output:
-        "results/ablation/all_rules.jsonl",
+        verdicts="results/ablation/all_rules.jsonl",
     params:
         code=code_of("ablate"),
     log:
@@ -55,10 +54,9 @@ rule judge_without_rule:
         "Ablation: judging without {wildcards.rule}"
     input:
         sets="results/ablation/sets",
-        answers="results/ablation/sealed",
         base="results/ablation/all_rules.jsonl",
     output:
-        "results/ablation/without/{rule}.jsonl",
+        verdicts="results/ablation/without/{rule}.jsonl",
     params:
         most=CONFIG.ablation.most,
         code=code_of("ablate"),
@@ -68,18 +66,25 @@ rule judge_without_rule:
         "../scripts/ablate.py"
 
 
-rule ablation:
+rule score_ablation:
     """What each rule rights and wrongs, one line a rule."""
     message:
         "Ablation: the table"
     input:
         base="results/ablation/all_rules.jsonl",
         without=expand("results/ablation/without/{rule}.jsonl", rule=sorted(RULES)),
+        answers="results/ablation/sealed",
     output:
         table="results/ablation/rules.csv",
     params:
-        code=code_of("tabulate_ablation"),
+        code=code_of("score_ablation"),
     log:
         "results/logs/ablation/table.log",
     script:
-        "../scripts/tabulate_ablation.py"
+        "../scripts/score_ablation.py"
+
+
+rule ablation:
+    """What each rule of the mismatch stage is worth."""
+    input:
+        "results/ablation/rules.csv",

@@ -2,7 +2,7 @@
 
 A rule has a name, says in one sentence what it decides, and holds its limits, each with the reason for its value. The
 code calls it with whether its condition holds; the answer is that, or no where the rule is switched off. What fired is
-counted for `snakemake ablation`, which judges concealed sets without each rule in turn.
+counted for the ledger of a verdict and for `snakemake ablation`, which judges sets without each rule in turn.
 """
 
 from __future__ import annotations

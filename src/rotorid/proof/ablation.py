@@ -1,4 +1,4 @@
-"""What each rule of the decision is worth: concealed sets judged with it and without it.
+"""What each rule of the decision is worth: verdicts with it and without it, scored by the answers.
 
 A rule is left out of those sets in which it fired; elsewhere nothing could change. A set is righted by a rule if its
 verdict is right with it and wrong without it, and wronged if it is the other way round.
@@ -7,18 +7,15 @@ verdict is right with it and wrong without it, and wronged if it is the other wa
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import pandas as pd
 from scipy.stats import beta
 
-from rotorid.mismatch.deliver import analysis_of, verdict_of
 from rotorid.mismatch.rules import RULES
 from rotorid.proof.score import score_case
-from rotorid.recordings import read_set
+from rotorid.proof.without_rules import Judged
 
 COLUMNS = (
     "rule", "fired", "judged", "righted", "wronged", "words_righted", "words_wronged", "pays_low_95", "pays_high_95",
@@ -26,47 +23,23 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A verdict on a concealed set, how it scores, and which rules fired."""
-
-    name: str
-    right: bool
-    word_right: bool
-    fired: Mapping[str, int]
-    seconds: float
-    """Processor time."""
+def scores(judged: Judged, answers: Path) -> tuple[bool, bool]:
+    """Whether a verdict names the whole set right, and whether its word is."""
+    answer = json.loads((answers / f"{judged.name}.json").read_text(encoding="utf-8"))
+    score = score_case(judged.verdict, answer, judged.samples_per_row)
+    return score["right"], score["word_right"]
 
 
-def judged(folder: Path, answers: Path, off: Collection[str] = ()) -> Judged:
-    """The verdict on the set in a folder, without some rules, scored by its answer."""
-    start = time.process_time()
-    try:
-        analysis = analysis_of(read_set(folder), off)
-        verdict, fired = json.loads(verdict_of(analysis).text()), analysis.fired
-        averaged = analysis.samples_per_row
-    except Exception as error:  # any fault of the stage is a result here
-        verdict, fired, averaged = {"failed": f"{type(error).__name__}: {error}"}, {}, 1
-    answer = json.loads((answers / f"{folder.name}.json").read_text(encoding="utf-8"))
-    score = score_case(verdict, answer, averaged)
-    return Judged(folder.name, score["right"], score["word_right"], fired, time.process_time() - start)
-
-
-def fires_in(base: Iterable[Judged], rule: str, most: int) -> list[Judged]:
-    """At most `most` of the sets in which a rule fired, spread evenly over all of them."""
-    own = [j for j in base if j.fired.get(rule)]
-    step = max(1.0, len(own) / most)
-    return [own[int(k * step)] for k in range(min(most, len(own)))]
-
-
-def row(rule: str, with_it: list[Judged], without: list[Judged], fired: int) -> dict:
-    """One line of the table: what leaving a rule out changed."""
-    pairs = list(zip(with_it, without, strict=True))
-    righted, wronged = (sum(a.right and not b.right for a, b in p) for p in (pairs, [(b, a) for a, b in pairs]))
-    words = [sum(a.word_right and not b.word_right for a, b in p) for p in (pairs, [(b, a) for a, b in pairs])]
-    low, high = share_interval(righted, wronged)
-    saved = sum(b.seconds - a.seconds for a, b in pairs) / len(pairs) if pairs else 0.0
-    values = (rule, fired, len(pairs), righted, wronged, *words, low, high, round(saved, 2))
+def row(rule: str, every: Iterable[Judged], without: list[Judged], answers: Path) -> dict:
+    """One line of the table: what leaving a rule out of the verdicts `without` changed."""
+    known = {j.name: j for j in every}
+    pairs = [(scores(known[j.name], answers), scores(j, answers)) for j in without]
+    back = [(other, one) for one, other in pairs]
+    changed = [sum(a[k] and not b[k] for a, b in way) for k in (0, 1) for way in (pairs, back)]
+    fired = sum(bool(j.fired.get(rule)) for j in known.values())
+    low, high = share_interval(*changed[:2])
+    saved = sum(j.seconds - known[j.name].seconds for j in without) / len(without) if without else 0.0
+    values = (rule, fired, len(pairs), *changed, low, high, round(saved, 2))
     return dict(zip(COLUMNS, values, strict=True))
 
 
@@ -85,13 +58,3 @@ def table(rows: Iterable[Mapping]) -> pd.DataFrame:
     out = out.sort_values(["net", "fired", "rule"], ascending=[False, False, True]).drop(columns="net")
     out.insert(1, "decides", [RULES[name].decides for name in out.rule])
     return out.reset_index(drop=True)
-
-
-def stored(items: Iterable[Judged]) -> str:
-    """Verdicts as JSON lines."""
-    return "".join(json.dumps(vars(j) | {"fired": dict(j.fired)}) + "\n" for j in items)
-
-
-def read_stored(path: Path) -> list[Judged]:
-    """What `stored` wrote."""
-    return [Judged(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]

@@ -1,22 +1,19 @@
 """What each rule of the decision is worth, one line a rule.
 
-- Compares the verdicts without a rule with those of all rules on the same sets.
+- Opens the sealed answers and compares the verdicts without a rule with those of all rules on the same sets.
 """
 
 from pathlib import Path
 
 from rotorid import log
 from rotorid.proof import ablation
+from rotorid.proof.without_rules import read_stored
 
 
-def main(base: str, without: list[str], out: str) -> None:
+def main(base: str, without: list[str], answers: str, out: str) -> None:
     """Write the table from the verdicts with all rules and those without each."""
-    every = {j.name: j for j in ablation.read_stored(Path(base))}
-    rows = []
-    for path in map(Path, without):
-        left_out = ablation.read_stored(path)
-        fired = sum(bool(j.fired.get(path.stem)) for j in every.values())
-        rows.append(ablation.row(path.stem, [every[j.name] for j in left_out], left_out, fired))
+    every = read_stored(Path(base))
+    rows = [ablation.row(path.stem, every, read_stored(path), Path(answers)) for path in map(Path, without)]
     ablation.table(rows).to_csv(out, index=False)
 
 
@@ -25,5 +22,6 @@ if __name__ == "__main__":
         main(
             base=snakemake.input.base,
             without=snakemake.input.without,
+            answers=snakemake.input.answers,
             out=snakemake.output.table,
         )
