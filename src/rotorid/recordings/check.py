@@ -133,8 +133,8 @@ def slow_speeds(recordings: RecordingSet) -> list[str]:
     if rate >= SLOWEST_SPEEDS_HZ:
         return []
     return [
-        f"Rotor speeds come {rate:.2g} times a second only: a lag or delay of the motors shorter than {1 / rate:.2g} s, "
-        "and what the vehicle does within that time, cannot be told from them."
+        f"Rotor speeds come {rate:.2g} times a second only: a lag or delay of the motors shorter than "
+        f"{1 / rate:.2g} s, and what the vehicle does within that time, cannot be told from them."
     ]
 
 
