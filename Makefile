@@ -15,8 +15,8 @@ BIN := .venv/bin
 READY := .venv/ready
 TESTED := .venv/tested
 SOURCES := $(shell find Snakefile config.yaml mkdocs.yml pyproject.toml README.md .pre-commit-config.yaml \
-	src acquire workflow notebooks tests raw docs \
-	-type f ! -path '*/__pycache__/*' ! -name '* *' 2>/dev/null)
+	src acquire firmware workflow notebooks tests raw docs \
+	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
 .PHONY: help report site proof plantings campaign test check environment lock
 .DEFAULT_GOAL := help
@@ -33,7 +33,7 @@ site: $(READY) ## the pages as a site, strictly: results/site/index.html (SERVE=
 	@echo "The site: results/site/index.html"
 
 campaign: $(READY) ## record the emulated campaign anew into raw/campaign
-	@$(BIN)/python -m acquire.campaign
+	@$(BIN)/python -m rotorid.acquire.campaign
 
 proof: $(READY) ## hide, find, score: about two hours; what is done stays done (kept in docs/proof)
 	@$(BIN)/snakemake --cores $(CORES) proof $(OPTIONS)
