@@ -15,7 +15,7 @@ BIN := .venv/bin
 READY := .venv/ready
 TESTED := .venv/tested
 SOURCES := $(shell find Snakefile config.yaml mkdocs.yml pyproject.toml README.md .pre-commit-config.yaml \
-	src firmware workflow notebooks tests raw docs \
+	src acquire firmware workflow notebooks tests raw docs \
 	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
 .PHONY: help report site proof plantings campaign test check environment lock
