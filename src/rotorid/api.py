@@ -109,9 +109,9 @@ def recording_set(
         found = read_set(Path(data))
     elif isinstance(data, str | Path):
         found = _of_logs([Path(data)], name, vehicle, mass_kg, like, mapping)
-    elif data and all(isinstance(part, pd.DataFrame) for part in data):
+    elif isinstance(data, Sequence) and data and all(isinstance(part, pd.DataFrame) for part in data):
         found = _of_tables({f"run_{i}": part for i, part in enumerate(data, 1)}, name, vehicle)
-    elif data and all(isinstance(part, str | Path) for part in data):
+    elif isinstance(data, Sequence) and data and all(isinstance(part, str | Path) for part in data):
         found = _of_logs([Path(part) for part in data], name, vehicle, mass_kg, like, mapping)
     else:
         raise InputError(

@@ -63,6 +63,14 @@ def test_a_full_flight_lacks_only_a_second_run() -> None:
     assert found.other_columns == ("odd",)
 
 
+def test_speeds_that_come_seldom_are_told_with_what_they_cannot_show() -> None:
+    speed = np.full(100, np.nan)
+    speed[::25] = 500.0
+    lacks = " ".join(check_set(flight(rotor_speed_1_rad_s=speed)).lacks)
+    assert "Rotor speeds come 3.7 times a second only: a lag or delay of the motors shorter than 0.27 s" in lacks
+    assert "times a second only" not in " ".join(check_set(flight(rotor_speed_1_rad_s=np.full(100, 500.0))).lacks)
+
+
 def test_a_bench_needs_force_and_reference_together() -> None:
     table = pd.DataFrame({"time_s": [0.0, 1.0], "force_x_n": [1.0, 2.0]})
     vehicle = Vehicle(name="b", kind="bench", tared=True)

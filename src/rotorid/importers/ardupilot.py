@@ -56,7 +56,7 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     except Exception as error:  # pymavlink lets whatever a broken file raises through
         raise InputError(f"{path}: not a DataFlash log that can be read ({error})") from None
     if not rows:
-        raise InputError(f"{path}: holds no message that is needed (IMU, ATT, RCOU)")
+        raise InputError(f"{path}: a DataFlash log with no message that is needed (IMU, ATT, RCOU)")
     tables = {}
     for kind, found in rows.items():
         table = pd.DataFrame(found)

@@ -19,6 +19,8 @@ from rotorid.errors import InputError
 from rotorid.importers.known import ORDERS, PLACES, Known, quad_x
 from rotorid.recordings import columns as c
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.templates import names
+from rotorid.templates import read as read_template
 
 WEIGHED, GUESSED_MASS = 0.02, 0.3
 FROM_FLIGHT, GUESSED_COEFFICIENT = 0.1, 0.5
@@ -61,6 +63,12 @@ def propose(
             "only the product of C_F and its square matters"
         )
     thrust, thrust_trust, thrust_note = _thrust(tables, mass, limit, template, count, remarks)
+    closer = closer_template(thrust / mass, template, template_name) if speeds else None
+    if closer:
+        remarks.append(
+            f"the rotors turn in flight as those of template {closer} do, rather than of {template_name}: if that is "
+            f"the vehicle, import again with --like {closer}"
+        )
     ratio, ratio_note = _ratio(known, template, template_name)
     remarks.append(f"the torque coefficient is C_F times {ratio:.4g} m ({ratio_note})")
     inertia, scale = _inertia(rotors, mass, template)
@@ -94,6 +102,24 @@ def propose(
         f"inertia_yy_kg_m2: {GUESSED_INERTIA:g}, inertia_zz_kg_m2: {GUESSED_INERTIA:g}}}",
     ]
     return Proposal("\n".join(lines) + "\n", tuple(remarks))
+
+
+def closer_template(lift_n_s2_kg: float, template: Vehicle, template_name: str) -> str | None:
+    """Another template of the same order of rotors that hovers at the speeds flown, where the one chosen does not.
+
+    `lift_n_s2_kg` is C_F over mass as flown, which holds whatever the mass is. None where the chosen one is within a
+    fifth.
+    """
+
+    def off(vehicle: Vehicle) -> float:
+        return abs(float(np.log(vehicle.thrust_coefficients_n_s2()[0] / vehicle.mass_kg / lift_n_s2_kg)))
+
+    def corners(vehicle: Vehicle) -> list[tuple]:
+        return [(np.sign(r.x_m), np.sign(r.y_m), r.spin) for r in vehicle.rotors]
+
+    others = {n: v for n in names() if n != template_name and corners(v := read_template(n)) == corners(template)}
+    best = min(others, key=lambda n: off(others[n]), default=None)
+    return best if best and off(template) > 0.2 and off(others[best]) < 0.1 else None
 
 
 def _quoted(text: str) -> str:

@@ -19,6 +19,8 @@ from rotorid.recordings.sufficient import sufficient
 
 GAP_FACTOR = 3.0
 """A step of the clock longer than this many median steps is a gap."""
+SLOWEST_SPEEDS_HZ = 20.0
+"""Rate of rotor speeds below which motors (time constants of some hundredths of a second) are faster than their log."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,21 @@ def _lacks_of_flight(has, count: int) -> list[str]:
     return lacks
 
 
+def slow_speeds(recordings: RecordingSet) -> list[str]:
+    """A sentence where rotor speeds come too seldom to carry what is fast between command and speed."""
+    names = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
+    runs = [run for run in recordings.runs if run.has(*names)]
+    if not runs:
+        return []
+    rate = min(float(run.table[names[0]].notna().sum() / (run.time_s[-1] - run.time_s[0])) for run in runs)
+    if rate >= SLOWEST_SPEEDS_HZ:
+        return []
+    return [
+        f"Rotor speeds come {rate:.2g} times a second only: a lag or delay of the motors shorter than "
+        f"{1 / rate:.2g} s, and what the vehicle does within that time, cannot be told from them."
+    ]
+
+
 def check_set(recordings: RecordingSet) -> SetCheck:
     """What a set contains and lacks."""
     vehicle = recordings.vehicle
@@ -131,6 +148,7 @@ def check_set(recordings: RecordingSet) -> SetCheck:
     lacks: list[str] = []
     if vehicle.kind == "flight":
         lacks = _lacks_of_flight(has, vehicle.rotor_count)
+        lacks += slow_speeds(recordings)
         if vehicle.ground_z_m is None and not has(c.HEIGHT):
             lacks.append("vehicle.yaml has no ground_z_m and no run has height_m: height is unknown.")
     elif vehicle.kind == "stand":

@@ -173,3 +173,46 @@ def test_import_keeps_a_vehicle_that_is_there(tmp_path: Path, flights: Path) -> 
 def test_simulate_refuses_to_overwrite(tmp_path: Path, flights: Path) -> None:
     done = run("simulate", flights / "vehicle.yaml", "-o", flights)
     assert done.exit_code == 1 and "is there already" in done.output
+
+
+def test_the_bundled_example_is_a_set_and_nothing_is_overwritten(tmp_path: Path) -> None:
+    from rotorid import examples
+
+    done = run("init", tmp_path / "flights", "--example")
+    assert done.exit_code == 0, done.output
+    found = read_set(tmp_path / "flights")
+    assert [r.name for r in found.runs] == ["flight_1", "flight_2"]
+    assert found.runs[0].time_s[-1] == examples.SECONDS and not found.vehicle.effects
+    again = run("init", tmp_path / "flights", "--example")
+    assert again.exit_code == 1 and "is there already" in again.output
+
+
+@pytest.mark.slow
+def test_the_bundled_example_is_what_its_module_makes_and_the_verdict_finds_what_is_concealed(tmp_path: Path) -> None:
+    from rotorid import examples
+    from rotorid.examples.__main__ import main
+
+    main(tmp_path)
+    for path in examples.write(tmp_path / "shipped"):
+        if path.suffix == ".yaml":
+            assert (tmp_path / path.name).read_text() == path.read_text()
+        else:
+            made, shipped = pd.read_parquet(tmp_path / path.name), pd.read_parquet(path)
+            pd.testing.assert_frame_equal(made, shipped, rtol=1e-5, atol=1e-6)
+    done = run("verdict", tmp_path / "shipped", "-o", tmp_path / "answer", "--json", "--series", "-q")
+    verdict = json.loads(done.stdout)
+    (drag,) = [e for e in verdict["effects"] if e["status"] == "established"]
+    low, high = drag["parameters"][0]["interval_95"]
+    assert drag["id"] == "rotor_drag" and low < examples.CONCEALED[0]["parameters"]["k_d"] < high
+    series = pd.read_parquet(tmp_path / "answer" / "series.parquet")
+    assert {"run", "time_s", "force_x_before", "force_x_after"} <= set(series.columns)
+
+
+def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
+    from rotorid.importers.propose import closer_template
+
+    brushed, brushless = templates.read("crazyflie-2.1"), templates.read("crazyflie-2.1-brushless")
+    lift = brushless.thrust_coefficient_n_s2 / brushless.mass_kg
+    assert closer_template(lift, brushed, "crazyflie-2.1") == "crazyflie-2.1-brushless"
+    assert closer_template(lift, brushless, "crazyflie-2.1-brushless") is None
+    assert closer_template(10 * lift, brushed, "crazyflie-2.1") is None

@@ -1,4 +1,4 @@
-"""The pages as somebody types from them: every command is one, and the blocks that can be run are, in their order."""
+"""The pages as somebody types from them: every command is one; blocks `bash` and `python` run in their order."""
 
 import re
 import shlex
