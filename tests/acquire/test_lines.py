@@ -19,6 +19,7 @@ from rotorid.acquire.transport import SerialTransport
 from rotorid.io.lines import Description, DescriptionError, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
 
+ROOT = Path(__file__).parents[2]
 FORMS = {
     "csv": (
         {"form": "csv", "separator": ",", "columns": {"force_z_n": {"field": 1, "scale": 2.0}, "time_s": {"field": 0}}},
@@ -39,6 +40,36 @@ FORMS = {
         0,
     ),
 }
+
+
+REAL = {  # as such instruments print it, with the lines that are none
+    "jr3-text": (
+        b"JR3 Inc. Force Sensor Receiver v2.1\r\nREADY\r\n0,    12,    -3,  8192,    -1,     2,    -5\r\n"
+        b"0,    11,    -3,  8190,    -1,     2,    -5\r\n1,  OVLD,    -3,  OVLD,    -1,     2,    -5\r\n0,    12,  ",
+        [(0.1465, -0.0366, 100.0, -0.00122, 0.00244, -0.0061), (0.1343, -0.0366, 99.976, -0.00122, 0.00244, -0.0061)],
+        3,
+    ),
+    "tensile-csv": (
+        '\ufeff"Prüfung 17; Probe 100-1"\r\n"Zeit [s]";"Weg [mm]";"Kraft [N]"\r\n"0,00";"0,000";"-0,2"\r\n'
+        '"0,10";"0,012";"15,3"\r\n\r\n"0,20";"0,024";"1.530,7"\r\n"Bruch";;\r\n'.encode(),
+        [(0.0, 0.0, -0.2), (0.1, 0.012, 15.3)],
+        4,
+    ),
+    "scale-fixed": (
+        b"+  500.48 g  \r\n+  500.4? g ?\r\n-    0.02 g  \r\n           g \r\n",
+        [(500.48,), (-0.02,)],
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("step", [1, 13, 1000])
+def test_what_such_instruments_print_is_read_by_the_descriptions_at_hand(name, step):
+    data, values, unreadable = REAL[name]
+    decoder = LineDecoder(read_description(ROOT / "acquire" / "instruments" / f"{name}.yaml"))
+    found = [row for start in range(0, len(data), step) for row in decoder.feed(data[start : start + step])]
+    assert found == [pytest.approx(row, rel=2e-3) for row in values] and decoder.unreadable == unreadable
 
 
 @pytest.mark.parametrize("form", FORMS)
