@@ -21,7 +21,7 @@ WINDOW_S = 2.0
 LOWEST_HZ = 0.5
 
 
-def echo_s(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, cutoff_hz: float) -> float:
+def closed_loop_bias_s(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, cutoff_hz: float) -> float:
     """Seconds by which roll or pitch, whichever is worse, seem to follow their commands late through noise alone.
 
     `noisy` are the same segments with the sensors' noise added once more. Zero without commands or body rates.

@@ -19,7 +19,8 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.creep import followed
 from rotorid.effects.hysteresis import play
 from rotorid.effects.loading import Instrument, Loading, change_of_load
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, in_training
+from rotorid.mismatch import rules
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, everything
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
@@ -173,15 +174,13 @@ def freed(model: ReadingModel, ids: tuple[str, ...]) -> Regression:
             rows.append(Rows(r.run, r.time_s, r.y, np.concatenate([r.x[:, :, kept], free], axis=2)))
     freely = [Term(f"free/{e}", "free", e, size=sizes[e], prior_sd=(np.inf,) * sizes[e]) for e in ids]
     per = block_length(setup, rows)
-    return build(
-        rows, [*chosen, *freely], model.regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz
-    )
+    return build(rows, [*chosen, *freely], model.regression.filters, everything, per / setup.rate_hz, setup.rate_hz)
 
 
 def without_remainders(model: ReadingModel, again: Callable[[list[str], dict[str, str]], ReadingModel]) -> ReadingModel:
     """The model without effects that are only what others leave over; `again(active, refused)` searches once more."""
     refused: dict[str, str] = {}
-    while (found := remainder(model)) is not None:
+    while rules.REMAINDER((found := remainder(model)) is not None):
         refused[model.search.terms[found.key].effect] = found.reason
         model = again([k for k in model.selection.active if k != found.key], dict(refused))
     if not refused:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.echo import echo_s
+from rotorid.mismatch.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.prepare import prepare
 
 from .flights import quad, recorded
@@ -36,14 +36,14 @@ def loop(moving_rad_s: float) -> tuple[list, list]:
 
 
 def test_a_loop_that_does_nothing_but_answer_noise_looks_late_by_inertia_over_gain():
-    late = echo_s(*loop(0.0), quad(), 20.0)
+    late = closed_loop_bias_s(*loop(0.0), quad(), 20.0)
     assert late == pytest.approx(2.489e-3 / GAIN_N_M_S, rel=0.15)
 
 
 def test_a_loop_that_mostly_turns_the_vehicle_does_not():
-    assert echo_s(*loop(20 * NOISE_RAD_S), quad(), 20.0) < 0.15 * 2.489e-3 / GAIN_N_M_S
+    assert closed_loop_bias_s(*loop(20 * NOISE_RAD_S), quad(), 20.0) < 0.15 * 2.489e-3 / GAIN_N_M_S
 
 
 def test_without_commands_there_is_no_echo():
     plain, again = ([replace(s, command=None) for s in part] for part in loop(0.0))
-    assert echo_s(plain, again, quad(), 20.0) == 0.0
+    assert closed_loop_bias_s(plain, again, quad(), 20.0) == 0.0

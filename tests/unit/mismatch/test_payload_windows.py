@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.carried import change_rows, two_plateaus
 from rotorid.mismatch.improve import modelled
+from rotorid.mismatch.payload_windows import change_rows, two_plateaus
 
 from .flights import COLUMNS, quad, recorded
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.louder import louder
+from rotorid.mismatch.excess_noise import noise_factors
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.rows import Thinner, baseline_wrench
 from tests.unit.vehicle.thesis import thesis_vehicle
@@ -43,7 +43,7 @@ def found(segment: Segment, assumed: float) -> dict[str, float]:
         rotor_speed=motion.rotor_speed + assumed * rng.standard_normal((SIZE, 4)),
         angular_acceleration=motion.angular_acceleration + rng.standard_normal((SIZE, 3)),
     )
-    return louder([segment], [replace(segment, motion=again)], VEHICLE, Thinner(RATE_HZ, 20.0))
+    return noise_factors([segment], [replace(segment, motion=again)], VEHICLE, Thinner(RATE_HZ, 20.0))
 
 
 def test_a_tachometer_that_averages_is_louder_in_the_band_than_at_its_highest_frequencies():

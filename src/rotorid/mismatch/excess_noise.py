@@ -24,7 +24,9 @@ LEAST_LOUDER, MOST_LOUDER = 1.2, 10.0
 """A sensor louder than that was filtered before it was recorded: what is left in the band may be the model's own."""
 
 
-def louder(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, thinner: Thinner) -> dict[str, float]:
+def noise_factors(
+    segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, thinner: Thinner
+) -> dict[str, float]:
     """Sensor (`rotors`, `gyroscope`) to the factor by which its noise in the band exceeds that of the `noisy` copies.
 
     Sensors without a word here are as loud as assumed, or move too much in the band to tell.
