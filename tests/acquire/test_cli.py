@@ -236,7 +236,7 @@ def test_forces_are_shown_once_the_bench_is_tared(loopback):
 
 def test_live_view_in_a_terminal(plugged, recorder_on):
     recorder = recorder_on("bench", plugged("bench", speed=200.0).names[0])
-    plot = Plot(recorder, "cell_1_v")
+    plot = Plot.of(recorder, "cell_1_v")
     console = Console(force_terminal=True, width=200, record=True, file=open("/dev/null", "w"))
 
     def work() -> None:

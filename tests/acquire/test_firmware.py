@@ -99,6 +99,12 @@ def test_core_under_sanitizers_takes_any_bytes():
 
 
 @needs_gcc
+def test_form_of_the_esp32_board_file():
+    """Against declarations of our own: it says nothing of Espressif's compiler, nor of a board."""
+    made("esp32-form")
+
+
+@needs_gcc
 def test_host_bench_sends_every_sample_and_counts_its_boots(on_host, recorder_on, tmp_path):
     boots = []
     for name in ("a", "b"):

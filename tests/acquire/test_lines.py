@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import threading
 import time
@@ -9,16 +10,20 @@ import tty
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from rotorid.acquire.cli import app
 from rotorid.acquire.clock import SystemClock
-from rotorid.acquire.errors import BadName, DeviceSilent
+from rotorid.acquire.errors import BadName, DeviceSilent, Interrupted
 from rotorid.acquire.lines import record_lines
 from rotorid.acquire.transport import SerialTransport
+from rotorid.acquire.view import LinesPanel, Plot
 from rotorid.io.lines import Description, DescriptionError, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
+from rotorid.io.session import Ended, read_session
 
+ROOT = Path(__file__).parents[2]
 FORMS = {
     "csv": (
         {"form": "csv", "separator": ",", "columns": {"force_z_n": {"field": 1, "scale": 2.0}, "time_s": {"field": 0}}},
@@ -39,6 +44,36 @@ FORMS = {
         0,
     ),
 }
+
+
+REAL = {  # as such instruments print it, with the lines that are none
+    "jr3-text": (
+        b"JR3 Inc. Force Sensor Receiver v2.1\r\nREADY\r\n0,    12,    -3,  8192,    -1,     2,    -5\r\n"
+        b"0,    11,    -3,  8190,    -1,     2,    -5\r\n1,  OVLD,    -3,  OVLD,    -1,     2,    -5\r\n0,    12,  ",
+        [(0.1465, -0.0366, 100.0, -0.00122, 0.00244, -0.0061), (0.1343, -0.0366, 99.976, -0.00122, 0.00244, -0.0061)],
+        3,
+    ),
+    "tensile-csv": (
+        '\ufeff"Prüfung 17; Probe 100-1"\r\n"Zeit [s]";"Weg [mm]";"Kraft [N]"\r\n"0,00";"0,000";"-0,2"\r\n'
+        '"0,10";"0,012";"15,3"\r\n\r\n"0,20";"0,024";"1.530,7"\r\n"Bruch";;\r\n'.encode(),
+        [(0.0, 0.0, -0.2), (0.1, 0.012, 15.3)],
+        4,
+    ),
+    "scale-fixed": (
+        b"+  500.48 g  \r\n+  500.4? g ?\r\n-    0.02 g  \r\n           g \r\n",
+        [(500.48,), (-0.02,)],
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("step", [1, 13, 1000])
+def test_what_such_instruments_print_is_read_by_the_descriptions_at_hand(name, step):
+    data, values, unreadable = REAL[name]
+    decoder = LineDecoder(read_description(ROOT / "acquire" / "instruments" / f"{name}.yaml"))
+    found = [row for start in range(0, len(data), step) for row in decoder.feed(data[start : start + step])]
+    assert found == [pytest.approx(row, rel=2e-3) for row in values] and decoder.unreadable == unreadable
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -108,6 +143,53 @@ def test_a_silent_line_ends_with_a_sentence(line, tmp_path):
     with pytest.raises(DeviceSilent, match="no byte for 0.1 s"):
         record_lines(description, SerialTransport(line[1], 9600), SystemClock(), tmp_path, "run", silence_s=0.1)
     assert (tmp_path / "run.yaml").exists()
+
+
+def test_an_instrument_is_told_to_stop_whatever_the_end(line, tmp_path):
+    """Before: after Ctrl-C, a silence or a limit it streamed on."""
+    master, port = line
+    description, stop = Description(name="x", end="S\r\n", **FORMS["csv"][0]), threading.Event()
+    stop.set()
+    with pytest.raises(Interrupted):
+        record_lines(description, SerialTransport(port, 9600), SystemClock(), tmp_path, "a", stop_asked=stop)
+    assert os.read(master, 100) == b"S\r\n"
+    with pytest.raises(DeviceSilent):
+        record_lines(description, SerialTransport(port, 9600), SystemClock(), tmp_path, "b", silence_s=0.05)
+    assert os.read(master, 100) == b"S\r\n"
+
+
+def test_a_limit_ends_the_recording_and_columns_are_those_of_the_description(line, tmp_path):
+    master, port = line
+    description = tmp_path / "d.yaml"
+    description.write_text("name: x\nseparator: ','\nend: S\ncolumns: {force_z_n: {field: 1}}\n")
+
+    def speak() -> None:
+        while not (tmp_path / "run.rlog").exists():
+            time.sleep(0.005)
+        os.write(master, b"0,1.5\n1,99\n2,3.5\n")
+
+    threading.Thread(target=speak, daemon=True).start()
+    words = ["lines", str(description), "--port", port, "--out", str(tmp_path), "--id", "run"]
+    done = CliRunner().invoke(app, [*words, "--limit", "force_z_n:-10:10"])
+    assert done.exit_code == 1 and "force_z_n is 99, allowed are -10 to 10: stopped" in done.output
+    assert read_session(tmp_path / "run.yaml").ended == Ended.LIMIT_EXCEEDED
+    assert os.read(master, 100) == b"S"
+    assert CliRunner().invoke(app, [*words, "--plot", "force"]).exit_code == 2
+
+
+def test_the_look_at_lines_while_recording():
+    now = [0.0]
+    panel = LinesPanel("old-sensor", ["force_z_n"], 40, lambda: now[0])
+    plot = Plot("force_z_n", 0)
+    for number in range(20):
+        now[0] += 0.1
+        for one in (panel, plot):
+            one.see((float(number),))
+    console = Console(width=100, file=io.StringIO())
+    console.print(panel.render(), plot.render())
+    shown = console.file.getvalue()
+    for words in ("20/40", "10.0", "2.0", "19", "noise of the last 20: 5.77"):
+        assert words in shown, shown
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import select
 import sys
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
@@ -15,7 +16,7 @@ from typing import Annotated
 import typer
 
 from rotorid.acquire import procedures, view
-from rotorid.acquire.errors import AcquireError, Interrupted
+from rotorid.acquire.errors import AcquireError, Interrupted, LimitExceeded
 from rotorid.acquire.options import Shared, with_shared
 from rotorid.acquire.programmes import HOLD_S, RAMP_S, programme_of
 from rotorid.acquire.record import recorders_for, run_with
@@ -427,6 +428,18 @@ def lines(
         name = shared.name or f"{read.name}-{datetime.now():%Y%m%d-%H%M%S}"
         setup = Setup(operator=shared.operator, air=shared.weather)
         transport = SerialTransport(port, read.baud_rate)
+        columns = list(read.columns)
+        plots = [view.Plot(column, columns.index(column)) for column in _of(columns, shared.plot)]
+        limits = shared.limits(columns)
+        panel = view.LinesPanel(read.name, columns, samples, time.monotonic)
+
+        def see(values: tuple[float, ...]) -> None:
+            for one in (panel, *plots):
+                one.see(values)
+            for column, (low, high) in limits.items():
+                value = values[columns.index(column)]
+                if not low <= value <= high:
+                    raise LimitExceeded(f"{column} is {value:.6g}, allowed are {low:g} to {high:g}: stopped")
 
         def work() -> None:
             record_lines(
@@ -434,9 +447,10 @@ def lines(
                 samples=samples,
                 stop_asked=stop,
                 silence_s=silence_s,
+                on_row=see,
             )
 
-        view.watch([], work, stop, [], console)
+        view.watch([], work, stop, plots, console, [panel])
     except Interrupted as error:
         console.print(str(error))
         raise typer.Exit(130) from error
@@ -525,9 +539,7 @@ def _record(
     console = view.stderr_console()
     stop = threading.Event()
     columns = [column for instrument in ports for column in INSTRUMENTS[instrument].columns]
-    wrong = [column for column in shared.plot or [] if column not in columns]
-    if wrong:
-        raise typer.BadParameter(f"--plot is one of {', '.join(columns)}, not {wrong[0]!r}")
+    _of(columns, shared.plot)
     try:
         recorders = recorders_for(
             ports,
@@ -543,7 +555,7 @@ def _record(
     except AcquireError as error:
         _fail(str(error))
     plots = [
-        view.Plot(recorder, column)
+        view.Plot.of(recorder, column)
         for recorder in recorders
         for column in shared.plot or []
         if column in recorder.instrument.columns
@@ -586,6 +598,14 @@ def _prompt(recorder: Recorder, place_s: float | None) -> procedures.Prompt:
         return pressed
 
     return prompt
+
+
+def _of(columns: list[str], wanted: list[str] | None) -> list[str]:
+    """The columns that are to be drawn. Raises typer.BadParameter for one that is none."""
+    for column in wanted or []:
+        if column not in columns:
+            raise typer.BadParameter(f"--plot is one of {', '.join(columns)}, not {column!r}")
+    return wanted or []
 
 
 def _check_lines(log: Path, csv: Path | None) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from hashlib import file_digest
 from pathlib import Path
 
@@ -61,13 +62,14 @@ def record_lines(
                     on_row(values)
             elif clock.now_ns() - last_ns > silence_s * 1e9:
                 raise DeviceSilent(f"{transport.name}: no byte for {silence_s:g} s; what came before is in the log")
-        if description.end:
-            holder._write(rawlog.SENT, description.end.encode())
-            transport.write(description.end.encode())
     except AcquireError as error:
         failure = error
         raise
     finally:
+        if holder.begun and description.end:  # whatever the end was, the instrument is told to stop
+            with suppress(AcquireError):
+                transport.write(description.end.encode())
+                holder._write(rawlog.SENT, description.end.encode())
         transport.close()
         if holder.begun:
             holder._writer.close()

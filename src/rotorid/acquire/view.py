@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from rich.console import Console, Group
@@ -42,25 +42,66 @@ def braille(values: list[float], width: int = 60, height: int = 8) -> list[str]:
 
 
 class Plot:
-    """The last samples of one channel, kept as they come."""
+    """The last samples of one channel, kept as they come: `see` takes a sample's values, `number` is the channel's."""
 
-    def __init__(self, recorder: Recorder, column: str) -> None:
+    def __init__(self, column: str, number: int) -> None:
         self.column = column
-        self._number = recorder.instrument.columns.index(column)
+        self._number = number
         self._values: deque[float] = deque(maxlen=PLOT_SAMPLES)
-        before = recorder.on_row  # several curves of one recorder: each sees every sample
+
+    @classmethod
+    def of(cls, recorder: Recorder, column: str) -> Plot:
+        """A curve of what a recorder takes in; several of one recorder see every sample each."""
+        plot, before = cls(column, recorder.instrument.columns.index(column)), recorder.on_row
 
         def see(row) -> None:
             if before is not None:
                 before(row)
-            self._values.append(row.values[self._number])
+            plot.see(row.values)
 
         recorder.on_row = see
+        return plot
+
+    def see(self, values: Sequence[float]) -> None:
+        """Take a sample."""
+        self._values.append(values[self._number])
 
     def render(self) -> Text:
         values = list(self._values)
         noise = f"   noise of the last {len(values)}: {np.std(values):.3g}" if len(values) > 1 else ""
         return Text(f"{self.column}{noise}\n" + "\n".join(braille(values)))
+
+
+class LinesPanel:
+    """What is seen of an instrument that sends plain lines; nobody can count what its line lost."""
+
+    def __init__(self, title: str, columns: Sequence[str], wanted: int | None, clock_s: Callable[[], float]) -> None:
+        self._title, self._columns, self._wanted, self._clock_s = title, columns, wanted, clock_s
+        self._values: Sequence[float] = [float("nan")] * len(columns)
+        self._lines, self._begun_s = 0, clock_s()
+
+    def see(self, values: Sequence[float]) -> None:
+        """Take a line's values."""
+        self._values = values
+        self._lines += 1
+
+    def render(self) -> Table:
+        elapsed_s = self._clock_s() - self._begun_s
+        rate_hz = self._lines / elapsed_s if elapsed_s > 0 and self._lines else 0.0
+        left = f"{(self._wanted - self._lines) / rate_hz:.0f}" if self._wanted and rate_hz else "–"
+        table = Table(title=f"{self._title} · lines", title_justify="left", box=None)
+        for heading in ("lines", "rate [1/s]", "elapsed [s]", "remaining [s]"):
+            table.add_column(heading, justify="right")
+        for column in self._columns:
+            table.add_column(column, justify="right", style="cyan")
+        table.add_row(
+            f"{self._lines}" + (f"/{self._wanted}" if self._wanted else ""),
+            f"{rate_hz:.1f}" if rate_hz else "–",
+            f"{elapsed_s:.1f}",
+            left,
+            *(f"{value:.5g}" for value in self._values),
+        )
+        return table
 
 
 def panel(recorder: Recorder) -> Table:
@@ -104,6 +145,7 @@ def watch(
     stop: threading.Event,
     plots: list[Plot],
     console: Console,
+    panels: Sequence[LinesPanel] = (),
 ) -> None:
     """Run a recording and show it. Ctrl-C asks it to stop; a second one no longer asks.
 
@@ -139,7 +181,9 @@ def watch(
 
         def picture() -> Group:
             forces = [text for recorder in recorders if (text := bench_forces(recorder)) is not None]
-            return Group(*map(panel, recorders), *forces, *(plot.render() for plot in plots))
+            return Group(
+                *map(panel, recorders), *(p.render() for p in panels), *forces, *(plot.render() for plot in plots)
+            )
 
         try:
             with Live(picture(), console=console, auto_refresh=False) as live:

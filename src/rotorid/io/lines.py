@@ -94,7 +94,9 @@ class Description(_Model):
 
     def _number(self, text: str) -> float:
         """Raises ValueError for what is no finite number: a heading, an overload written as text."""
-        text = text.strip().strip('"')
+        text = text.strip().strip('"').strip()
+        if text[:1] in ("+", "-"):  # scales print the sign in a place of its own
+            text = text[0] + text[1:].lstrip()
         number = float(text if self.decimal == "." else text.replace(",", "."))
         if not math.isfinite(number) or "_" in text or (self.decimal == "," and "." in text):
             raise ValueError(f"{text!r} is no number")
