@@ -53,6 +53,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
         said = made.unanswerable[0][1] if made.unanswerable else "no manoeuvre separates them"
         return proof.Row(case=case.name, truth=named, open=" ".join(ids), outcome="no plan", said=said)
     expected = proof.predicted(made, ids, truth)
+    question = next((q for q in found.questions if q.ids and set(q.ids) == set(ids)), None)
     references = {
         "planned": simulator.reference_of(sampled(made), *simulator.grid(case)),
         "standard": simulator.standard(case, made.duration_s),
@@ -61,7 +62,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     for name, reference in references.items():
         second = as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
         outcome[name], said[name], whole = judged(first, second, ids, truth)
-        measured[name] = proof.measured(known(whole), expected)
+        measured[name] = proof.measured(known(whole), question, named)
     row = proof.Row(
         case=case.name,
         truth=named,

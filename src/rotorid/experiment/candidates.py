@@ -185,6 +185,15 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
             "eight", f"a figure of eight, {amplitude:.1f} m each way, nose held", eight, whole(rate / np.sqrt(2), 15.0)
         )
     ]
+    # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
+    half_s = max(1.875 * np.pi / (0.8 * np.radians(limits.yaw_rate_deg_s)), np.sqrt(5.77 * np.pi / most_rad_s2), 1.0)
+
+    def face(t):
+        there, back = np.clip((t - 1.0) / half_s, 0, 1), np.clip((t[-1] - 1.0 - t) / half_s, 0, 1)
+        s = np.minimum(there, back)
+        return np.zeros((len(t), 3)), np.pi * s**3 * (10 - 15 * s + 6 * s**2)
+
+    pieces.append(Piece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
     degrees = np.degrees(yaw_rate)
     for name, words, make, speed in (
         ("spin", f"turn on the spot at up to {degrees:.0f} degrees a second", spin, yaw_rate),
@@ -243,10 +252,12 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
                         slope = np.gradient(wave, t)
                         bend = np.abs(np.gradient(slope, t)).max()
                         most_rate = 0.8 * np.radians(limits.yaw_rate_deg_s)
-                        yaw = wave * min(np.radians(40.0), most_rate / np.abs(slope).max(), most_rad_s2 / bend)
+                        most_bend = most_rad_s2 / len(axes) ** 0.5
+                        yaw = wave * min(np.radians(40.0), most_rate / np.abs(slope).max(), most_bend / bend)
                         continue
                     k = "xyz".index(axis)
-                    top = (most / np.sqrt(2) if len(axes) > 1 else most) if k < 2 else 4.0
+                    # What several axes ask of a rotor at once adds up.
+                    top = (most / np.sqrt(2) if len(axes) > 1 else most) if k < 2 else 4.0 / len(axes) ** 0.5
                     speed = limits.speed_m_s / np.sqrt(2) if k < 2 else limits.climb_m_s
                     slope = np.gradient(wave, t)
                     bend = np.abs(np.gradient(slope, t)).max()

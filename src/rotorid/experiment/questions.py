@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.experiment.between import ChainQuestion, chain_question, speeds_in_hover
 from rotorid.mismatch.analyse import findings_of
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.findings import CLAIMED, Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
@@ -19,6 +19,9 @@ from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import COST_PER_PARAMETER
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet
+
+CURVES = ("throttle_curve", "thrust_curve")
+"""Between throttle and speed, and between speed and thrust: one column where no speed is measured."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +88,15 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
     questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
+        if found.commanded and finding.id in CURVES and finding.status in CLAIMED:
+            # Whichever was found: known from commands alone the other would do as well.
+            ids = tuple(sorted({*ids, *CURVES}))
         if not ids and finding.id in suggested and finding.status == "established":
             ids = (finding.id,)
         if not ids or frozenset(ids) in seen:
             continue
         seen.add(frozenset(ids))
-        if found.commanded and {"thrust_curve", "throttle_curve"} <= set(ids):
+        if found.commanded and set(CURVES) <= set(ids):
             throttle, thrust = speeds_in_hover(found)
             what = (
                 "where speeds are known from their commands alone both curves are one; record the rotor speeds, or "

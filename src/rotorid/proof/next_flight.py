@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.experiment.plan import Plan
-from rotorid.experiment.questions import Known, best_of
+from rotorid.experiment.questions import Known, Question, best_of
 from rotorid.experiment.separation import Separation
 from rotorid.experiment.together import answers
 from rotorid.mismatch.findings import Finding
@@ -66,24 +66,26 @@ def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation |
     return next((s for s in found if s.true in truth), None)
 
 
-def measured(joint: Known, expected: Separation | None) -> float:
-    """√ of the whitened squares that the true model explains more than its rival in both sets together.
+def measured(joint: Known, question: Question | None, true: str) -> float:
+    """√ of the whitened squares that the true model explains more than its nearest rival in both sets together.
 
-    NaN where there is none, or where it is no term of forces and moments (between command and rotor speed).
+    Models are those of the question as it was asked of the first set, each in the form that fits both sets best. NaN
+    where truth is none of them, or is no term of forces and moments (between command and rotor speed).
     """
-    if expected is None:
+    if question is None or true not in question.rivals:
         return float("nan")
-    true, rival = expected.true, expected.rival
     search, active = joint.fitted.model.search, joint.fitted.model.selection.active
-    shared = [*search.always, *(k for k in active if search.terms[k].effect not in (true, rival))]
-    explained = []
-    for name in (true, rival):
-        choices = [(t.key,) for t in search.terms.values() if t.effect == name and not t.run]
-        if not choices:
-            return float("nan")
-        best = best_of(joint.regression, shared, choices, search.terms)
-        explained.append(joint.regression.explained([*shared, *best]))
-    return float(np.sqrt(max(explained[0] - explained[1], 0.0)))
+    shared = [*search.always, *(k for k in active if search.terms[k].effect not in question.ids)]
+    explained = {}
+    for name, choices in question.rivals.items():
+        able = [keys for keys in choices if all(k in search.terms for k in keys)]
+        if able:
+            best = best_of(joint.regression, shared, able, search.terms)
+            explained[name] = joint.regression.explained([*shared, *best])
+    if true not in explained or len(explained) < 2:
+        return float("nan")
+    rival = max(value for name, value in explained.items() if name != true)
+    return float(np.sqrt(max(explained[true] - rival, 0.0)))
 
 
 def table(rows: list[Row]) -> pd.DataFrame:
