@@ -1,6 +1,8 @@
 """A fleet through the workflow: one command, a broken set beside sound ones, everything killed in the middle."""
 
+import importlib.util
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,6 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+import slurm
 from copied_project import Project
 
 from rotorid.cli.simulating import fly
@@ -53,6 +56,39 @@ def test_killed_in_the_middle_it_repeats_only_what_was_lost(fleet: Project) -> N
     assert (fleet.root / "results/fleet/fleet.html").stat().st_size > 5000
     again = subprocess.run(command, cwd=fleet.root, env=environment, capture_output=True, text=True)
     assert "Nothing to be done" in again.stdout + again.stderr
+
+
+def no_slurm() -> str:
+    """Why the test with a SLURM of its own is left out; empty where it is wanted and can be had."""
+    if not os.environ.get("ROTORID_SLURM"):
+        return "starts a SLURM of its own: set ROTORID_SLURM=1"
+    if importlib.util.find_spec("snakemake_executor_plugin_slurm") is None:
+        return "needs pip install snakemake-executor-plugin-slurm"
+    return slurm.missing()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(no_slurm()), reason=no_slurm())
+def test_a_fleet_through_slurm_says_what_it_says_here(fleet: Project, tmp_path: Path) -> None:
+    """The profile of the project, on a real SLURM of one node; every batch a job of the queue."""
+    with slurm.running(tmp_path / "slurm") as environment:
+        environment |= {"PYTHONPATH": str(fleet.root / "src")}
+        command = [sys.executable, "-m", "snakemake", "fleet", *SETTINGS]
+        profile = ["--workflow-profile", "workflow/profiles/slurm", "--slurm-no-account", "--latency-wait", "5"]
+        quick = ["--slurm-init-seconds-before-status-checks", "5"]
+        done = subprocess.run(
+            [*command, *profile, *quick], cwd=fleet.root, env=environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        jobs = subprocess.run(["scontrol", "show", "jobs", "-o"], env=environment, capture_output=True, text=True)
+        assert jobs.stdout.count("JobState=COMPLETED") == 3, jobs.stdout
+    through = {f.parent.name: f.read_bytes() for f in fleet.root.glob("results/fleet/verdicts/*/*/verdict.json")}
+    assert set(through) == {"b-2026-11-01", "c-2026-11-02"}
+    for folder in ("results", "cache"):
+        shutil.rmtree(fleet.root / folder)
+    subprocess.run([*command, "--cores", "1"], cwd=fleet.root, env=environment, check=True, capture_output=True)
+    here = {f.parent.name: f.read_bytes() for f in fleet.root.glob("results/fleet/verdicts/*/*/verdict.json")}
+    assert here == through
 
 
 def verdicts(memory: Path) -> list[Path]:
