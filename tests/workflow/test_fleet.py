@@ -17,7 +17,7 @@ from copied_project import Project
 from rotorid.cli.simulating import fly
 from rotorid.templates import read
 
-SETTINGS = ("--config", "recordings=sets", "fleet={batch: 1}")
+SETTINGS = ("--config", "recordings=sets")
 
 
 @pytest.fixture
@@ -29,6 +29,8 @@ def fleet(project: Project) -> Project:
     broken.mkdir()
     (broken / "vehicle.yaml").write_text("name: a\nkind: flight\nmass_kg: heavy\n")
     (broken / "run.csv").write_text("time_s\n0\n")
+    settings = project.root / "config.yaml"
+    settings.write_text(settings.read_text().replace("  batch: 25 #", "  batch: 1 #"))
     return project
 
 
@@ -42,7 +44,8 @@ def test_killed_in_the_middle_it_repeats_only_what_was_lost(fleet: Project) -> N
     try:
         wait_for(lambda: len(verdicts(memory)) == 2 and list(memory.glob("*/.*.part")), running)
     finally:
-        os.killpg(running.pid, signal.SIGKILL)
+        if running.poll() is None:
+            os.killpg(running.pid, signal.SIGKILL)
         running.wait()
     before = {path: path.stat().st_mtime_ns for path in verdicts(memory)}
     assert not (fleet.root / "results/fleet/sets.csv").exists()
