@@ -15,8 +15,8 @@ BIN := .venv/bin
 READY := .venv/ready
 TESTED := .venv/tested
 SOURCES := $(shell find Snakefile config.yaml pyproject.toml README.md .pre-commit-config.yaml \
-	src acquire workflow notebooks tests raw docs \
-	-type f ! -path '*/__pycache__/*' ! -name '* *' 2>/dev/null)
+	src acquire firmware workflow notebooks tests raw docs \
+	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
 .PHONY: help report proof plantings campaign test check environment lock
 .DEFAULT_GOAL := help
@@ -29,7 +29,7 @@ report: $(READY) ## make the report from raw measurements
 	@echo "The report: results/report/report.pdf and results/report/report.html"
 
 campaign: $(READY) ## record the emulated campaign anew into raw/campaign
-	@$(BIN)/python -m acquire.campaign
+	@$(BIN)/python -m rotorid.acquire.campaign
 
 proof: $(READY) ## hide, find, score: about two hours; what is done stays done (kept in docs/proof)
 	@$(BIN)/snakemake --cores $(CORES) proof $(OPTIONS)

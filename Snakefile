@@ -26,6 +26,7 @@ include: "workflow/rules/mismatch.smk"
 include: "workflow/rules/proof.smk"
 include: "workflow/rules/examples.smk"
 include: "workflow/rules/plantings.smk"
+include: "workflow/rules/ablation.smk"
 include: "workflow/rules/fleet.smk"
 include: "workflow/rules/report.smk"
 

@@ -44,6 +44,7 @@ rule mismatch:
         ledger="results/mismatch/{set}/ledger.json",
     params:
         folder=set_folder_of,
+        off=CONFIG.rules.off,
         code=code_of("mismatch"),
     log:
         "results/logs/mismatch/{set}.log",

@@ -11,42 +11,16 @@ from pydantic import ValidationError
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import check_belief
+from rotorid.recordings.explain import explain
 from rotorid.recordings.names import hint
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import TooFewSamples, check_table, read_csv, read_parquet
 from rotorid.recordings.text_files import check_file, read_yaml
-from rotorid.recordings.vehicle import Inertia, Noise, Rotor, Vehicle
-from rotorid.wording import expected, found, printable
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.wording import printable
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
-
-
-def explain(error: ValidationError) -> str:
-    """First fault of a pydantic error as one clause: key, what was found and what was expected."""
-    entries = error.errors()
-    # A misspelled key is also a missing one: its name says more.
-    first = next((e for e in entries if e["type"] == "extra_forbidden"), entries[0])
-    location, kind = first["loc"], first["type"]
-    key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
-    if kind == "extra_forbidden":
-        return f"{key}: no such key is known{hint(str(location[-1]), _keys_at(location))}"
-    if kind == "missing":
-        return f"{key}: is missing"
-    if kind == "value_error":
-        return ": ".join(x for x in (key, str(first["ctx"]["error"])) if x)
-    return f"{key}: found {found(first)}, expected {expected(first)}"
-
-
-_BRANCHES = ("float", "tuple[float, ...]", "constrained-float")
-"""Parts of a pydantic location that name a kind of value, not a key."""
-
-
-def _keys_at(location: tuple[str | int, ...]) -> list[str]:
-    """Keys that are known where a location of a pydantic error lies."""
-    inner = {"inertia_kg_m2": Inertia, "rotors": Rotor, "noise": Noise}
-    model = inner.get(str(location[0]), Vehicle) if len(location) > 1 else Vehicle
-    return list(model.model_fields)
 
 
 def _numbers(value):
@@ -77,7 +51,7 @@ def read_vehicle(path: Path) -> Vehicle:
     try:
         return Vehicle.model_validate({str(key): value for key, value in content.items()})
     except ValidationError as error:
-        raise InputError(f"{path}: {explain(error)}") from None
+        raise InputError(f"{path}: {explain(error, Vehicle)}") from None
 
 
 def _misnamed(path: Path) -> str | None:
