@@ -44,14 +44,18 @@ def read_vehicle(path: Path) -> Vehicle:
         near = _misnamed(path)
         if near:
             raise InputError(f"{path}: file is missing; did you mean {printable(near)}?")
-    content = read_yaml(path)
+    return vehicle_of(read_yaml(path), str(path))
+
+
+def vehicle_of(content: dict, where: str) -> Vehicle:
+    """The vehicle that the keys of a `vehicle.yaml` state; InputError names the key that is wrong."""
     content = {k: v if k in ("name", "kind") else _numbers(v) for k, v in content.items()}
     if isinstance(content.get("name"), (int, float)) and not isinstance(content["name"], bool):
         content["name"] = str(content["name"])
     try:
         return Vehicle.model_validate({str(key): value for key, value in content.items()})
     except ValidationError as error:
-        raise InputError(f"{path}: {explain(error, Vehicle)}") from None
+        raise InputError(f"{where}: {explain(error, Vehicle)}") from None
 
 
 def _misnamed(path: Path) -> str | None:
@@ -146,6 +150,17 @@ def read_split(path: Path, names: list[str]) -> tuple[str, ...]:
     return tuple(held_out)
 
 
+def check_rotors(run: Run, vehicle: Vehicle) -> None:
+    """InputError where a run has a column of a rotor that the vehicle does not list."""
+    for column in run.table.columns:
+        rotor = c.rotor_number(column)
+        if not rotor or vehicle.kind == "bench" or 1 <= rotor[1] <= vehicle.rotor_count:
+            continue
+        if rotor[1] < 1:
+            raise InputError(f"{run.path or run.name}, column {column}: rotors are numbered from 1")
+        raise InputError(f"{run.path or run.name}, column {column}: {VEHICLE} lists {vehicle.rotor_count} rotors only")
+
+
 def read_set(folder: Path) -> RecordingSet:
     """Read a recording set; InputError in one sentence if anything in it does not fit the contract."""
     folder = Path(folder)
@@ -165,13 +180,7 @@ def read_set(folder: Path) -> RecordingSet:
             if len(left_out) == len(paths):
                 raise
     for run in runs:
-        for column in run.table.columns:
-            rotor = c.rotor_number(column)
-            if not rotor or vehicle.kind == "bench" or 1 <= rotor[1] <= vehicle.rotor_count:
-                continue
-            if rotor[1] < 1:
-                raise InputError(f"{run.path}, column {column}: rotors are numbered from 1")
-            raise InputError(f"{run.path}, column {column}: {VEHICLE} lists {vehicle.rotor_count} rotors only")
+        check_rotors(run, vehicle)
     held_out = None
     split = folder / SPLIT
     if split.exists() or split.is_symlink():
