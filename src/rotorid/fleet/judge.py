@@ -74,7 +74,9 @@ def content_of(folder: Path) -> str:
 def _judge_apart(folder: Path, known: Path) -> None:
     """Judge a set in a process of its own; its results appear as the folder `known`, whole or not at all."""
     part = known.with_name(f".{known.name}.{os.getpid()}.part")
-    shutil.rmtree(part, ignore_errors=True)
+    # Nobody else judges this set: what lies here was left by a process that was killed.
+    for left in known.parent.glob(f".{known.name}.*.part"):
+        shutil.rmtree(left, ignore_errors=True)
     part.mkdir(parents=True)
     try:
         context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")

@@ -78,7 +78,10 @@ def test_nothing_is_judged_twice_but_what_changed(sets: Path, told: Path, tmp_pa
     assert judged(sets, tmp_path / "again") == first
     assert told.read_text() == ""
     (sets / "e-sound" / "run.csv").write_text("time_s\n0\n")
+    left = tmp_path / "memory" / "c0de" / f".{judge.content_of(sets / 'e-sound')}.1.part"
+    left.mkdir()  # by a process that was killed
     judged(sets, tmp_path / "third")
+    assert not left.exists()
     assert told.read_text() == "e-sound\n"
     told.write_text("")
     judged(sets, tmp_path / "fourth", code="0ther")
