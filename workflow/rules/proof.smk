@@ -150,6 +150,25 @@ rule tabulate_real:
         "../scripts/tabulate_real.py"
 
 
+rule prove_next_flight:
+    """Open questions, the flight planned for each, and what both sets together say: slow, on request."""
+    message:
+        "Proof: the next flight"
+    input:
+        limits="workflow/proof_room.yaml",
+    output:
+        table="results/proof/next_flight.csv",
+        summary="results/proof/next_flight_summary.csv",
+    params:
+        so_far="results/next_flight/rows.csv",
+        concealing=[CODE.of(path) for path in CONCEALING],
+        code=code_of("prove_next_flight"),
+    log:
+        "results/logs/prove_next_flight.log",
+    script:
+        "../scripts/prove_next_flight.py"
+
+
 rule draw_proof:
     """Figures of the proof beside its tables."""
     message:

@@ -224,19 +224,22 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
     """Column to mask of samples in which a rotor reads (near) zero while the others carry the vehicle."""
     speed = run.array(names)
     out = {}
-    with np.errstate(invalid="ignore"):
-        usual = np.nanquantile(np.where(speed > 0, speed, np.nan), 0.75, axis=0)
+    turning = [v[v > 0] for v in speed.T]
+    usual = np.array([np.quantile(v, 0.75) if len(v) else np.nan for v in turning])
+    if not np.isfinite(usual).any():
+        return out
     if not np.all(np.isfinite(usual)) or np.any(usual <= 0):
         usual = np.where(np.isfinite(usual) & (usual > 0), usual, np.nanmedian(usual))
     top = float(np.median(usual))
     for i, name in enumerate(names):
         others = np.delete(speed / usual, i, axis=1)
         # Half of the others at work, and none of them standing: then the vehicle flies.
-        with np.errstate(invalid="ignore"):
-            flying = (np.nanmedian(others, axis=1) > 0.6) & (np.nanmin(others, axis=1) > 0.3)
-        if not flying.any():
+        flying = np.isfinite(others).any(axis=1)
+        flying[flying] = (np.nanmedian(others[flying], axis=1) > 0.6) & (np.nanmin(others[flying], axis=1) > 0.3)
+        if not np.isfinite(speed[flying, i]).any():
             continue
-        thrust = np.nanquantile(speed[flying, i], 0.98) ** 2 / max(np.nanmedian(speed[flying], axis=0).max() ** 2, 1e-9)
+        read = speed[flying][:, np.isfinite(speed[flying]).any(axis=0)]
+        thrust = np.nanquantile(speed[flying, i], 0.98) ** 2 / max(np.nanmedian(read, axis=0).max() ** 2, 1e-9)
         if thrust < IMPLAUSIBLE_THRUST and _balanced(vehicle, i):
             out[name] = np.isfinite(speed[:, i])
             continue

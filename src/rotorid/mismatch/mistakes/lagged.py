@@ -24,6 +24,10 @@ PERFECTION = 1e-3
 OVERLAP = 1.94
 """Neighbouring frequencies of a Hann window are correlated: sums of squares vary by this more."""
 FEWEST_BLOCKS = 4
+PIECE_BINS = 6
+"""Frequencies of a block that count as one piece: with Hann's window only next neighbours are correlated, so that the
+pieces of a block are nearly independent. Short flights have too few blocks to be judged by: what stands at eight
+standard errors is no chance, and yet 1 in 20,000 by Student's t of eight blocks."""
 LONGEST_LAG_S = 0.15
 
 
@@ -259,6 +263,11 @@ def fit(
     rest = blocks.y - blocks.z @ without.T
     explained = 1 - np.sum(w * np.abs(left) ** 2, axis=(0, 1)) / np.sum(w * np.abs(rest) ** 2, axis=(0, 1))
     return LaggedFit(float(lag), lag_sd, beta[:, :p], sd[:, :p], explained, weight, beta[:, p:], count)
+
+
+def pieces(frequency_hz: np.ndarray) -> list[np.ndarray]:
+    """Places of the frequencies that make a piece each."""
+    return np.array_split(np.arange(frequency_hz.size), max(1, frequency_hz.size // PIECE_BINS))
 
 
 def beyond_nuisances(turn: np.ndarray, z: np.ndarray, weight: np.ndarray) -> np.ndarray:

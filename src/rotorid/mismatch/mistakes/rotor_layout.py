@@ -36,14 +36,14 @@ TIED_LIKELIHOOD, TIED_SHARE = 12.0, 0.02
 
 @dataclass(frozen=True)
 class Moments:
-    """Normal equations of an axis, block by block, nuisances already taken out."""
+    """Normal equations of an axis, piece by piece (a block's band of frequencies), nuisances already taken out."""
 
     square: np.ndarray
-    """(b,)."""
+    """(n,)."""
     cross: np.ndarray
-    """(b, k)."""
+    """(n, k)."""
     gram: np.ndarray
-    """(b, k, k)."""
+    """(n, k, k)."""
 
 
 def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> Moments:
@@ -56,9 +56,11 @@ def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> Mo
         inverse = np.linalg.pinv(gram, hermitian=True)
         x = x - z @ (inverse @ np.real(np.einsum("bmk,bml->kl", z.conj() * w, x)))
         y = y - z @ (inverse @ np.real(np.einsum("bmk,bm->k", z.conj() * w, y)))
-    square = np.sum(weight[None] * np.abs(y) ** 2, axis=1)
-    cross = np.real(np.einsum("bmk,bm->bk", x.conj() * w, y))
-    return Moments(square, cross, np.real(np.einsum("bmk,bml->bkl", x.conj() * w, x)))
+    parts = [(x[:, m], y[:, m], weight[m]) for m in lagged.pieces(blocks.frequency_hz)]
+    square = [np.sum(w * np.abs(y) ** 2, axis=1) for _, y, w in parts]
+    cross = [np.real(np.einsum("bmk,bm->bk", x.conj() * w[:, None], y)) for x, y, w in parts]
+    gram = [np.real(np.einsum("bmk,bml->bkl", x.conj() * w[:, None], x)) for x, _, w in parts]
+    return Moments(*(np.concatenate(part) for part in (square, cross, gram)))
 
 
 def rows_of(vehicle: Vehicle) -> np.ndarray:
@@ -137,16 +139,17 @@ class Contest:
     step: float
     """0: the believed one fits; 1: the other does."""
     p_value: float
-    """That the step is zero, for blocks that are independent of each other."""
+    """That the step is zero, for pieces that are independent of each other."""
 
 
 def contest(axis_moments: list[Moments], believed: list[np.ndarray], other: list[np.ndarray]) -> Contest:
     """Step along the difference of two predictions (rows (k,) an axis, gains included)."""
-    score, curvature = 0.0, 0.0
+    scores, curvatures = [], []
     for m, old, new in zip(axis_moments, believed, other, strict=True):
         change = new - old
-        score = score + m.cross @ change - m.gram @ old @ change
-        curvature = curvature + m.gram @ change @ change
+        scores.append(m.cross @ change - m.gram @ old @ change)
+        curvatures.append(m.gram @ change @ change)
+    score, curvature = np.concatenate(scores), np.concatenate(curvatures)
     count = len(score)
     step = float(score.sum() / max(curvature.sum(), 1e-300))
     rest = score - curvature * step
@@ -189,10 +192,11 @@ def find(recordings: RecordingSet) -> Result:
         return Result(recordings)
     # Only axes on which the two layouts differ can tell them apart.
     contested, now, then = [], [], []
-    if order:
-        contested += parts
-        now += [best_gain(m, rows[a]) for a, m in enumerate(parts)]
-        then += [best_gain(m, rows[a][orders[order]]) for a, m in enumerate(parts)]
+    for a, m in enumerate(parts):
+        if not np.array_equal(rows[a], rows[a][orders[order]]):
+            contested.append(m)
+            now.append(best_gain(m, rows[a]))
+            then.append(best_gain(m, rows[a][orders[order]]))
     same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
     if yaw and turned != same:
         contested.append(yaw)
@@ -206,9 +210,11 @@ def find(recordings: RecordingSet) -> Result:
         return Result(recordings)
     checked = any({"attitude", "gyroscope"} <= set(s.values) for s in signals)
     if not checked:
-        flipped = _flipped_gyroscope(recordings, parts, rows, yaw, believed, least, whole, costs[order, turned])
-        if flipped:
-            return flipped(outcome.p_value)
+        turned_gyroscope = _turned_gyroscope(
+            recordings, parts, rows, yaw, believed, tie(whole, least), int(costs[order, turned]), outcome.p_value
+        )
+        if turned_gyroscope:
+            return turned_gyroscope
     rival = any(costs[a, b] == costs[order, turned] for a, b in ranked[1:])
     result = Result(recordings)
     if order:
@@ -228,25 +234,42 @@ def _turned_cost(senses: np.ndarray, expected: np.ndarray) -> np.ndarray:
     return np.where(changed == senses.shape[1], 1, changed)
 
 
-def _flipped_gyroscope(recordings, parts, rows, yaw, believed, least, whole, cost):
-    """A gyroscope with fewer flipped axes than the layout needs changes, where no attitude tells; None if none."""
+def _turned_gyroscope(
+    recordings: RecordingSet,
+    parts: list[Moments],
+    rows: np.ndarray,
+    yaw: Moments | None,
+    believed: np.ndarray,
+    enough: float,
+    cost: int,
+    p_value: float,
+) -> Result | None:
+    """A gyroscope with flipped or exchanged axes that takes no more changes than a layout's `cost`; None if none.
+
+    For sets without an attitude. `enough` is the loss up to which it fits as well. Roll and pitch exchanged are, on a
+    square of rotors, two opposite rotors exchanged: with as many changes it is either, and nobody can say which.
+    """
     best = None
-    for signs in product((1, -1), repeat=3):
-        total = sum(loss(m, best_gain(m, signs[a] * rows[a])) for a, m in enumerate(parts))
+    for source, signs in product(((0, 1, 2), (1, 0, 2)), product((1, -1), repeat=3)):
+        true = [signs[i] * rows[source[i]] for i in (0, 1)]
+        total = sum(loss(m, best_gain(m, row)) for m, row in zip(parts, true, strict=True))
         total += loss(yaw, _yaw_row(yaw, signs[2] * believed)) if yaw else 0.0
-        flips = sum(s < 0 for s in signs)
-        if total <= tie(whole, least) and 0 < flips < cost and (best is None or flips < best[0]):
-            best = (flips, signs)
-    if best is None:
+        changes = sum(s < 0 for s in signs) + (source != (0, 1, 2))
+        if total <= enough and 0 < changes <= cost and (best is None or changes < best[0]):
+            best = (changes, Turn(source, signs))
+    if best is None or best[0] == cost and best[1].source == (0, 1, 2):
         return None
-    turn = Turn((0, 1, 2), best[1])
-
-    def result(p_value: float) -> Result:
-        note = "No attitude is recorded: the gyroscope's sign was told from the believed rotors' moments."
-        finding = axis_finding(recordings, "gyroscope", turn, p_value)
-        return Result(apply_turn(recordings, "gyroscope", turn), (finding,), (note,))
-
-    return result
+    note = "No attitude is recorded: the gyroscope's axes were told from the believed rotors' moments."
+    finding = axis_finding(recordings, "gyroscope", best[1], p_value)
+    if best[0] == cost:
+        words = "; or else rotors are in another order than vehicle.yaml has them, which nothing recorded tells apart."
+        finding = replace(
+            finding,
+            status="ambiguous",
+            alternatives=("axis_sign", "rotor_order"),
+            sentence=finding.sentence.removesuffix(".") + words,
+        )
+    return Result(apply_turn(recordings, "gyroscope", best[1]), (finding,), (note,))
 
 
 def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:

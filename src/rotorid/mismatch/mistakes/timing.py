@@ -28,7 +28,8 @@ LEAST_ALONE = 0.9
 TELLS_A_DRIFT = 0.95
 """Share of the motion that commands must explain to tell a drift: disturbances come and go, and their lateness too.
 
-Of measured speeds the bound on what disturbances can feign (`disturbed_s`) takes the place of both."""
+Measured speeds follow commands whatever disturbs the vehicle: there the first limit will do. Where they are compared
+with the motion, the bound on what disturbances can feign (`disturbed_s`) takes the place of both."""
 LEAST_SHARE = 0.1
 """A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
 SHARE_STEP_S = 0.004
@@ -40,6 +41,8 @@ LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
 MOTOR_FORM = 0.15
 """A dead time up to this share of a motor's lag is the lag's form (no motor is exactly first order)."""
+MOTOR_SLOWS_PER_S = 0.1 / 30.0
+"""Share of itself by which a motor's lag grows in a second: no battery loses a tenth of its voltage within 30 s."""
 FILTER_SAMPLES, FILTER_S = 2.6, 0.008
 """One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
 SMALL_LAGS = {
@@ -50,6 +53,8 @@ SMALL_LAGS = {
 }
 RUN_AGREEMENT, RUN_SIGMAS = 0.1, 3.0
 """Share of a drift, and one-sigmas of its own, that a run's drift may be off all runs'."""
+AS_WELL = 9.0
+"""Squared standard errors within which two explanations of all growths are as good."""
 LARGEST_SKEW = 1.2e-2
 LONGEST_DRIFT_S = 0.4
 COARSE_SKEWS = 6
@@ -75,7 +80,8 @@ class Difference:
     """(2, 2) of start and growth."""
     likelihood: float
     """Rise of the log-likelihood by start and growth over none."""
-    blocks: int
+    pieces: int
+    """Independent pieces of the spectra, from which the covariance is."""
     explained: float
     motor_s: float
     """Motor lag taken out of the command first."""
@@ -87,6 +93,7 @@ class Difference:
     """The most that disturbances, which the rotors answer in a closed loop, can feign of lateness."""
     longest_s: float = 0.0
     """Length of the longest run."""
+    runs: int = 1
 
     def sd(self, key: int) -> float:
         """One sigma of lateness (key 0) or growth (1)."""
@@ -95,9 +102,14 @@ class Difference:
     def bound(self, key: int) -> float:
         """The most that is feigned of lateness (key 0), or of growth from a run's start to its end (1).
 
-        By disturbances, or by a motor that is not exactly first order.
+        By disturbances, or by a motor that is not exactly first order, or gets slower as the battery empties. A growth
+        must show in every run, and what other disturbances feign in each of them has a mean that is smaller by the root
+        of their number.
         """
-        return max(self.bias_s, MOTOR_FORM * self.motor_s) if key == 0 else 2 * self.bias_s / max(self.longest_s, 1e-9)
+        if key == 0:
+            return max(self.bias_s, MOTOR_FORM * self.motor_s)
+        disturbed = 2 * self.bias_s / np.sqrt(self.runs) / max(self.longest_s, 1e-9)
+        return max(disturbed, MOTOR_SLOWS_PER_S * self.motor_s)
 
     def part(self, sensors: list[str]) -> float:
         """By which share of their own lateness some sensors, late together, move this one."""
@@ -233,16 +245,24 @@ def _weighted(found: LaggedFit, base: LaggedFit) -> LaggedFit:
 
 
 def difference(
-    late: str, over: str, blocks: Blocks, found: LaggedFit, motor_s: float, shares: Shares, drifting: bool
+    late: str,
+    over: str,
+    blocks: Blocks,
+    found: LaggedFit,
+    motor_s: float,
+    shares: Shares,
+    drifting: bool,
+    free: bool = True,
 ) -> Difference:
     """Lateness, and its growth if asked for, at the likelihood's peak.
 
-    Gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the first fit.
+    Where `free`, gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the
+    first fit.
     """
     longest = LONGEST_DRIFT_S if drifting else lagged.LONGEST_LAG_S
     lags = np.arange(-longest, longest + 1e-9, LAG_STEP_S)
     # Only the fast comparisons with the gyroscope blur beyond recognition.
-    if drifting and np.min(found.explained) < LEAST_EXPLAINED and "gyroscope" in (late, over):
+    if free and drifting and np.min(found.explained) < LEAST_EXPLAINED and "gyroscope" in (late, over):
         found = unblurred(blocks, found)
     start, growth = found.lag_s, 0.0
     for _ in range(3 if drifting else 1):
@@ -250,21 +270,24 @@ def difference(
         middle = start + growth * float(blocks.time_s.mean())
         start, growth = _peak(lags, curves, blocks.time_s, middle, drifting)
         phase = lagged.delay(blocks.frequency_hz, start + growth * blocks.time_s)
-        found = lagged.fit(replace(blocks, x=blocks.x * phase[:, :, None]), np.zeros(1))
+        if free:
+            found = lagged.fit(replace(blocks, x=blocks.x * phase[:, :, None]), np.zeros(1))
     # Newton's steps to the peak itself, and the likelihood's shape there.
     model = (blocks.x * phase[:, :, None]) @ found.gain.T
     turn = -2j * np.pi * blocks.frequency_hz[None, :, None] * model
     turn = lagged.beyond_nuisances(turn, blocks.z, found.weight)
     left = blocks.y - model - blocks.z @ found.nuisance.T
     weight = found.weight.T[None]
-    slope = np.real(np.sum(weight * turn.conj() * left, axis=(1, 2)))
-    bend = np.sum(weight * np.abs(turn) ** 2, axis=(1, 2))
-    design = np.stack([np.ones(blocks.count), blocks.time_s], axis=1)[:, : 2 if drifting else 1]
+    parts = lagged.pieces(blocks.frequency_hz)
+    slope, bend = np.real(weight * turn.conj() * left), weight * np.abs(turn) ** 2
+    slope, bend = (np.concatenate([v[:, m].sum(axis=(1, 2)) for m in parts]) for v in (slope, bend))
+    time_s = np.tile(blocks.time_s, len(parts))
+    design = np.stack([np.ones(len(time_s)), time_s], axis=1)[:, : 2 if drifting else 1]
     inverse = np.linalg.pinv(design.T @ (design * bend[:, None]), hermitian=True)
     step = inverse @ (design.T @ slope)
     start, growth = start + float(step[0]), growth + (float(step[1]) if drifting else 0.0)
     score = design * (slope - bend * (design @ step))[:, None]
-    robust = inverse @ (score.T @ score) @ inverse * blocks.count / max(blocks.count - design.shape[1], 1)
+    robust = inverse @ (score.T @ score) @ inverse * len(score) / max(len(score) - design.shape[1], 1)
     covariance = np.zeros((2, 2))
     size = design.shape[1]
     # The likelihood's own curvature counts as a floor.
@@ -281,7 +304,20 @@ def difference(
     bias = disturbed_s(blocks, found) if over == "rotors" else 0.0
     longest = float(blocks.time_s.max()) + lagged.BLOCK_S / 2
     return Difference(
-        late, over, start, growth, covariance, rise, blocks.count, explained, motor_s, gained, shares, bias, longest
+        late,
+        over,
+        start,
+        growth,
+        covariance,
+        rise,
+        len(time_s),
+        explained,
+        motor_s,
+        gained,
+        shares,
+        bias,
+        longest,
+        len(np.unique(blocks.run)),
     )
 
 
@@ -360,9 +396,10 @@ def in_every_run(whole: Difference, comparison: tuple) -> bool:
     agree, shown = [], []
     for run in np.unique(blocks.run):
         own = blocks.part(blocks.run == run)
-        if own.count < lagged.FEWEST_BLOCKS:
+        if own.count < 2:
             continue
-        d = difference(late, over, own, found, motor_s, shares, drifting=True)
+        # A run of a few blocks cannot tell gains of its own.
+        d = difference(late, over, own, found, motor_s, shares, drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
         sd = d.sd(1)
         agree.append(abs(d.growth - whole.growth) < RUN_SIGMAS * sd + RUN_AGREEMENT * abs(whole.growth))
         due = min(LEAST_LIKELIHOOD, whole.gained * own.count / blocks.count) / 4
@@ -548,6 +585,24 @@ def _listed(sensors: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
+def one_clock(differences: list[Difference], telling: list[Difference]) -> tuple[str, ...]:
+    """The sensor whose clock alone explains all growths best, and others that do so as well; none for no candidate.
+
+    Candidates are the two sides of the comparisons that surely tell of a growth. Nothing but height rests on the
+    position, so that it is none of them.
+    """
+    names = {n for d in telling for n in (d.late, *(name for name, _ in d.shares))} - {"position"}
+    left = {}
+    for name in names:
+        rate, _ = across(differences, [name], 1)
+        left[name] = sum(
+            (d.growth - d.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
+        )
+    trusted = {n: PREFERRED.index(n) if n in PREFERRED else len(PREFERRED) for n in names}
+    alike = [n for n in names if left[n] < min(left.values()) + AS_WELL]
+    return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
+
+
 def _skew(recordings: RecordingSet, known: list) -> Result:
     """Sensors whose lateness grows."""
     signals = signals_of(recordings)
@@ -556,10 +611,10 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     periods = own_period_s(signals)
     telling = []
     for d, source in zip(found, sources, strict=True):
-        if d.over in COMMANDED and d.explained < TELLS_A_DRIFT:
+        if d.over in COMMANDED and d.late != "rotors" and d.explained < TELLS_A_DRIFT:
             continue
         beyond = abs(d.growth) - d.bound(1)
-        p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.blocks - 2, 1)))
+        p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.pieces - 2, 1)))
         slowest = max(periods[n] for n in (d.late, *(name for name, _ in d.shares)))
         if p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > LEAST_LIKELIHOOD:
             if not in_every_run(d, source):
@@ -575,8 +630,16 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
         if abs(value) > 0.5 * max(periods[n], 2e-3) / longest + 3 * sd + bound and abs(value) * longest > periods[n]
     ]
     wrong = [n for n in wrong if n != "position" or {"velocity", "attitude"} & set(wrong)]
+    other = ""
     if not wrong:
-        return Result(recordings)
+        # Two clocks surely part, and the rest cannot tell which is right: the one that leaves least to explain.
+        blamed = one_clock(found, [d for _, d in telling])
+        if not blamed:
+            return Result(recordings)
+        drift = {blamed[0]: (across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
+        wrong = [blamed[0]]
+        if len(blamed) > 1:
+            other = f" (or that of {_listed(list(blamed[1:]))} the other way: nothing else recorded tells which)"
     # One clock at a time, the one most sensors go by first: what a second one did is measured anew.
     rates = {n: value for n, (value, _, _) in drift.items()}
     sides = [[n for n in wrong if rates[n] > 0], [n for n in wrong if rates[n] < 0]]
@@ -599,10 +662,10 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
         id="clock_skew",
         status="established",
         sentence=(
-            f"The clock of {_listed(wrong)} runs at another rate: its stamps fall behind by {1e3 * rate:.2f} ms "
+            f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps fall behind by {1e3 * rate:.2f} ms "
             f"every second; put on the other sensors' time."
             if rate > 0
-            else f"The clock of {_listed(wrong)} runs at another rate: its stamps gain {-1e3 * rate:.2f} ms "
+            else f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps gain {-1e3 * rate:.2f} ms "
             f"every second; put on the other sensors' time."
         ),
         parameters=(Estimate("skew", rate, "1", rate - 1.96 * sd, rate + 1.96 * sd),),
@@ -629,8 +692,8 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
     for n, (value, sd, bound) in relative.items():
         touching = [d for d in found if abs(d.part([n])) > LEAST_SHARE]
         limit = limits[n] = max(periods[n], sample, bound)
-        blocks = max(d.blocks for d in touching)
-        p = float(student.sf((abs(value) - limit) / max(sd, 1e-9), max(blocks - 2, 1)))
+        count = max(d.pieces for d in touching)
+        p = float(student.sf((abs(value) - limit) / max(sd, 1e-9), max(count - 2, 1)))
         if p > P_LATE or max(d.likelihood for d in touching) < LEAST_LIKELIHOOD:
             continue
         if n == "position":
