@@ -201,6 +201,8 @@ LINE_PT = 453.0
 """Width of the page's text, pt."""
 LETTER_PT, BOLD_PT, GAP_PT = 4.5, 5.0, 12.0
 """Width of a letter in a table, of one in its bold heading, and space between columns, pt; about."""
+MOST_LETTERS = 100
+"""Text longer than this many letters gets no larger share of a wide table."""
 
 
 def _columns_pt(
@@ -211,7 +213,7 @@ def _columns_pt(
     for heading, *column in zip(headings, *cells, strict=True):
         heading, column = _seen(heading), [_seen(entry) for entry in column]
         words = [BOLD_PT * len(word) for word in heading.split()]
-        words += [LETTER_PT * len(word) for entry in column for word in entry.split(" ")]
+        words += [LETTER_PT * len(word) for entry in column for word in re.split("[ -]", entry)]
         entries = [BOLD_PT * max((len(word) for word in heading.split()), default=0)]
         entries += [LETTER_PT * min(len(entry), widest) for entry in column]
         out.append((max(words, default=0.0) + GAP_PT, max(*entries, *words, 0.0) + GAP_PT))
@@ -230,7 +232,7 @@ def too_wide(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
 
 def shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
     """Shares of the line for each column, `0.20,0.80`: never less than its longest word, the rest by what is longer."""
-    columns = _columns_pt(headings, cells, WIDEST)
+    columns = _columns_pt(headings, cells, MOST_LETTERS)
     least = [word for word, _ in columns]
     more = [whole - word for word, whole in columns]
     room = max(LINE_PT - sum(least), 0.0)

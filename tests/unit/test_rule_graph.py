@@ -1,6 +1,6 @@
 """The drawing of the workflow's rules."""
 
-from rotorid.plots.rule_graph import columns, heights, merged, rule_graph, wrapped
+from rotorid.plots.rule_graph import columns, heights, merged, reduced, rule_graph, wrapped
 
 STEPS = [
     ("import_public_a", "fit"),
@@ -19,6 +19,10 @@ def test_a_rule_stands_right_of_what_it_reads_and_chapters_in_one_column() -> No
     place = columns(pairs)
     assert all(place[a] < place[b] for a, b in pairs)
     assert place["chapter_one"] == place["chapter_two"] == 2
+
+
+def test_what_a_longer_way_implies_is_not_drawn() -> None:
+    assert reduced([("a", "b"), ("a", "c"), ("b", "c")]) == [("a", "b"), ("b", "c")]
 
 
 def test_no_two_rules_stand_on_each_other() -> None:

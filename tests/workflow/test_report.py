@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from rotorid import typeset
+from tests.browser import CHROMIUM, Browser
 
 ROOT = Path(__file__).parents[2]
 PARTS = ROOT / "workflow" / "report"
@@ -114,3 +115,20 @@ def test_nothing_is_fetched_and_no_script_runs_in_the_html(chapters: list[str]) 
     policy = html.unescape(re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', page)[1])
     assert "default-src 'none'" in policy and "script" not in policy
     assert "<script" not in page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+@pytest.mark.parametrize("width", [360, 900, 1400])
+def test_the_html_is_as_wide_as_the_window_and_says_nothing_to_the_console(chapters: list[str], width: int) -> None:
+    cells = " | ".join(f"{k}.123456789" for k in range(40))
+    wide = (
+        f"| {' | '.join(['n'] * 40)} |\n| {' | '.join(['---:'] * 40)} |\n| {cells} |\n\n: Wide. {{#tbl:second-wide}}\n"
+    )
+    Path("two.md").write_text(TWO + "\n" + wide)
+    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    with Browser(Path.cwd()) as browser:
+        browser.open(Path("report.html"), width)
+        assert browser.said == []
+        assert browser.value("document.documentElement.scrollWidth") <= width
+        assert browser.value("[...document.images].every((image) => image.naturalWidth > 0)")

@@ -112,7 +112,9 @@ local count = {
       end
       element.attr.attributes.widths = nil
     end
-    return number_caption(element, "Table", assign(element.identifier, "tbl")), false
+    local numbered = number_caption(element, "Table", assign(element.identifier, "tbl"))
+    -- On a narrow page a wide table scrolls in a frame of its own, not the page.
+    return is_typst and numbered or pandoc.Div({ numbered }, { class = "table-wrap" }), false
   end,
   Para = function(paragraph)
     local span = paragraph.content[1]

@@ -98,7 +98,7 @@ def main(
             "low_95": fit["interval_95"][0],
             "high_95": fit["interval_95"][1],
             "difference_percent": 100 * fit["difference"],
-            "how": "least squares through the origin",
+            "how": "fitted",
         }
         for name, unit, fit in (("C_F", "N s²", found.get("c_f")), ("C_Q", "N m s²", found.get("c_q")))
         if fit
@@ -113,7 +113,7 @@ def main(
                 "thesis": believed,
                 "value": value,
                 "difference_percent": 100 * (value / believed - 1),
-                "how": "component table",
+                "how": "composed",
             }
         )
     pd.DataFrame(rows).to_csv(table, index=False)

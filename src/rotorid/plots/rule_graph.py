@@ -30,6 +30,21 @@ def merged(steps: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     return sorted((a, b) for a, b in pairs if a != b)
 
 
+def reduced(pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The pairs that no way over other rules implies."""
+    after: dict[str, set[str]] = {}
+    for a, b in pairs:
+        after.setdefault(a, set()).add(b)
+    behind: dict[str, set[str]] = {}
+
+    def all_behind(rule: str) -> set[str]:
+        if rule not in behind:
+            behind[rule] = set().union(*({b} | all_behind(b) for b in after.get(rule, ())))
+        return behind[rule]
+
+    return [(a, b) for a, b in pairs if not any(b in all_behind(other) for other in after[a] - {b})]
+
+
 def columns(pairs: list[tuple[str, str]]) -> dict[str, int]:
     """Rule to its column: one more than the last of the rules whose files it reads; chapters share a column."""
     rules = sorted({rule for pair in pairs for rule in pair})
@@ -93,6 +108,7 @@ def rule_graph(steps: Iterable[tuple[str, str]]) -> Figure:
     """The graph, from pairs of a rule and one that reads its files."""
     pairs = merged(steps)
     place = columns(pairs)
+    pairs = reduced(pairs)
     height = heights(pairs, place)
     most = max(np.bincount(list(place.values())))
     fig, axis = style.figure(0.6 + 0.4 * most)
