@@ -14,11 +14,11 @@ unexport PYTHONDONTWRITEBYTECODE
 BIN := .venv/bin
 READY := .venv/ready
 TESTED := .venv/tested
-SOURCES := $(shell find Snakefile config.yaml pyproject.toml README.md .pre-commit-config.yaml \
-	src acquire workflow notebooks tests raw docs \
-	-type f ! -path '*/__pycache__/*' ! -name '* *' 2>/dev/null)
+SOURCES := $(shell find Snakefile config.yaml mkdocs.yml pyproject.toml README.md .pre-commit-config.yaml \
+	src acquire firmware workflow notebooks tests raw docs \
+	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
-.PHONY: help report proof plantings campaign test check environment lock
+.PHONY: help report site proof plantings campaign test check environment lock
 .DEFAULT_GOAL := help
 
 help: ## say what there is
@@ -28,8 +28,12 @@ report: $(READY) ## make the report from raw measurements
 	@$(BIN)/snakemake --cores $(CORES) $(OPTIONS)
 	@echo "The report: results/report/report.pdf and results/report/report.html"
 
+site: $(READY) ## the pages as a site, strictly: results/site/index.html (SERVE=1 shows it while writing)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs $(if $(SERVE),serve,build --quiet)
+	@echo "The site: results/site/index.html"
+
 campaign: $(READY) ## record the emulated campaign anew into raw/campaign
-	@$(BIN)/python -m acquire.campaign
+	@$(BIN)/python -m rotorid.acquire.campaign
 
 proof: $(READY) ## hide, find, score: about two hours; what is done stays done (kept in docs/proof)
 	@$(BIN)/snakemake --cores $(CORES) proof $(OPTIONS)

@@ -1,5 +1,7 @@
 """From raw logs to the report. One screen: the stages are in workflow/rules, one file each."""
 
+import atexit
+
 from snakemake.utils import min_version
 
 min_version("9.27")
@@ -26,6 +28,8 @@ include: "workflow/rules/mismatch.smk"
 include: "workflow/rules/proof.smk"
 include: "workflow/rules/examples.smk"
 include: "workflow/rules/plantings.smk"
+include: "workflow/rules/ablation.smk"
+include: "workflow/rules/fleet.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -40,3 +44,8 @@ rule all:
 
 # All rules have asked for their code by now.
 CODE.remember()
+
+
+onsuccess:
+    # The answer is the last thing on the screen: Snakemake says where its log is after this.
+    atexit.register(say_verdicts)

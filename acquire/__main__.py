@@ -1,5 +1,5 @@
-"""`python -m acquire` is `rotorid-acquire`."""
+"""`python -m acquire` in a clone is `rotorid-acquire`."""
 
-from acquire.cli import app
+from rotorid.acquire.cli import app
 
 app()

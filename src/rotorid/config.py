@@ -14,9 +14,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from rotorid.errors import InputError
+from rotorid.mismatch.rules import RULES
 from rotorid.wording import expected, found
 
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
@@ -223,6 +224,42 @@ class Plantings(Section):
     )
 
 
+class Rules(Section):
+    """Rules of the mismatch stage (`rotorid.mismatch.rules`)."""
+
+    off: list[Text] = Field(description="Rules that are left out of every verdict [names].")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _off_is_a_name(cls, values):
+        # YAML reads the bare word off as false.
+        if isinstance(values, dict) and False in values:
+            return {"off" if key is False else key: value for key, value in values.items()}
+        return values
+
+    @field_validator("off")
+    @classmethod
+    def _known(cls, names):
+        if unknown := [name for name in names if name not in RULES]:
+            raise ValueError(f"no rule is named {', '.join(unknown)}; docs/mismatch.md lists the rules")
+        return names
+
+
+class Ablation(Section):
+    """What each rule of the mismatch stage is worth."""
+
+    cases: list[Text] = Field(
+        min_length=1, description="Shell patterns on the cases of tests/concealed/cases.tsv; one must fit [names]."
+    )
+    most: int = Field(ge=1, description="Sets that a rule is judged without, of those in which it fired [1].")
+
+
+class Fleet(Section):
+    """Every recording set of a folder, judged together."""
+
+    batch: int = Field(ge=1, description="Sets that one job judges [1].")
+
+
 class Config(Section):
     """The whole of `config.yaml`."""
 
@@ -238,6 +275,9 @@ class Config(Section):
     black_box: BlackBox = Field(description="The stand's wrench without knowledge of the vehicle.")
     proof: Proof = Field(description="The proof on concealed recordings.")
     plantings: Plantings = Field(description="Plantings in real flights.")
+    rules: Rules = Field(description="Rules of the mismatch stage.")
+    ablation: Ablation = Field(description="What each of these rules is worth.")
+    fleet: Fleet = Field(description="Every recording set of a folder, judged together.")
     report: Report = Field(description="The report.")
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -75,11 +76,13 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
         made_of = MADE_OF["emulated" if emulated and kind == "campaign" else kind]
         return f"*{made_of}* {caption}" if made_of else caption
 
-    def figure(name: str, caption: str, kind: str, width: str = "100%") -> str:
-        if name not in files or Path(files[name]).suffix not in FIGURES:
-            raise ProseError(f"{path}: there is no figure called {name}.")
+    def figure(name: str, caption: str, kind: str, width: str = "100%", moving: str = "") -> str:
+        for shown in filter(None, (name, moving)):
+            if shown not in files or Path(files[shown]).suffix not in FIGURES:
+                raise ProseError(f"{path}: there is no figure called {shown}.")
         label = f"fig:{path.stem}-{name}".replace("_", "-")
-        return f"![{captioned(caption, kind)}]({files[name]}){{#{label} width={width}}}"
+        on_page = f' moving="{files[moving]}"' if moving else ""
+        return f"![{captioned(caption, kind)}]({files[name]}){{#{label} width={width}{on_page}}}"
 
     def table(name: str, caption: str, columns: Sequence[Sequence[str]], kind: str) -> str:
         rows = known.get(name)
@@ -93,13 +96,25 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
 
     try:
         template = environment.from_string(path.read_text(encoding="utf-8"))
-        return template.render(**known, figure=figure, table=table, emulated=emulated)
+        return _standing_alone(template.render(**known, figure=figure, table=table, emulated=emulated), path)
     except jinja2.TemplateSyntaxError as error:
         raise ProseError(f"{path}, line {error.lineno}: {error.message}.") from None
     except (jinja2.UndefinedError, TypeError, ValueError) as error:
         if isinstance(error, ProseError):
             raise
         raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
+
+
+def _standing_alone(markdown: str, path: Path) -> str:
+    """The markdown, if each figure is a paragraph of its own; inside of another it would have no number."""
+    lines = ["", *markdown.splitlines(), ""]
+    for before, line, after in zip(lines, lines[1:], lines[2:], strict=False):
+        if line.startswith("![") and (before.strip() or after.strip()):
+            name = line[line.rfind("{#") + 2 :].split()[0].rstrip("}")
+            raise ProseError(
+                f"{path}: the figure {name} stands inside a paragraph; it needs an empty line on both sides."
+            )
+    return markdown
 
 
 def not_recorded(path: str | Path, kinds: Sequence[str], index: str) -> str:
@@ -182,22 +197,44 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}{attributes}}}\n"
 
 
-LINE = 96
-"""About so many characters of a table fit on a line of the page."""
+LINE_PT = 453.0
+"""Width of the page's text, pt."""
+LETTER_PT, BOLD_PT, GAP_PT = 4.5, 5.0, 12.0
+"""Width of a letter in a table, of one in its bold heading, and space between columns, pt; about."""
+
+
+def _columns_pt(
+    headings: Sequence[str], cells: Sequence[Sequence[str]], widest: float = math.inf
+) -> list[tuple[float, float]]:
+    """Of each column the width of its longest word and of its longest entry (or of `widest` letters), pt."""
+    out = []
+    for heading, *column in zip(headings, *cells, strict=True):
+        heading, column = _seen(heading), [_seen(entry) for entry in column]
+        words = [BOLD_PT * len(word) for word in heading.split()]
+        words += [LETTER_PT * len(word) for entry in column for word in entry.split(" ")]
+        entries = [BOLD_PT * max((len(word) for word in heading.split()), default=0)]
+        entries += [LETTER_PT * min(len(entry), widest) for entry in column]
+        out.append((max(words, default=0.0) + GAP_PT, max(*entries, *words, 0.0) + GAP_PT))
+    return out
+
+
+def _seen(markdown: str) -> str:
+    """About what is seen of a cell's markdown: without the signs for mathematics, raised and escaped letters."""
+    return re.sub(r"[$^{}\\_]", "", markdown)
 
 
 def too_wide(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
     """Whether a row would not fit on a line, so that the columns need shares of it."""
-    longest = [max(len(entry) for entry in column) for column in zip(headings, *cells, strict=True)]
-    return sum(longest) + 3 * len(longest) > LINE and max(longest) > WIDEST
+    return sum(whole for _, whole in _columns_pt(headings, cells)) > LINE_PT
 
 
 def shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
-    """Shares of the line for each column, `0.20,0.80`: by its longest text up to a limit, never less than a word."""
-    wanted = []
-    for column in zip(headings, *cells, strict=True):
-        word = max(len(word) for entry in column for word in entry.split() or [""])
-        wanted.append(max(word + 3, min(max(len(entry) for entry in column), WIDEST), 7))
+    """Shares of the line for each column, `0.20,0.80`: never less than its longest word, the rest by what is longer."""
+    columns = _columns_pt(headings, cells, WIDEST)
+    least = [word for word, _ in columns]
+    more = [whole - word for word, whole in columns]
+    room = max(LINE_PT - sum(least), 0.0)
+    wanted = [word + room * extra / max(sum(more), 1e-9) for word, extra in zip(least, more, strict=True)]
     return ",".join(f"{width / sum(wanted):.3f}" for width in wanted)
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import glob
 import math
 import os
+import platform
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,32 +14,73 @@ from typing import Any
 
 DIGITS = 6
 """Significant digits that verdicts and vehicles state."""
+FORGOTTEN_S = 86400.0
+"""Age at which the part of a file written by another computer counts as left behind."""
+_HOST = platform.node().replace(".", "_")
 
 
 @contextmanager
 def all_or_none(*paths: Path) -> Iterator[tuple[Path, ...]]:
     """Places to write files at that take their names together when the block ends; on an exception none is left.
 
-    They lie in the files' own folders (which are made), so that each takes its name in one step.
+    They lie in the files' own folders (which are made), so that each takes its name in one step. No system gives
+    several names in one step, so the first file vouches for the others: it goes first and comes last. A process that
+    is killed, or a computer that stops, leaves either all files of one writing or no first file. What such a process
+    left behind half written is swept away by the next that writes the same files.
     """
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
-    parts = tuple(path.with_name(f".{path.name}.{os.getpid()}.part") for path in paths)
+        _sweep(path)
+    parts = tuple(path.with_name(f".{path.name}.{_HOST}-{os.getpid()}.part") for path in paths)
     try:
         yield parts
         for part in parts:
             _to_disk(part)
-        for part, path in zip(parts, paths, strict=True):
+        (first_part, first), *others = zip(parts, paths, strict=True)
+        if others and first.exists():
+            first.unlink()
+            _to_disk(first.parent)
+        for part, path in others:
             os.replace(part, path)
+        for folder in {path.parent for _, path in others}:
+            _to_disk(folder)
+        os.replace(first_part, first)
+        _to_disk(first.parent)
     finally:
         for part in parts:
             part.unlink(missing_ok=True)
 
 
+def _sweep(path: Path) -> None:
+    """Remove parts of a file whose writer is gone: of this computer by its process, of another after a day."""
+    for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
+        host, _, process = part.name.removesuffix(".part").rpartition(".")[2].rpartition("-")
+        try:
+            gone = _dead(process) if host in (_HOST, "") else time.time() - part.stat().st_mtime > FORGOTTEN_S
+        except FileNotFoundError:
+            continue
+        if gone:
+            part.unlink(missing_ok=True)
+
+
+def _dead(process: str) -> bool:
+    """Whether no process of this number runs here."""
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, ValueError):
+        return True
+    except PermissionError:
+        return False
+    return False
+
+
 def _to_disk(path: Path) -> None:
-    """Wait until a file's content is on the disk: a full disk may tell only then."""
-    with open(path, "rb") as file:
-        os.fsync(file.fileno())
+    """Wait until a file's content, or a folder's names, are on the disk: a full disk may tell only then."""
+    number = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
 
 
 def rounded(value: Any) -> Any:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from acquire.clock import SystemClock, VirtualClock
-from acquire.emulators.build import build
-from acquire.emulators.faults import Faults
-from acquire.emulators.ports import EmulatedPorts
-from acquire.emulators.truth import Truth
-from acquire.recorder import Recorder, Timings
-from acquire.transport import LoopbackTransport, SerialTransport
+from rotorid.acquire.clock import SystemClock, VirtualClock
+from rotorid.acquire.emulators.build import build
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.ports import EmulatedPorts
+from rotorid.acquire.emulators.truth import Truth
+from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.transport import LoopbackTransport, SerialTransport
 from rotorid.io.wire import INSTRUMENTS
 
 QUICK = Timings(poll_s=0.02, reply_s=0.5, tries=3, silence_s=2.0, retry_open_s=0.002, reconnect_s=5.0)

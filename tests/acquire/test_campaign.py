@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquire.campaign import PARTS, run_campaign
-from acquire.geometry import SLOPE, body_forces, cell_forces
-from acquire.weights import COMBINATIONS, weight_gf
+from rotorid.acquire.campaign import PARTS, run_campaign
+from rotorid.acquire.geometry import SLOPE, body_forces, cell_forces
+from rotorid.acquire.weights import COMBINATIONS, weight_gf
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
 from rotorid.io.session import read_session

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from acquire import procedures
-from acquire.clock import SystemClock
-from acquire.recorder import Recorder, Timings
-from acquire.transport import ReplayTransport
+from rotorid.acquire import procedures
+from rotorid.acquire.clock import SystemClock
+from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.transport import ReplayTransport
 from rotorid.io.frames import COMMAND, decode
 from rotorid.io.logs import read_log
 from rotorid.io.rawlog import SENT, read_raw

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from acquire.cli import app
+from rotorid.acquire.cli import app
 from rotorid.io.session import Ended
 from rotorid.io.wire import INSTRUMENTS
 

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from acquire.emulators.bench import BenchPhysics
-from acquire.emulators.devices import programme_share
-from acquire.emulators.load_cell import LoadCells
-from acquire.emulators.oscillator import Oscillator
-from acquire.emulators.rotor import Battery, Rotors
-from acquire.emulators.stand import StandPhysics, tilt_matrix
-from acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
-from acquire.emulators.truth import (
+from rotorid.acquire.emulators.bench import BenchPhysics
+from rotorid.acquire.emulators.devices import programme_share
+from rotorid.acquire.emulators.load_cell import LoadCells
+from rotorid.acquire.emulators.oscillator import Oscillator
+from rotorid.acquire.emulators.rotor import Battery, Rotors
+from rotorid.acquire.emulators.stand import StandPhysics, tilt_matrix
+from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
+from rotorid.acquire.emulators.truth import (
     BatteryTruth,
     BenchTruth,
     CellsTruth,
@@ -26,9 +26,9 @@ from acquire.emulators.truth import (
     read_truth,
     write_truth,
 )
-from acquire.geometry import GF_N, M, body_forces, cell_forces, cell_response
-from acquire.programmes import programme_of
-from acquire.steady import LowPass, Steadiness
+from rotorid.acquire.geometry import GF_N, M, body_forces, cell_forces, cell_response
+from rotorid.acquire.programmes import programme_of
+from rotorid.acquire.steady import LowPass, Steadiness
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.wire.quadrotor import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
 

@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from acquire import procedures
-from acquire.cli import app
-from acquire.emulators.faults import Faults
-from acquire.errors import AcquireError, DeviceSilent
-from acquire.recorder import Recorder, Timings
+from rotorid.acquire import procedures
+from rotorid.acquire.cli import app
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.errors import AcquireError, DeviceSilent
+from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, DATA, END, START, Frame, encode
@@ -233,7 +233,7 @@ ODD = {
 @pytest.mark.parametrize("what", ODD)
 @seen("a malformed frame with a right checksum", "recorder and reader crashed (struct.error, ValueError, IndexError)")
 def test_a_malformed_frame_is_counted_and_nothing_else_is_lost(tmp_path, what):
-    from acquire.clock import SystemClock
+    from rotorid.acquire.clock import SystemClock
 
     bench = wire.INSTRUMENTS["bench"]
     recorder = Recorder(bench, Script([ODD[what]]), SystemClock(), tmp_path, "run", durable=False)
@@ -253,7 +253,7 @@ def test_a_malformed_frame_is_counted_and_nothing_else_is_lost(tmp_path, what):
 
 @seen("samples that are all of another length", "recorder stopped at the first; the reader raised for the whole log")
 def test_a_firmware_of_another_layout_is_told_and_its_log_is_readable(tmp_path):
-    from acquire.clock import SystemClock
+    from rotorid.acquire.clock import SystemClock
 
     script = Script([(DATA, b"\1\2\3\4")] * 25)
     script._number = 9
@@ -293,7 +293,8 @@ def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
     from rotorid.io.session import Session
 
     write_session(
-        Session(id="run", instrument="bench", started="x", host_start_ns=0, log=path.name), tmp_path / "run.yaml"
+        Session(id="run", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log=path.name),
+        tmp_path / "run.yaml",
     )
     log = read_log(path)
     assert len(log.table) == 0 and log.malformed == 1 and "toaster" in log.faults[0]
@@ -323,7 +324,18 @@ def test_a_terminal_that_goes_away_stops_the_device(plugged, tmp_path):
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
         os.execv(
             sys.executable,
-            [sys.executable, "-m", "acquire", "bench", "--port", ports.names[0], "--out", str(tmp_path), "--id", "run"],
+            [
+                sys.executable,
+                "-m",
+                "rotorid.acquire",
+                "bench",
+                "--port",
+                ports.names[0],
+                "--out",
+                str(tmp_path),
+                "--id",
+                "run",
+            ],
         )
     stop = threading.Event()
 
@@ -352,7 +364,7 @@ def test_a_terminal_that_goes_away_stops_the_device(plugged, tmp_path):
 @seen("SIGKILL while a motor turns", "the motor turned on to its hold time (up to 65 s), the tester streamed on")
 def test_a_killed_recorder_leaves_no_motor_running(plugged, tmp_path):
     ports = plugged("rotor", speed=1.0)
-    command = [sys.executable, "-m", "acquire", "rotor", "--port", ports.names[0], "--throttle", "0.3"]
+    command = [sys.executable, "-m", "rotorid.acquire", "rotor", "--port", ports.names[0], "--throttle", "0.3"]
     process = subprocess.Popen(
         [*command, "--hold-s", "60", "--rest-s", "0.1", "--out", str(tmp_path), "--id", "run"],
         stdout=subprocess.DEVNULL,
@@ -468,7 +480,7 @@ def test_a_weight_that_never_comes_ends_with_a_sentence(loopback):
 @seen("standard input at its end while Enter is waited for", "the recorder waited for ever")
 def test_standard_input_at_its_end_is_an_answer(plugged, tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "acquire", "bench", "--port", plugged("bench", speed=20.0).names[0]]
+        [sys.executable, "-m", "rotorid.acquire", "bench", "--port", plugged("bench", speed=20.0).names[0]]
         + ["--test", "static", "--out", str(tmp_path), "--id", "run"],
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -532,7 +544,7 @@ def test_metadata_after_a_full_disk_are_those_of_the_log(plugged, recorder_on):
 @pytest.mark.parametrize(("firmware", "port"), [("bench 1.0 (simulated)", "/dev/ttyACM0"), ("bench 1.0", "/dev/pts/3")])
 @seen("a simulated board", "recorded as source: instrument")
 def test_a_simulated_board_is_no_instrument(firmware, port):
-    from acquire.recorder import _source
+    from rotorid.acquire.recorder import _source
 
     assert _source(wire.StartRecord(1, 1, 1, "bench", firmware, "7"), port) == "emulator"
     assert _source(wire.StartRecord(1, 1, 1, "bench", "bench 1.0", "7"), "/dev/ttyACM0") == "instrument"

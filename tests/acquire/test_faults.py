@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquire import procedures
-from acquire.emulators.faults import Faults
-from acquire.errors import (
+from rotorid.acquire import procedures
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.errors import (
     BadName,
     DeviceReset,
     DeviceSilent,
@@ -27,7 +27,7 @@ from acquire.errors import (
     PortMissing,
     Refused,
 )
-from acquire.transport import SerialTransport
+from rotorid.acquire.transport import SerialTransport
 from rotorid.io.logs import read_log
 from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
@@ -347,7 +347,7 @@ def start_recorder(port: str, folder: Path, *more: str) -> subprocess.Popen:
     command = [
         sys.executable,
         "-m",
-        "acquire",
+        "rotorid.acquire",
         "bench",
         "--port",
         port,
@@ -393,7 +393,7 @@ def test_sigkill(plugged, tmp_path):
     assert len(log.table) > 10 and log.missing == 0
     assert log.session.ended == Ended.RECORDING and "killed" in log.session.message
     check = subprocess.run(
-        [sys.executable, "-m", "acquire", "check", str(tmp_path / "run.rlog")], capture_output=True, text=True
+        [sys.executable, "-m", "rotorid.acquire", "check", str(tmp_path / "run.rlog")], capture_output=True, text=True
     )
     assert check.returncode == 0 and "completed now" in check.stdout
     assert read_session(tmp_path / "run.yaml").counts.samples == len(log.table)

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquire import procedures
-from acquire.errors import DeviceFault, Refused
-from acquire.recorder import Timings
+from rotorid.acquire import procedures
+from rotorid.acquire.errors import DeviceFault, Refused
+from rotorid.acquire.recorder import Timings
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended
 from rotorid.io.wire.bench import VOLTS_PER_COUNT

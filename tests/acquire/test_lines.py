@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from acquire.cli import app
-from acquire.clock import SystemClock
-from acquire.errors import BadName, DeviceSilent
-from acquire.lines import record_lines
-from acquire.transport import SerialTransport
+from rotorid.acquire.cli import app
+from rotorid.acquire.clock import SystemClock
+from rotorid.acquire.errors import BadName, DeviceSilent
+from rotorid.acquire.lines import record_lines
+from rotorid.acquire.transport import SerialTransport
 from rotorid.io.lines import Description, DescriptionError, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
 
@@ -115,8 +115,8 @@ def test_a_silent_line_ends_with_a_sentence(line, tmp_path):
     [
         ("name: x\nform: fixed\ncolumns: {a_n: {field: 1}}", "columns.a_n: form `fixed` needs `start` and `stop`"),
         ("name: x\ncolumns: {a_n: {field: Fz}}", "needs `field`, the field's number from 0"),
-        ("name: x\ncolums: {}", "d.yaml: columns: Field required"),
-        ("{", "not YAML"),
+        ("name: x\ncolums: {}", "d.yaml: colums: no such key is known; did you mean columns?"),
+        ("{", "d.yaml, line 1: not valid YAML"),
     ],
 )
 def test_mistakes_in_a_description_get_one_sentence(tmp_path: Path, text, sentence):

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from acquire import procedures
-from acquire.emulators.faults import Faults
-from acquire.log_writer import LogWriter
+from rotorid.acquire import procedures
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.log_writer import LogWriter
 from rotorid.io import rawlog
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import COLUMNS, read_index, write_index
@@ -89,7 +89,7 @@ def test_no_log_at_all(tmp_path):
     path.write_text("time_s,force_x_n\n0,1\n")
     with pytest.raises(NotALog, match="table.rlog: does not begin with"):
         read_log(path)
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(NotALog, match="nothing.rlog: file is missing"):
         read_log(tmp_path / "nothing.rlog")
 
 
@@ -135,14 +135,17 @@ def test_metadata_are_written_atomically(tmp_path, monkeypatch):
     assert path.read_bytes() == before and sorted(p.name for p in tmp_path.iterdir()) == ["a.yaml"]
 
 
+START = "id: a\ninstrument: bench\nstarted: '2024-03-04T09:00:00-06:00'\n"
+
+
 def test_metadata_errors_name_file_and_key(tmp_path):
     path = tmp_path / "a.yaml"
     with pytest.raises(SessionError, match="a.yaml: no such file"):
         read_session(path)
-    path.write_text("id: a\ninstrument: bench\nstarted: x\nhost_start_ns: soon\nlog: a.rlog\n")
-    with pytest.raises(SessionError, match="a.yaml: host_start_ns: Input should be a valid integer"):
+    path.write_text(START + "host_start_ns: soon\nlog: a.rlog\n")
+    with pytest.raises(SessionError, match="a.yaml: host_start_ns: found .soon., expected a whole number"):
         read_session(path)
-    path.write_text("id: a\ninstrument: bench\nstarted: x\nhost_start_ns: 1\nlog: a.rlog\nbatery: 4S\n")
+    path.write_text(START + "host_start_ns: 1\nlog: a.rlog\nbatery: 4S\n")
     with pytest.raises(SessionError, match="batery"):
         read_session(path)
 

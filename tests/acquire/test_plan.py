@@ -12,12 +12,12 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from acquire import procedures
-from acquire.cli import app
-from acquire.errors import AcquireError, LimitExceeded
-from acquire.plan import Plan, PlanError, attempts, is_done, read_plan, steps_of
-from acquire.record import record
-from acquire.run_plan import Desk, check, emulated_ports, run
+from rotorid.acquire import procedures
+from rotorid.acquire.cli import app
+from rotorid.acquire.errors import AcquireError, LimitExceeded
+from rotorid.acquire.plan import Plan, PlanError, attempts, is_done, read_plan, steps_of
+from rotorid.acquire.record import record
+from rotorid.acquire.run_plan import Desk, check, emulated_ports, run
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
 from rotorid.io.session import Ended
@@ -100,7 +100,7 @@ def test_steps_one_by_one_one_skipped_one_again_and_the_index(tmp_path, emulated
 def test_a_campaign_of_twenty_steps_killed_twice(tmp_path):
     """By the command line; what was killed has left its log, and the next start goes on."""
     plan = plan_with(tmp_path, ports={"bench": "/dev/b"})
-    command = [sys.executable, "-m", "acquire", "campaign", str(tmp_path / "plan.yaml"), "--emulate"]
+    command = [sys.executable, "-m", "rotorid.acquire", "campaign", str(tmp_path / "plan.yaml"), "--emulate"]
     command += ["--speed", "50", "--place-s", "0.2"]
     for killed_at in (5, 12):
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -172,14 +172,21 @@ def test_checks_find_a_port_that_is_not_there_and_a_clock_that_is_behind(tmp_pat
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"steps": [GROUP | {"do": "stir"}]}, "plan.yaml: steps.0.do: Input should be 'stream', 'calibrate'"),
-        ({"steps": [GROUP | {"repeat": 3}]}, "plan.yaml: steps.0.repeat: Extra inputs"),
+        ({"steps": [GROUP | {"do": "stir"}]}, "plan.yaml: steps.0.do: found 'stir', expected 'stream', 'calibrate'"),
+        ({"steps": [GROUP | {"repeat": 3}]}, "plan.yaml: steps.0.repeat: no such key is known; did you mean repeats?"),
         ({"steps": [GROUP | {"name": "a"}]}, "two steps are called 'a'"),
         ({"steps": [GROUP | {"name": "{weight}"}]}, "uses 'weight', which is not in `over`"),
         ({"steps": [GROUP | {"name": "../{load_gf}-{repeat}"}]}, "cannot be called"),
         ({"steps": [{"name": "x", "do": "experiment"}]}, "experiment needs a quadrotor, and `ports` has none"),
         ({"ports": {"bensch": "x"}}, "there is no instrument 'bensch'"),
         ({"limits": {"speed": [0, 1]}}, "'speed' is none"),
+        ({"steps": [GROUP | {"settings": {"sample": 5}}]}, "stream has no such setting; did you mean samples?"),
+        (
+            {"steps": [GROUP | {"setup": {"platfrm": "al"}}]},
+            "setup.platfrm: no such key is known; did you mean platform?",
+        ),
+        ({"steps": [GROUP | {"setup": {"cell": True}}]}, "setup.cell: found True, expected a whole number"),
+        ({"steps": [GROUP | {"over": {"load_gf": [1], "waight": [2, 3]}}]}, "over.waight: nothing reads it"),
     ],
 )
 def test_mistakes_in_a_plan_get_one_sentence(tmp_path, change, sentence):

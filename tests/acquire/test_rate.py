@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from acquire import procedures
+from rotorid.acquire import procedures
 from rotorid.io.logs import read_log
 
 

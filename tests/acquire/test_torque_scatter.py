@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquire.campaign import SEED, run_campaign
-from acquire.emulators.truth import draw_truth
+from rotorid.acquire.campaign import SEED, run_campaign
+from rotorid.acquire.emulators.truth import draw_truth
 from rotorid.io.tables import read_tables
 from rotorid.rotor.campaign import torque_points
 

@@ -1,5 +1,7 @@
 """Exports fly like ours: the same rotor speeds in RotorPy and MuJoCo beside our simulation; what is lost is named."""
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -76,3 +78,82 @@ def test_the_exported_file_is_python_and_an_unknown_form_is_told(tmp_path) -> No
     assert scope["quad_params"]["k_d"] == 6e-5
     done = CliRunner().invoke(app, ["export", str(tmp_path / "v.yaml"), "--to", "rotorpi"])
     assert done.exit_code == 1 and "did you mean rotorpy?" in done.output
+
+
+def matrix_of(element, prefix: str = "") -> np.ndarray:
+    """The inertia of an SDF or URDF element, (3, 3)."""
+    get = (lambda k: float(element.findtext(f"i{k}"))) if not prefix else (lambda k: float(element.get(f"i{k}")))
+    return np.array(
+        [[get("xx"), get("xy"), get("xz")], [get("xy"), get("yy"), get("yz")], [get("xz"), get("yz"), get("zz")]]
+    )
+
+
+def numbers(text: str) -> np.ndarray:
+    return np.array([float(x) for x in text.split()])
+
+
+def test_sdf_carries_the_vehicles_mass_and_inertia_once() -> None:
+    vehicle = with_effects(
+        DRAG, OFFSET, PRODUCTS, ("motor_lag", "up and down", {"tau_up": 0.03, "tau_down": 0.05}), FLAP
+    )
+    exported = export_vehicle(vehicle, "sdf")
+    model = ElementTree.fromstring(exported.text).find("model")
+    mass, first, spread = 0.0, np.zeros(3), np.zeros((3, 3))
+    for link in model.findall("link"):
+        inertial = link.find("inertial")
+        place = (
+            numbers(link.findtext("pose", "0 0 0 0 0 0"))[:3] + numbers(inertial.findtext("pose", "0 0 0 0 0 0"))[:3]
+        )
+        own = float(inertial.findtext("mass"))
+        mass, first = mass + own, first + own * place
+        spread += matrix_of(inertial.find("inertia")) + own * (place @ place * np.eye(3) - np.outer(place, place))
+    assert mass == pytest.approx(vehicle.mass_kg)
+    np.testing.assert_allclose(first, 0, atol=1e-9)
+    turned = np.diag([1.0, -1.0, -1.0])
+    products = np.array([[0, 1e-4, 2e-4], [1e-4, 0, -1e-4], [2e-4, -1e-4, 0]])
+    expected = turned @ (vehicle.inertia_kg_m2.matrix() + products) @ turned
+    np.testing.assert_allclose(spread, expected, atol=1e-9)
+    motors = model.findall("plugin")
+    assert [m.findtext("turningDirection") for m in motors] == [r.spin for r in vehicle.rotors]
+    assert float(motors[0].findtext("timeConstantDown")) == 0.05
+    assert float(motors[0].findtext("motorConstant")) == pytest.approx(1.3877e-6)
+    assert float(motors[0].findtext("rotorDragCoefficient")) == 6e-5
+    assert [s.split()[0] for s in exported.left_out] == ["com_offset", "flapping_moment"]
+
+
+@pytest.mark.parametrize("order", ["thesis", "x500"])
+def test_gym_pybullet_drones_makes_our_forces_of_the_same_speeds(order: str) -> None:
+    vehicle = templates.read(order)
+    exported = export_vehicle(vehicle, "gym-pybullet-drones")
+    root = ElementTree.fromstring(exported.text)
+    # Read as that tool reads it: by place in the file.
+    kf, km = float(root[0].get("kf")), float(root[0].get("km"))
+    assert float(root[1][0][1].get("value")) == pytest.approx(vehicle.mass_kg)
+    np.testing.assert_allclose(matrix_of(root[1][0][2], "u"), vehicle.inertia_kg_m2.matrix(), rtol=1e-8)
+    assert float(root[1][2][1][0].get("radius")) > 0
+    places = [
+        numbers(link.find("inertial/origin").get("xyz")) for link in root.findall("link") if "prop" in link.get("name")
+    ]
+    said = next(s for s in exported.left_out if s.startswith("order of the rotors"))
+    rotors = [int(w.strip(",")) - 1 for w in said.split("are rotors ")[1].split(" here")[0].split()]
+    speed = np.array([500.0, 520.0, 480.0, 510.0])
+    rpm = speed[rotors] * 60 / (2 * np.pi)
+    thrust, twist = kf * rpm**2, km * rpm**2 * (-1 if any("RACE" in s for s in exported.left_out) else 1)
+    there = np.sum([np.cross(p, [0, 0, f]) for p, f in zip(places, thrust, strict=True)], axis=0)
+    there[2] += -twist[0] + twist[1] - twist[2] + twist[3]
+    force = vehicle.thrust_coefficients_n_s2() * speed**2
+    ours = np.sum([np.cross(p, [0, 0, -f]) for p, f in zip(vehicle.rotor_positions_m(), force, strict=True)], axis=0)
+    ours[2] += vehicle.yaw_signs() @ (vehicle.torque_coefficients_n_m_s2() * speed**2)
+    np.testing.assert_allclose(there * [1, -1, -1], ours, rtol=1e-6)
+    assert thrust.sum() == pytest.approx(force.sum())
+    # Its own dynamics take rotors 0 and 3 for the front, 0 and 1 for the left.
+    assert [np.sign(p[:2]).tolist() for p in places] == [[1, 1], [-1, 1], [-1, -1], [1, -1]]
+
+
+def test_gym_pybullet_drones_refuses_what_it_cannot_fly() -> None:
+    plus = with_effects().model_copy(
+        update={"rotors": tuple(r.model_copy(update={"y_m": 0.0}) for r in with_effects().rotors)}
+    )
+    for vehicle in (plus, with_effects().model_copy(update={"rotors": with_effects().rotors[:3]})):
+        with pytest.raises(ValueError, match="gym-pybullet-drones"):
+            export_vehicle(vehicle, "gym-pybullet-drones")

@@ -1,6 +1,7 @@
 """A chapter's text: numbers, tables and figures from files, and a stop where one is missing."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,19 @@ def test_a_figure_has_caption_path_and_label(tmp_path: Path, files: dict[str, st
     )
 
 
+def test_a_figure_inside_a_paragraph_stops_the_report(tmp_path: Path, files: dict[str, str]) -> None:
+    text = 'Said before.\n{{ figure("lines", "Lines.", kind="public") }}\n'
+    with pytest.raises(prose.ProseError, match="fig:hover-lines stands inside a paragraph"):
+        rendered(tmp_path, text, files)
+
+
+def test_a_figure_may_move_on_the_page(tmp_path: Path, files: dict[str, str]) -> None:
+    text = '{{ figure("lines", "Lines.", kind="public", moving="lines") }}'
+    assert 'moving="results/report/x/lines.svg"' in rendered(tmp_path, text, files)
+    with pytest.raises(prose.ProseError, match="no figure called film"):
+        rendered(tmp_path, '{{ figure("lines", "Lines.", kind="public", moving="film") }}', files)
+
+
 def test_a_caption_says_first_that_instruments_were_emulated(tmp_path: Path, files: dict[str, str]) -> None:
     path = tmp_path / "hover.md"
     path.write_text('{{ figure("lines", "All lines.", kind="campaign") }}{% if emulated %} Emulated.{% endif %}')
@@ -98,6 +112,23 @@ def test_columns_of_long_text_get_more_room(tmp_path: Path) -> None:
     rows = [{"what": "a" * 60, "n": 1.0}, {"what": "b", "n": 22.0}]
     lines = prose.table_of(rows, "All.", [("what", "What"), ("n", "Number of them", "fix0")], "tbl:x")
     assert lines.splitlines()[1] == f"| :{'-' * 40} | {'-' * 6}: |"
+
+
+def test_no_column_of_a_wide_table_is_narrower_than_its_longest_word() -> None:
+    columns = [
+        ("study", "Recording"),
+        ("found", "What was found there"),
+        ("error", "Measured"),
+        ("rest", "Unexplained"),
+    ]
+    rows = [{"study": "appius-ground-effect", "found": "rotor drag; unequal rotors; " * 4, "error": "0.686 / 0.653 N",
+             "rest": "14 %"}]  # fmt: skip
+    table = prose.table_of(rows, "All.", columns, "tbl:x")
+    shares = [float(share) for share in re.search(r"widths=([\d.,]+)", table)[1].split(",")]
+    assert sum(shares) == pytest.approx(1, abs=0.01)
+    for share, word in zip(shares, ("appius-ground-effect", "unequal", "Measured", "Unexplained"), strict=True):
+        assert share * prose.LINE_PT > prose.LETTER_PT * len(word)
+    assert "widths" not in prose.table_of([{"a": "1"}], "All.", [("a", "A")], "tbl:x")
 
 
 def test_symbols_are_set_as_mathematics() -> None:

@@ -32,6 +32,19 @@ def test_through_the_origin_by_hand() -> None:
     assert fit.offsets_n == ()
 
 
+def test_the_interval_holds_where_fast_points_are_noisier() -> None:
+    """Twenty torque tests whose noise grows with the squared speed, as that of a shaken sensor does."""
+    rng = np.random.default_rng(2)
+    speed = 1575 * (np.arange(1, 21) / 20) ** 0.669
+    noise = 0.0006 + 0.0008 * (speed / 1000) ** 2
+    held = 0
+    for _ in range(1500):
+        low, high = fit_coefficient([points(1.8558e-8 * speed**2 + rng.normal(0, noise), speed)], False).interval_95
+        held += low <= 1.8558e-8 <= high
+    # Three standard errors of a share of 1500; intervals for points of equal noise hold 86 %.
+    assert 0.933 < held / 1500 < 0.967
+
+
 def test_each_run_has_an_offset_of_its_own() -> None:
     runs = [points(1.2e-6 * SPEED**2 - 0.07, run="a"), points(1.2e-6 * SPEED**2 + 0.03, run="b")]
     fit = fit_coefficient(runs, offset=True)

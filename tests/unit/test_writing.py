@@ -1,5 +1,8 @@
 """Files are written together or not at all; numbers to the digits that are not chance."""
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -34,6 +37,80 @@ def test_a_file_that_was_never_written_keeps_the_others_back(tmp_path: Path) -> 
         with all_or_none(one, two) as (first, _):
             first.write_text("1")
     assert not list(tmp_path.iterdir())
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from rotorid import writing
+
+left, folder = int(sys.argv[1]), Path(sys.argv[2])
+
+def one_less(function):
+    def counted(*arguments, **named):
+        global left
+        if left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        left -= 1
+        return function(*arguments, **named)
+    return counted
+
+Path.unlink, os.replace, writing._to_disk = map(one_less, (Path.unlink, os.replace, writing._to_disk))
+with writing.all_or_none(*(folder / name for name in ("verdict", "page", "vehicle"))) as parts:
+    for part in parts:
+        part.write_text("new")
+"""
+
+
+@pytest.mark.parametrize("old", [True, False], ids=["over older files", "for the first time"])
+def test_a_killed_writer_leaves_no_mixture_that_the_first_file_vouches_for(tmp_path: Path, old: bool) -> None:
+    """The process is killed before each of its steps in turn; the next writer leaves a clean folder."""
+    names, outcomes = ("verdict", "page", "vehicle"), set()
+    for steps in range(40):
+        folder = tmp_path / str(steps)
+        folder.mkdir()
+        for name in names if old else ():
+            (folder / name).write_text("old")
+        done = subprocess.run([sys.executable, "-c", KILLED, str(steps), str(folder)], check=False)
+        found = {name: (folder / name).read_text() for name in names if (folder / name).exists()}
+        if "verdict" in found:
+            assert len(found) == 3 and len(set(found.values())) == 1
+            outcomes.add(found["verdict"])
+        else:
+            outcomes.add("none")
+        with all_or_none(*(folder / name for name in names)) as parts:
+            for part in parts:
+                part.write_text("last")
+        assert sorted(p.name for p in folder.iterdir()) == sorted(names)
+        assert {(folder / name).read_text() for name in names} == {"last"}
+        if done.returncode == 0:
+            break
+        assert done.returncode == -signal.SIGKILL
+    assert done.returncode == 0
+    assert outcomes == ({"old", "none", "new"} if old else {"none", "new"})
+
+
+def test_the_part_of_a_living_writer_stays(tmp_path: Path) -> None:
+    with all_or_none(tmp_path / "one") as (part,):
+        part.write_text("mine")
+        with all_or_none(tmp_path / "one") as (other,):
+            assert other == part  # the same process; what matters is that nothing was swept away
+            assert other.read_text() == "mine"
+        part.write_text("mine")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.write_text("old")
+    two.write_text("old")
+    with pytest.raises(OSError, match="No space left"):
+        with all_or_none(one, two) as (first, second):
+            first.write_text("new")
+            second.symlink_to("/dev/full")
+            second.write_text("new")
+    assert (one.read_text(), two.read_text()) == ("old", "old")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["one", "two"]
 
 
 def test_the_twelfth_digit_is_no_difference() -> None:

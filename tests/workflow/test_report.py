@@ -1,5 +1,7 @@
 """The report's own machinery: numbering, references, and both files from one source."""
 
+import base64
+import html
 import re
 from pathlib import Path
 
@@ -93,3 +95,22 @@ def test_what_leads_nowhere_stops_the_report(chapters: list[str], text: str, mes
     Path("bad.md").write_text(text)
     with pytest.raises(typeset.TypesetError, match=message):
         typeset.html(["bad.md"], "Title", "Subtitle", PARTS, "report.html")
+
+
+def test_a_figure_that_moves_stands_still_in_print(chapters: list[str]) -> None:
+    Path("moving.svg").write_text(FIGURE.replace("<rect", "<circle r='4'/><rect"))
+    Path("two.md").write_text(TWO.replace("{#fig:second-box}", '{#fig:second-box moving="moving.svg"}'))
+    typeset.typst_source(chapters, "Title", "Subtitle", PARTS, "report.typ")
+    assert "moving.svg" not in Path("report.typ").read_text()
+    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    page = Path("report.html").read_text()
+    assert "moving=" not in page
+    assert base64.b64encode(Path("moving.svg").read_bytes()).decode() in page or "circle" in page
+
+
+def test_nothing_is_fetched_and_no_script_runs_in_the_html(chapters: list[str]) -> None:
+    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    page = Path("report.html").read_text()
+    policy = html.unescape(re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', page)[1])
+    assert "default-src 'none'" in policy and "script" not in policy
+    assert "<script" not in page

@@ -1,6 +1,6 @@
 """What every rule must have, read from the rule files; and what every chapter must."""
 
-import fnmatch
+import importlib.util
 import json
 import re
 import textwrap
@@ -29,6 +29,16 @@ def rules() -> dict[str, str]:
     return found
 
 
+def site():
+    """The hook that makes the site's pages."""
+    spec = importlib.util.spec_from_file_location("site_hook", ROOT / "docs" / "hooks" / "site.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+SITE = site()
+DESCRIBED = SITE.described()
 RULES = rules()
 WORKING = {name: text for name, text in RULES.items() if "script:" in text}
 CHAPTERS = yaml.safe_load((ROOT / "config.yaml").read_text())["report"]["chapters"]
@@ -71,16 +81,19 @@ def test_only_provenance_takes_the_whole_configuration(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", WORKING)
-def test_every_result_has_its_line_in_the_readme(name: str) -> None:
-    listed = [
-        re.sub(r"<\w+>", "*", entry)
-        for entry in re.findall(r"^\| `(results/[^`]+)`", (ROOT / "README.md").read_text(), re.MULTILINE)
-    ]
+def test_every_result_is_described(name: str) -> None:
     block = re.search(r"^    output:\n((?:        .*\n)+)", WORKING[name], flags=re.MULTILINE)
     assert block, "every rule makes something"
     for output in re.findall(r'"(results/[^"]+)"', block[1]):
-        flat = re.sub(r"\{\w+\}", "x", output)
-        assert any(fnmatch.fnmatch(flat, entry) for entry in listed), f"README does not list {output}"
+        assert SITE.entry_of(output, DESCRIBED), f"workflow/results.yaml does not describe {output}"
+
+
+def test_nothing_is_described_that_no_rule_makes_and_the_page_lists_all() -> None:
+    made = {
+        SITE.entry_of(o, DESCRIBED) for rules in SITE.results().values() for _, _, outputs in rules for o in outputs
+    }
+    page = SITE.results_page()
+    assert [entry for entry in DESCRIBED if entry not in made and f"`{entry}`" not in page] == []
 
 
 def test_every_script_belongs_to_a_rule() -> None:

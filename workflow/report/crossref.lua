@@ -151,6 +151,11 @@ local resolve = {
     return out
   end,
   Image = function(image)
+    -- A figure that moves on the page stands still in the PDF.
+    if image.attributes.moving and not is_typst then
+      image.src = image.attributes.moving
+    end
+    image.attributes.moving = nil
     if is_typst and not image.src:match("^/") then
       image.src = "/" .. image.src
     end

@@ -1,4 +1,10 @@
-"""Tables of the report's appendix."""
+"""Tables of the report's appendix, and the graph of its rules."""
+
+
+def rules_of_report(wildcards):
+    """Which rule's files are read by which, on the way to the report."""
+    return rules_behind(rules.typeset_pdf.output.pdf, rules.build_html.output.html)
+
 
 APPENDIX_SECTIONS = ["filter", "bench", "stand", "rotor", "residuals", "simulation", "grey_box", "black_box"]
 
@@ -21,8 +27,15 @@ rule chapter_appendix:
         experiments="results/report/appendix/experiments.csv",
         settings="results/report/appendix/settings.csv",
         hashes="results/report/appendix/hashes.csv",
+        rule_graph=report(
+            "results/report/appendix/rule_graph.svg",
+            category="Appendix",
+            caption="../report/captions/appendix.rst",
+            labels={"figure": "rule graph"},
+        ),
     params:
         config={name: getattr(CONFIG, name).model_dump() for name in APPENDIX_SECTIONS},
+        steps=rules_of_report,
         code=code_of("tabulate_appendix"),
     log:
         "results/logs/chapter_appendix.log",

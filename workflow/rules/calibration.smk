@@ -29,8 +29,18 @@ rule chapter_loadcell:
         readings="raw/thesis/table_2_7.csv",
         calibration=rules.calibrate_load_cells.output.coefficients,
     output:
-        lines="results/report/loadcell/lines.svg",
-        printed="results/report/loadcell/printed.svg",
+        lines=report(
+            "results/report/loadcell/lines.svg",
+            category="Load cells",
+            caption="../report/captions/loadcell.rst",
+            labels={"figure": "lines"},
+        ),
+        printed=report(
+            "results/report/loadcell/printed.svg",
+            category="Load cells",
+            caption="../report/captions/loadcell.rst",
+            labels={"figure": "printed"},
+        ),
         coefficients="results/report/loadcell/coefficients.csv",
     params:
         code=code_of_chapter("loadcell"),

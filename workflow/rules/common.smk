@@ -42,5 +42,20 @@ def results_behind(*files):
     return sorted(found)
 
 
+def rules_behind(*files):
+    """Pairs of rules, the one that makes a file and the one that reads it, on the way to these files."""
+    found, seen, waiting = set(), set(), [(path, None) for path in files]
+    while waiting:
+        path, reader = waiting.pop()
+        for producer in (known for known in workflow.rules if known.is_producer(path)):
+            if reader not in (None, producer.name):
+                found.add((producer.name, reader))
+            if path not in seen:
+                seen.add(path)
+                inputs, *_ = producer.expand_input(producer.get_wildcards(path))
+                waiting += [(str(file), producer.name) for file in inputs if str(file).startswith("results/")]
+    return sorted(found)
+
+
 wildcard_constraints:
     chapter="[a-z][a-z0-9_]*",

@@ -51,9 +51,24 @@ rule chapter_mismatch:
         locations=rules.judge_examples.output.locations,
         traces=rules.judge_examples.output.traces,
     output:
-        real_error="results/report/mismatch/real_error.svg",
-        real_channels="results/report/mismatch/real_channels.svg",
-        bench_error="results/report/mismatch/bench_error.svg",
+        real_error=report(
+            "results/report/mismatch/real_error.svg",
+            category="Mismatch",
+            caption="../report/captions/mismatch.rst",
+            labels={"figure": "real error"},
+        ),
+        real_channels=report(
+            "results/report/mismatch/real_channels.svg",
+            category="Mismatch",
+            caption="../report/captions/mismatch.rst",
+            labels={"figure": "real channels"},
+        ),
+        bench_error=report(
+            "results/report/mismatch/bench_error.svg",
+            category="Mismatch",
+            caption="../report/captions/mismatch.rst",
+            labels={"figure": "bench error"},
+        ),
         verdicts="results/report/mismatch/verdicts.csv",
         real_effects="results/report/mismatch/real_effects.csv",
         bench_effects="results/report/mismatch/bench_effects.csv",

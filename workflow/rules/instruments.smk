@@ -10,10 +10,30 @@ rule chapter_instruments:
         geometry=BENCH_GEOMETRY,
         vehicle=THESIS_VEHICLE,
     output:
-        signal_chain="results/report/instruments/signal_chain.svg",
-        bench="results/report/instruments/bench.svg",
-        vehicle_figure="results/report/instruments/vehicle.svg",
-        stand="results/report/instruments/stand.svg",
+        signal_chain=report(
+            "results/report/instruments/signal_chain.svg",
+            category="Instruments",
+            caption="../report/captions/instruments.rst",
+            labels={"figure": "signal chain"},
+        ),
+        bench=report(
+            "results/report/instruments/bench.svg",
+            category="Instruments",
+            caption="../report/captions/instruments.rst",
+            labels={"figure": "bench"},
+        ),
+        vehicle_figure=report(
+            "results/report/instruments/vehicle.svg",
+            category="Instruments",
+            caption="../report/captions/instruments.rst",
+            labels={"figure": "vehicle"},
+        ),
+        stand=report(
+            "results/report/instruments/stand.svg",
+            category="Instruments",
+            caption="../report/captions/instruments.rst",
+            labels={"figure": "stand"},
+        ),
     params:
         code=code_of_chapter("instruments"),
     log:

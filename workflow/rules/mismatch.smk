@@ -1,5 +1,11 @@
 """Where a simulation and recordings part, why, and a better model: `results/mismatch/<set>/verdict.json`."""
 
+import json
+import sys
+import time
+
+STARTED = time.time()
+
 
 def set_folder(name):
     """Folder of a set: below `recordings`, else among those made of the campaign or of public recordings."""
@@ -44,6 +50,7 @@ rule mismatch:
         ledger="results/mismatch/{set}/ledger.json",
     params:
         folder=set_folder_of,
+        off=CONFIG.rules.off,
         code=code_of("mismatch"),
     log:
         "results/logs/mismatch/{set}.log",
@@ -53,3 +60,12 @@ rule mismatch:
         set="[^/]+",
     script:
         "../scripts/mismatch.py"
+
+
+def say_verdicts():
+    """Print the sentence of each verdict that this run made."""
+    for path in sorted(Path("results/mismatch").glob("*/verdict.json")):
+        if path.stat().st_mtime >= STARTED:
+            verdict = json.loads(path.read_text(encoding="utf-8"))
+            page = path.with_name("report.html")
+            print(f"\n{verdict['set']}: {verdict['sentence']}\n{page}", file=sys.stderr)

@@ -35,8 +35,18 @@ rule chapter_neurobem:
         bins=rules.neurobem_residuals.output.bins,
         points=rules.neurobem_residuals.output.points,
     output:
-        airspeed="results/report/neurobem/airspeed.svg",
-        rmse="results/report/neurobem/rmse.svg",
+        airspeed=report(
+            "results/report/neurobem/airspeed.svg",
+            category="Fast flight",
+            caption="../report/captions/neurobem.rst",
+            labels={"figure": "airspeed"},
+        ),
+        rmse=report(
+            "results/report/neurobem/rmse.svg",
+            category="Fast flight",
+            caption="../report/captions/neurobem.rst",
+            labels={"figure": "rmse"},
+        ),
         by_flight="results/report/neurobem/by_flight.csv",
     params:
         code=code_of_chapter("neurobem"),

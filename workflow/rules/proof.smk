@@ -150,6 +150,25 @@ rule tabulate_real:
         "../scripts/tabulate_real.py"
 
 
+rule prove_next_flight:
+    """Open questions, the flight planned for each, and what both sets together say: slow, on request."""
+    message:
+        "Proof: the next flight"
+    input:
+        limits="workflow/proof_room.yaml",
+    output:
+        table="results/proof/next_flight.csv",
+        summary="results/proof/next_flight_summary.csv",
+    params:
+        so_far="results/next_flight/rows.csv",
+        concealing=[CODE.of(path) for path in CONCEALING],
+        code=code_of("prove_next_flight"),
+    log:
+        "results/logs/prove_next_flight.log",
+    script:
+        "../scripts/prove_next_flight.py"
+
+
 rule draw_proof:
     """Figures of the proof beside its tables."""
     message:
@@ -190,11 +209,36 @@ rule chapter_proof:
         real=f"{CONFIG.proof.tables}/real.csv",
         coefficients=f"{CONFIG.proof.tables}/coefficients.csv",
     output:
-        targets="results/report/proof/targets.svg",
-        confusion_figure="results/report/proof/confusion.svg",
-        instruments_figure="results/report/proof/instruments.svg",
-        power_figure="results/report/proof/power.svg",
-        oracle="results/report/proof/oracle.svg",
+        targets=report(
+            "results/report/proof/targets.svg",
+            category="Proof",
+            caption="../report/captions/proof.rst",
+            labels={"figure": "targets"},
+        ),
+        confusion_figure=report(
+            "results/report/proof/confusion.svg",
+            category="Proof",
+            caption="../report/captions/proof.rst",
+            labels={"figure": "confusion"},
+        ),
+        instruments_figure=report(
+            "results/report/proof/instruments.svg",
+            category="Proof",
+            caption="../report/captions/proof.rst",
+            labels={"figure": "instruments"},
+        ),
+        power_figure=report(
+            "results/report/proof/power.svg",
+            category="Proof",
+            caption="../report/captions/proof.rst",
+            labels={"figure": "power"},
+        ),
+        oracle=report(
+            "results/report/proof/oracle.svg",
+            category="Proof",
+            caption="../report/captions/proof.rst",
+            labels={"figure": "oracle"},
+        ),
         rows="results/report/proof/rows.csv",
         others="results/report/proof/others.csv",
         methods="results/report/proof/methods.csv",

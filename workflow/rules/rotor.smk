@@ -31,8 +31,18 @@ rule chapter_rotor_coefficients:
         motors=rules.fit_rotor_coefficients.output.motors,
         points=rules.fit_rotor_coefficients.output.points,
     output:
-        apparent="results/report/rotor_coefficients/apparent.svg",
-        by_motor="results/report/rotor_coefficients/by_motor.svg",
+        apparent=report(
+            "results/report/rotor_coefficients/apparent.svg",
+            category="Thrust coefficients",
+            caption="../report/captions/rotor_coefficients.rst",
+            labels={"figure": "apparent"},
+        ),
+        by_motor=report(
+            "results/report/rotor_coefficients/by_motor.svg",
+            category="Thrust coefficients",
+            caption="../report/captions/rotor_coefficients.rst",
+            labels={"figure": "by motor"},
+        ),
         pooled="results/report/rotor_coefficients/pooled.csv",
     params:
         code=code_of_chapter("rotor_coefficients"),

@@ -84,11 +84,36 @@ rule chapter_stand:
         thrust=rules.fit_white_box.output.thrust,
         torque=rules.fit_white_box.output.torque,
     output:
-        clocks="results/report/stand/clocks.svg",
-        experiment="results/report/stand/experiment.svg",
-        steady="results/report/stand/steady.svg",
-        weight_figure="results/report/stand/weight_figure.svg",
-        characteristics="results/report/stand/characteristics.svg",
+        clocks=report(
+            "results/report/stand/clocks.svg",
+            category="Stand",
+            caption="../report/captions/stand.rst",
+            labels={"figure": "clocks"},
+        ),
+        experiment=report(
+            "results/report/stand/experiment.svg",
+            category="Stand",
+            caption="../report/captions/stand.rst",
+            labels={"figure": "experiment"},
+        ),
+        steady=report(
+            "results/report/stand/steady.svg",
+            category="Stand",
+            caption="../report/captions/stand.rst",
+            labels={"figure": "steady"},
+        ),
+        weight_figure=report(
+            "results/report/stand/weight_figure.svg",
+            category="Stand",
+            caption="../report/captions/stand.rst",
+            labels={"figure": "weight"},
+        ),
+        characteristics=report(
+            "results/report/stand/characteristics.svg",
+            category="Stand",
+            caption="../report/captions/stand.rst",
+            labels={"figure": "characteristics"},
+        ),
         means="results/report/stand/means.csv",
         parameters="results/report/stand/parameters.csv",
     params:

@@ -68,10 +68,31 @@ rule chapter_white_box:
         flight=rules.simulate_attitude.output.flight,
         summary=rules.simulate_attitude.output.summary,
     output:
-        rotor="results/report/white_box/rotor.svg",
-        attitude="results/report/white_box/attitude.svg",
-        motion="results/report/white_box/motion.svg",
-        view="results/report/white_box/view.svg",
+        rotor=report(
+            "results/report/white_box/rotor.svg",
+            category="White box",
+            caption="../report/captions/white_box.rst",
+            labels={"figure": "rotor"},
+        ),
+        attitude=report(
+            "results/report/white_box/attitude.svg",
+            category="White box",
+            caption="../report/captions/white_box.rst",
+            labels={"figure": "attitude"},
+        ),
+        motion=report(
+            "results/report/white_box/motion.svg",
+            category="White box",
+            caption="../report/captions/white_box.rst",
+            labels={"figure": "motion"},
+        ),
+        view=report(
+            "results/report/white_box/view.svg",
+            category="White box",
+            caption="../report/captions/white_box.rst",
+            labels={"figure": "view"},
+        ),
+        moving="results/report/white_box/moving.svg",
     params:
         code=code_of_chapter("white_box"),
     log:

@@ -45,7 +45,7 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "thesis": believed,
         "difference": plain.value / believed - 1,
         "standard_errors_off": (plain.value - believed) / plain.standard_error,
-        "p_value": float(2 * student_t.sf(abs(plain.value - believed) / plain.standard_error, plain.points - 1)),
+        "p_value": float(2 * student_t.sf(abs(plain.value - believed) / plain.standard_error, plain.freedom)),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
     }
 

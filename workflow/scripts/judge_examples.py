@@ -21,6 +21,7 @@ from rotorid.mismatch.deliver import analysis_of, write_files
 from rotorid.recordings import RecordingSet, Run, read_set
 
 SHOWN_HZ = 50.0
+OTHER_MODEL = "neurobem_"
 INSTRUMENT = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 
 
@@ -29,6 +30,8 @@ def piece(recordings: RecordingSet, flights: Sequence[str], start_s: float, stop
     runs = []
     for name in flights:
         table = recordings.run(name).table
+        # What another model predicts is no property of the flight: a mismatch is not to be located by it.
+        table = table[[column for column in table.columns if not column.startswith(OTHER_MODEL)]]
         since = table["time_s"] - table["time_s"].iloc[0]
         runs.append(Run(name, table[since.between(start_s, stop_s)].iloc[::every].reset_index(drop=True)))
     return RecordingSet(recordings.name, recordings.vehicle, tuple(runs), (flights[-1],))

@@ -14,9 +14,9 @@ from rotorid.mismatch.deliver import deliver
 from rotorid.recordings import read_set
 
 
-def main(folder: str, verdict: str, page: str, improved: str) -> None:
-    """Analyse the set in `folder` and write the three files."""
-    deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), progress=report_progress)
+def main(folder: str, verdict: str, page: str, improved: str, off: list[str]) -> None:
+    """Analyse the set in `folder`, without the rules named in `off`, and write the three files."""
+    deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), report_progress, off)
 
 
 def report_progress(text: str) -> None:
@@ -32,6 +32,7 @@ if __name__ == "__main__":
                 verdict=snakemake.output.verdict,
                 page=snakemake.output.page,
                 improved=snakemake.output.improved,
+                off=snakemake.params.off,
             )
         except InputError as error:
             sys.exit(f"rotorid: {error}")

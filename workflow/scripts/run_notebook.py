@@ -17,6 +17,8 @@ from traitlets.config import Config
 from rotorid import log
 
 LOGGER = logging.getLogger("rotorid.notebook")
+PATIENCE_S = 600
+"""A kernel may take long to start where the machine is busy."""
 
 
 def main(notebook: str, parameters: Mapping[str, Any], outputs: Mapping[str, str], executed: str) -> None:
@@ -44,6 +46,7 @@ def main(notebook: str, parameters: Mapping[str, Any], outputs: Mapping[str, str
             cwd=Path(notebook).parent,
             progress_bar=False,
             log_output=True,
+            start_timeout=PATIENCE_S,
             config=Config({"KernelManager": {"transport": "ipc", "ip": f"{sockets}/kernel"}}),
         )
     missing = [path for path in outputs.values() if not Path(path).is_file()]

@@ -1,4 +1,4 @@
-"""Tables of the report's appendix: settings, controller, excitation of the experiments, what was read.
+"""Tables of the report's appendix: settings, controller, excitation of the experiments, what was read; graph of rules.
 
 - Gains and references of the attitude controller, as the code holds them.
 - Amplitudes and frequencies of the experiments on the stand (table A.1 of the thesis).
@@ -16,6 +16,8 @@ from rotorid import log
 from rotorid.control.pid import THESIS_GAINS
 from rotorid.control.references import AttitudeReference, training_reference, validation_reference
 from rotorid.io.experiments import EXPERIMENTS
+from rotorid.plots import style
+from rotorid.plots.rule_graph import rule_graph
 from rotorid.provenance import sha256
 
 AXES = ("roll", "pitch", "yaw")
@@ -80,8 +82,13 @@ def settings(config: Mapping[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def main(config: Mapping[str, Any], read: Sequence[str], out: Mapping[str, str]) -> None:
-    """Write the tables (CSV); `read` are the files whose hashes are given."""
+def main(
+    config: Mapping[str, Any], read: Sequence[str], steps: Sequence[Sequence[str]], out: Mapping[str, str]
+) -> None:
+    """Write the tables (CSV) and the graph (SVG).
+
+    `read` are the files whose hashes are given, `steps` pairs of a rule and one that reads its files.
+    """
     gains().to_csv(out["gains"], index=False)
     references = reference_rows(training_reference()) + reference_rows(validation_reference())
     pd.DataFrame(references).to_csv(out["references"], index=False, float_format="%.4g")
@@ -89,6 +96,7 @@ def main(config: Mapping[str, Any], read: Sequence[str], out: Mapping[str, str])
     settings(config).to_csv(out["settings"], index=False)
     hashes = [{"file": path, "sha256": sha256(Path(path))[:16]} for path in read]
     pd.DataFrame(hashes).to_csv(out["hashes"], index=False)
+    style.save(rule_graph([(a, b) for a, b in steps]), out["rule_graph"])
 
 
 if __name__ == "__main__":
@@ -96,5 +104,6 @@ if __name__ == "__main__":
         main(
             config=dict(snakemake.params.config),
             read=list(snakemake.input),
+            steps=list(snakemake.params.steps),
             out=dict(snakemake.output.items()),
         )

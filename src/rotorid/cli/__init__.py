@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import checking, effects, exporting, importing, simulating, starting, verdicts
+from rotorid.cli import checking, effects, exporting, importing, planning, simulating, starting, verdicts
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -44,6 +44,8 @@ def main(
 
 
 app.command("verdict")(verdicts.verdict)
+app.command("plan")(planning.plan)
+app.command("together")(planning.together)
 app.command("import")(importing.import_logs)
 app.command("init")(starting.init)
 app.command("check")(checking.check)

@@ -93,70 +93,13 @@ def make_set(
     as_csv: bool = False,
 ) -> Made:
     """Write the set `folder` of logs of one vehicle; a `vehicle.yaml` that is there already stays."""
-    from rotorid import templates
-    from rotorid.importers.logfile import TEMPLATES, read_log
     from rotorid.importers.mapping import read_mapping
-    from rotorid.importers.obtain import sha256
-    from rotorid.importers.propose import propose
-    from rotorid.importers.report import ImportReport
-    from rotorid.recordings import read_vehicle
+    from rotorid.importers.set_of_logs import set_of_logs
 
     mapping = read_mapping(mapping_file) if mapping_file else None
-    found = [read_log(path, mapping) for path in logs]
-    kinds = {f.kind for f in found}
-    if len(kinds) > 1:
-        raise InputError(f"the logs are of different kinds ({', '.join(sorted(kinds))}); import each kind by itself")
-    runs: dict[str, object] = {}
-    for path, imported in zip(logs, found, strict=True):
-        for name, table in imported.runs.items():
-            if name in runs:
-                raise InputError(f"{path}: another log has a run called {name}, too; rename one of the files")
-            runs[name] = table
-    there = folder / "vehicle.yaml"
-    remarks: tuple[str, ...] = ()
-    kept = False
-    if vehicle_file is not None:
-        read_vehicle(vehicle_file)
-        text = vehicle_file.read_text(encoding="utf-8")
-    elif there.is_file() and mass_kg is None and like is None:
-        read_vehicle(there)
-        text, kept = there.read_text(encoding="utf-8"), True
-    else:
-        if kinds != {"flight"}:
-            raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
-        name = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
-        if found[0].format == "neurobem":
-            name = like or "neurobem"
-        if name is None:
-            raise InputError(
-                f"{logs[0]}: nothing tells what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
-                f"{', '.join(templates.names())} and --mass-kg"
-            )
-        proposal = propose(folder.name, list(runs.values()), found[0].known, templates.read(name), name, mass_kg)
-        text, remarks = proposal.text, proposal.remarks
-        if there.is_file() and there.read_text(encoding="utf-8") != text:
-            raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
-    folder.mkdir(parents=True, exist_ok=True)
-    if not kept:
-        there.write_text(text, encoding="utf-8")
-    for name, table in runs.items():
-        if as_csv:
-            table.to_csv(folder / f"{name}.csv", index=False)
-        else:
-            table.to_parquet(folder / f"{name}.parquet", index=False)
-    faults = tuple(dict.fromkeys(f for i in found for f in i.faults))
-    ImportReport(
-        folder.name,
-        True,
-        source=", ".join(path.name for path in logs),
-        licence="",
-        citation="",
-        files={path.name: sha256(path) for path in logs},
-        axes=found[0].axes,
-        faults=faults,
-        notes=remarks,
-    ).write(folder)
-    return Made(folder, remarks, tuple(f.sentence for f in faults), kept)
+    found = set_of_logs(logs, folder.name, mass_kg, like, vehicle_file, mapping, folder / "vehicle.yaml")
+    found.write(folder, as_csv)
+    return Made(folder, found.remarks, found.sentences, found.kept_vehicle)
 
 
 def tell(made: Made) -> None:

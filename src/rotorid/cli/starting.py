@@ -19,11 +19,18 @@ def init(
     like: Annotated[str | None, typer.Option("--like", help="Template vehicle; asked for where it is missing.")] = None,
     mass_kg: MassKg = None,
     name: Annotated[str | None, typer.Option(help="What the vehicle is called.")] = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Write a small set with two simulated flights to try things on.")
+    ] = False,
     listing: Annotated[bool, typer.Option("--list", help="List the template vehicles and leave.")] = False,
 ) -> None:
     """Write a commented `vehicle.yaml` from a template vehicle.
 
-    Example: `rotorid init flights --like five-inch --mass-kg 0.71`
+    Examples:
+
+    `rotorid init flights --like five-inch --mass-kg 0.71`
+
+    `rotorid init flights --example`, a set to try things on
     """
     from rotorid import templates
 
@@ -32,6 +39,12 @@ def init(
             for known in templates.names():
                 vehicle = templates.read(known)
                 typer.echo(f"{known:24} {vehicle.name}, {vehicle.mass_kg:g} kg")
+            return
+        if example:
+            from rotorid import examples
+
+            written = examples.write(folder)
+            typer.echo(f"{folder}: {', '.join(p.name for p in written)}. Next: `rotorid verdict {folder}`")
             return
         path = folder / "vehicle.yaml"
         if path.exists():

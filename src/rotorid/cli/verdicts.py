@@ -26,6 +26,9 @@ def verdict(
     like: Like = None,
     vehicle: VehicleFile = None,
     mapping: MappingFile = None,
+    series: Annotated[
+        bool, typer.Option("--series", help="Also write series.parquet: recorded minus simulated, for PlotJuggler.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print verdict.json on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
@@ -54,7 +57,7 @@ def verdict(
             folder = made.folder
             if not quiet and not as_json:
                 tell(made)
-        text = deliver_set(folder, target, quiet)
+        text = deliver_set(folder, target, quiet, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)
             return
@@ -65,12 +68,15 @@ def verdict(
         )
 
 
-def deliver_set(folder: Path, target: Path, quiet: bool) -> str:
-    """Analyse the set in `folder`, write the files into `target`, and return the verdict's sentence."""
+def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -> str:
+    """Analyse the set in `folder`, write the files into `target`, and return the verdict's sentence.
+
+    With `series` the residuals are written, too, as `series.parquet`.
+    """
     with progress(None, quiet) as step:
         step(f"reading {folder.name}")
         # The effects bring a compiler along, whose start takes seconds.
-        from rotorid.mismatch.deliver import deliver
+        from rotorid.mismatch.deliver import analysis_of, write_files
         from rotorid.recordings import read_set
 
         recordings = read_set(folder)
@@ -80,8 +86,15 @@ def deliver_set(folder: Path, target: Path, quiet: bool) -> str:
     # What a module warns of goes to no log here; the verdict itself says what a reader must know.
     with progress(expected, quiet) as step, warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        step(f"{recordings.name}: analysing {len(recordings.runs)} runs")
+        analysis = analysis_of(recordings)
         # The last step told is the verdict's own sentence, which the caller prints.
-        return deliver(recordings, *files, progress=lambda text: None if text.endswith(".") else step(text)).sentence
+        verdict = write_files(analysis, *files, progress=lambda text: None if text.endswith(".") else step(text))
+        if series:
+            from rotorid.result import residuals_of
+
+            residuals_of(analysis).to_parquet(target / "series.parquet", index=False)
+        return verdict.sentence
 
 
 def _no_vehicle(folder: Path) -> str:

@@ -10,7 +10,7 @@ rates are integrals of moment over inertia.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from rotorid.control.pid import AttitudePid, Gains
 from rotorid.control.references import AttitudeReference
 from rotorid.estimate.inertial import regressors, weights_of_inertias
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 
 HOLD_GAINS = Gains((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
@@ -197,3 +198,9 @@ class ExcitedHold:
         square = self._pid.rotor_command(time_s, euler_rad) ** 2
         square = square + self._multisine.moment(np.array([time_s])) @ self._allocation[:, 1:].T
         return np.clip(np.sqrt(np.maximum(square, 0.0)), *self._limits)
+
+    def attitude_loop(self, time_s: np.ndarray) -> AttitudeLoop | None:
+        """As of the attitude controller, with the excitation's squared speeds added."""
+        hold = self._pid.attitude_loop(time_s)
+        more = self._multisine.moment(time_s) @ self._allocation[:, 1:].T
+        return None if hold is None else replace(hold, more=more, limits_rad_s=self._limits)

@@ -8,6 +8,7 @@ import numpy as np
 
 from rotorid.control.references import AttitudeReference
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.mixer import allocation_matrix
 
 
@@ -105,3 +106,16 @@ class AttitudePid:
         self._time_s = time_s
         wanted = np.concatenate([np.full((len(error), 1), self.reference.thrust_n), moment], axis=1)
         return np.sqrt(np.maximum(wanted @ self._allocation, 0.0))
+
+    def attitude_loop(self, time_s: np.ndarray) -> AttitudeLoop | None:
+        """The controller laid out for instants (m,), s, so that it flies compiled; None once it has been called."""
+        if self._memory is not None:
+            return None
+        angles = np.array([np.asarray(self.reference.euler_rad(t), float) for t in time_s])
+        return AttitudeLoop(
+            *(np.asarray(g) for g in (self.gains.proportional, self.gains.integral, self.gains.derivative)),
+            allocation=self._allocation.T,
+            reference=np.column_stack([angles, np.full(len(time_s), self.reference.thrust_n)]),
+            derivative_time_s=self.derivative_time_s,
+            limit_n_m=self.limit_n_m,
+        )

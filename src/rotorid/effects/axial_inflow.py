@@ -29,6 +29,19 @@ def independent_of_speed(motion, vehicle, values):
     return Contribution(force=force)
 
 
+def kernel_at_the_hubs(m, v, p, w):
+    for i in range(v.rotors):
+        w.hub_force[i, 2] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 2]
+
+
+def kernel_at_the_centre(m, v, p, w):
+    w.force[2] -= p[0] * m.rotor_speed_sum * m.air_velocity[2]
+
+
+def kernel_independent_of_speed(m, v, p, w):
+    w.force[2] -= p[0] * m.air_velocity[2]
+
+
 def forms(vehicle):
     size = scale(vehicle)
     k_z = Parameter(
@@ -41,9 +54,23 @@ def forms(vehicle):
     d_z = Parameter("d_z", "N s/m", 0.0, size.drag_per_speed, meaning="thrust lost per climb speed")
     needs = ("velocity", "rotor_speed")
     return (
-        Form("at the hubs", "T_i −= k_z ω_i v_z,i (climbing)", (k_z,), at_the_hubs, needs),
-        Form("at the centre of mass", "T −= k_z Σω v_z (climbing)", (k_z,), at_the_centre, needs),
-        Form("independent of rotor speed", "F_z = −d_z v_z", (d_z,), independent_of_speed, ("velocity",)),
+        Form("at the hubs", "T_i −= k_z ω_i v_z,i (climbing)", (k_z,), at_the_hubs, needs, kernel=kernel_at_the_hubs),
+        Form(
+            "at the centre of mass",
+            "T −= k_z Σω v_z (climbing)",
+            (k_z,),
+            at_the_centre,
+            needs,
+            kernel=kernel_at_the_centre,
+        ),
+        Form(
+            "independent of rotor speed",
+            "F_z = −d_z v_z",
+            (d_z,),
+            independent_of_speed,
+            ("velocity",),
+            kernel=kernel_independent_of_speed,
+        ),
     )
 
 

@@ -23,15 +23,37 @@ def with_lever_arm(motion, vehicle, values):
     return Contribution(moment=moment_only(motion, vehicle, values).moment, specific_force=shift)
 
 
+def kernel(m, v, p, w):
+    for i in range(v.rotors):
+        w.moment[0] += p[1] * m.thrust[i]
+        w.moment[1] -= p[0] * m.thrust[i]
+
+
 def forms(vehicle):
     space = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xyz")
     plane, text = space[:2], "M = −r_c × F_thrust"
     read_too = text + ", a_m = a + dΩ × (−r_c) + Ω × (Ω × (−r_c))"
     needs = ("rotor_speed", "angular_velocity", "angular_acceleration", "accelerometer")
     return (
-        Form("moment", text, plane, moment_only, ("rotor_speed", "angular_velocity"), excited_by=("rotor_speed",)),
-        Form("moment and accelerometer", read_too, plane, with_lever_arm, needs),
-        Form("moment and accelerometer, in space", read_too, space, with_lever_arm, needs, must_show=(0, 1)),
+        Form(
+            "moment",
+            text,
+            plane,
+            moment_only,
+            ("rotor_speed", "angular_velocity"),
+            excited_by=("rotor_speed",),
+            kernel=kernel,
+        ),
+        Form("moment and accelerometer", read_too, plane, with_lever_arm, needs, kernel=kernel),
+        Form(
+            "moment and accelerometer, in space",
+            read_too,
+            space,
+            with_lever_arm,
+            needs,
+            must_show=(0, 1),
+            kernel=kernel,
+        ),
     )
 
 

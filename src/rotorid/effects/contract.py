@@ -130,6 +130,9 @@ class Parameter:
 
 
 Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]
+Kernel = Callable[..., None]
+"""`kernel(m, v, p, w)`: adds to `w` (fields of `rotorid.vehicle.kernels.ADDED`) what a form does at the instant `m`
+(`INSTANT`) to the vehicle `v` (`BODY`) with the values `p`. Arithmetic and `math` alone: numba compiles it."""
 Residuals = Sequence[tuple[Motion, dict[str, np.ndarray]]]
 """Motions of a recording, each with the `force` and `moment` that are not explained, (n, 3) in body axes."""
 
@@ -171,6 +174,12 @@ class Form:
     takes_up: tuple[str, ...] = ()
     """Believed values (keys of the regression) that the form has a part of its own for: beside it their trust is no
     room to move in, or the two would share one slope."""
+
+    kernel: Kernel | None = None
+    """The same force and moment at one instant, as a plain function that the simulator compiles (`Kernel`); None where
+    the form adds neither, or needs the past. A form without it is simulated by its array code."""
+    kernel_values: Callable[[np.ndarray], Sequence[float]] | None = None
+    """What the kernel takes for its values, from the form's parameter values; None for these themselves."""
 
     def stated(self, fitted: np.ndarray) -> np.ndarray:
         """The linear parameters as their equation has them, from the coefficients fitted to recordings, each (k,)."""

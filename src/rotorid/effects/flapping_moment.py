@@ -30,6 +30,23 @@ def rolling(motion, vehicle, values):
     return Contribution(moment=-values[0] * _weighted_airspeed(motion, vehicle) * (1.0 - E3))
 
 
+def kernel_hub_moment(m, v, p, w):
+    for i in range(v.rotors):
+        w.moment[0] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 1]
+        w.moment[1] += p[0] * m.rotor_speed[i] * m.hub_velocity[i, 0]
+
+
+def kernel_independent_of_speed(m, v, p, w):
+    w.moment[0] -= p[0] * m.air_velocity[1]
+    w.moment[1] += p[0] * m.air_velocity[0]
+
+
+def kernel_rolling(m, v, p, w):
+    for i in range(v.rotors):
+        w.moment[0] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 0]
+        w.moment[1] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 1]
+
+
 def forms(vehicle):
     size = scale(vehicle)
     k_flap = size.arm_m * size.drag_per_rotor_speed
@@ -41,6 +58,7 @@ def forms(vehicle):
             (Parameter("k_flap", "N m s2/(rad m)", 0.0, k_flap, meaning="moment per rotor speed and airspeed"),),
             hub_moment,
             ("velocity", "rotor_speed"),
+            kernel=kernel_hub_moment,
         ),
         Form(
             "independent of rotor speed",
@@ -48,6 +66,7 @@ def forms(vehicle):
             (Parameter("k_m", "N s", 0.0, k_m, meaning="moment per airspeed"),),
             independent_of_speed,
             ("velocity",),
+            kernel=kernel_independent_of_speed,
         ),
         Form(
             "about the airspeed, at the hubs",
@@ -55,6 +74,7 @@ def forms(vehicle):
             (Parameter("k_roll", "N m s2/(rad m)", 0.0, k_flap, meaning="moment about the airspeed per rotor speed"),),
             rolling,
             ("velocity", "rotor_speed"),
+            kernel=kernel_rolling,
         ),
     )
 

@@ -1,5 +1,7 @@
 """Parasitic drag of the airframe, quadratic in airspeed."""
 
+from math import sqrt
+
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
@@ -44,6 +46,31 @@ def per_component(motion, vehicle, values):
     return Contribution(force=-np.asarray(values) * np.abs(v) * v)
 
 
+def kernel(m, v, p, w):
+    """F_j = -c_j |v| v_j, M = e3 × (c h) |v| v; `p` is c_x, c_y, c_z, c_x h, c_y h."""
+    speed = sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2 + m.air_velocity[2] ** 2)
+    for j in range(3):
+        w.force[j] -= p[j] * speed * m.air_velocity[j]
+    w.moment[0] -= p[4] * speed * m.air_velocity[1]
+    w.moment[1] += p[3] * speed * m.air_velocity[0]
+
+
+def kernel_per_component(m, v, p, w):
+    for j in range(3):
+        w.force[j] -= p[j] * abs(m.air_velocity[j]) * m.air_velocity[j]
+
+
+def _alike(values):
+    """c, and c h where it is there, as the kernel's values."""
+    c_h = values[1] if len(values) > 1 else 0.0
+    return (*[values[0]] * 3, c_h, c_h)
+
+
+def _each(values):
+    """c_x, c_y, c_z, and c_x h, c_y h where they are there, as the kernel's values."""
+    return (*values, 0.0, 0.0)[:5]
+
+
 def forms(vehicle):
     unit = "N s2/m2"
     size = scale(vehicle)
@@ -57,9 +84,9 @@ def forms(vehicle):
         for symbol in ("c", "c_x", "c_y")
     )
     return (
-        Form("isotropic", "F = −c |v| v", (c,), isotropic, ("velocity",)),
-        Form("per axis", "F_j = −c_j |v| v_j", axes, per_axis, ("velocity",)),
-        Form("per component", "F_j = −c_j |v_j| v_j", axes, per_component, ("velocity",)),
+        Form("isotropic", "F = −c |v| v", (c,), isotropic, ("velocity",), kernel=kernel, kernel_values=_alike),
+        Form("per axis", "F_j = −c_j |v| v_j", axes, per_axis, ("velocity",), kernel=kernel, kernel_values=_each),
+        Form("per component", "F_j = −c_j |v_j| v_j", axes, per_component, ("velocity",), kernel=kernel_per_component),
         Form(
             "isotropic, off the centre of mass",
             "F = −c |v| v, M = −h e3 × F",
@@ -68,6 +95,8 @@ def forms(vehicle):
             ("velocity",),
             must_show=(0, 1),
             compound=True,
+            kernel=kernel,
+            kernel_values=_alike,
         ),
         Form(
             "per axis, off the centre of mass",
@@ -77,6 +106,8 @@ def forms(vehicle):
             ("velocity",),
             must_show=(0, 1, 3),
             compound=True,
+            kernel=kernel,
+            kernel_values=_each,
         ),
     )
 

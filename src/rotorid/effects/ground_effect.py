@@ -1,5 +1,7 @@
 """Ground effect: more thrust close to the ground."""
 
+from math import exp
+
 import numpy as np
 
 from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
@@ -40,6 +42,27 @@ def exponential(motion, vehicle, values):
     return _along_thrust(values[0] * np.exp(-values[1] * hub_heights_m(motion, vehicle)), motion, vehicle)
 
 
+def kernel_image(m, v, p, w):
+    for i in range(v.rotors):
+        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
+        ratio = p[0] * (v.radius / (4.0 * max(m.height - drop, CLOSEST_RADII * v.radius))) ** 2
+        w.hub_force[i, 2] -= (1.0 / (1.0 - min(ratio, 0.8)) - 1.0) * m.thrust[i]
+
+
+def kernel_inverse_square(m, v, p, w):
+    for i in range(v.rotors):
+        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
+        ratio = (v.radius / (4.0 * max(m.height - drop, CLOSEST_RADII * v.radius))) ** 2
+        w.hub_force[i, 2] -= p[0] * ratio * m.thrust[i]
+
+
+def kernel_exponential(m, v, p, w):
+    for i in range(v.rotors):
+        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
+        height = max(m.height - drop, CLOSEST_RADII * v.radius)
+        w.hub_force[i, 2] -= p[0] * exp(-p[1] * height) * m.thrust[i]
+
+
 def forms(vehicle):
     needs = ("height", "rotor_speed")
     radius = rotor_radius_m(vehicle)
@@ -50,6 +73,7 @@ def forms(vehicle):
             (Parameter("c", "1", 0.0, 40.0, True, (1.0, 4.0, 10.0), "gain of the image rotor, 1 for a single one"),),
             image,
             needs,
+            kernel=kernel_image,
         ),
         Form(
             "inverse square",
@@ -57,6 +81,7 @@ def forms(vehicle):
             (Parameter("c", "1", 0.0, 60.0, meaning="gain of the image rotor, 1 for a single one"),),
             inverse_square,
             needs,
+            kernel=kernel_inverse_square,
         ),
         Form(
             "exponential",
@@ -75,6 +100,7 @@ def forms(vehicle):
             ),
             exponential,
             needs,
+            kernel=kernel_exponential,
         ),
     )
 

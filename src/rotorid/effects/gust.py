@@ -36,7 +36,36 @@ def window_form(start_s: float, stop_s: float, knots: int) -> Form:
         for k in range(knots)
     )
     name = f"{start_s:.2f} s to {stop_s:.2f} s, {knots} knots"
-    return Form(name, "F = Rᵀ f(t)", parameters, contribution, ("rotation", "rotor_speed"))
+    return Form(
+        name,
+        "F = Rᵀ f(t)",
+        parameters,
+        contribution,
+        ("rotation", "rotor_speed"),
+        kernel=kernel,
+        kernel_values=lambda values: (start_s, stop_s, knots, *values),
+    )
+
+
+def kernel(m, v, p, w):
+    """F = Rᵀ f(t); `p` is start and stop, the number of inner knots, then their forces north and east."""
+    knots = int(p[2])
+    place = (m.time_s - p[0]) / (p[1] - p[0]) * (knots + 1)
+    if place <= 0.0 or place >= knots + 1 or m.rotor_speed_sum <= 0.0:
+        return
+    before = int(place)
+    share = place - before
+    north = east = 0.0
+    if before > 0:
+        north += (1.0 - share) * p[2 + before]
+        east += (1.0 - share) * p[2 + knots + before]
+    if before < knots:
+        north += share * p[3 + before]
+        east += share * p[3 + knots + before]
+    for i in range(v.rotors):
+        caught = m.rotor_speed[i] / m.rotor_speed_sum
+        for j in range(3):
+            w.hub_force[i, j] += caught * (m.rotation[0, j] * north + m.rotation[1, j] * east)
 
 
 def form_named(name: str) -> Form | None:

@@ -17,6 +17,14 @@ def products(motion, vehicle, values):
     return Contribution(moment=-(motion.angular_acceleration @ extra + np.cross(rate, rate @ extra)))
 
 
+def kernel(m, v, p, w):
+    a, o = m.angular_acceleration, m.angular_velocity
+    x, y, z = p[0] * o[1] + p[1] * o[2], p[0] * o[0] + p[2] * o[2], p[1] * o[0] + p[2] * o[1]
+    w.moment[0] -= p[0] * a[1] + p[1] * a[2] + o[1] * z - o[2] * y
+    w.moment[1] -= p[0] * a[0] + p[2] * a[2] + o[2] * x - o[0] * z
+    w.moment[2] -= p[1] * a[0] + p[2] * a[1] + o[0] * y - o[1] * x
+
+
 def forms(vehicle):
     bound = scale(vehicle).inertia_kg_m2
     return (
@@ -26,6 +34,7 @@ def forms(vehicle):
             tuple(Parameter(name, "kg m2", -bound, bound, meaning="entry of J to be added") for name, _, _ in PAIRS),
             products,
             ("angular_velocity", "angular_acceleration"),
+            kernel=kernel,
         ),
     )
 

@@ -37,8 +37,7 @@ class Instrument:
     run_s: float
     """Of the longest run, gaps and all."""
     runs: tuple[str, ...]
-    training: tuple[str, ...] = ()
-    """Runs that are fitted; empty for all."""
+    """Those that are fitted."""
     largest: tuple[float, ...] = (1.0,) * 6
     """Largest load of each channel, N and N m."""
     tilts: bool = False

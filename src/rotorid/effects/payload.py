@@ -83,6 +83,22 @@ def rigid_with_inertia(motion, vehicle, values):
     return Contribution(force=carried.force, moment=carried.moment - turning)
 
 
+def kernel_rigid(m, v, p, w):
+    """A rigid payload; `p` is m_p, m_p x, m_p y, J_xy, J_xz, J_yz."""
+    s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
+    x, y, z = p[3] * o[1] + p[4] * o[2], p[3] * o[0] + p[5] * o[2], p[4] * o[0] + p[5] * o[1]
+    for j in range(3):
+        w.force[j] -= p[0] * s[j]
+    w.moment[0] -= p[2] * s[2] + p[3] * a[1] + p[4] * a[2] + o[1] * z - o[2] * y
+    w.moment[1] -= -p[1] * s[2] + p[3] * a[0] + p[5] * a[2] + o[2] * x - o[0] * z
+    w.moment[2] -= p[1] * s[1] - p[2] * s[0] + p[4] * a[0] + p[5] * a[1] + o[0] * y - o[1] * x
+
+
+def _without_products(values):
+    """m_p, m_p x, m_p y as the kernel's values."""
+    return (*values, 0.0, 0.0, 0.0)
+
+
 def forms(vehicle):
     size = scale(vehicle)
     mass, bound = size.mass_kg, size.inertia_kg_m2
@@ -115,8 +131,18 @@ def forms(vehicle):
             rigid_with_inertia,
             ("specific_force", "angular_velocity", "angular_acceleration"),
             must_show=(0,),
+            kernel=kernel_rigid,
         ),
-        Form("rigid", "F = −m_p a, M = −m_p r × a", (m_p, *places), rigid, ("specific_force",), must_show=(0,)),
+        Form(
+            "rigid",
+            "F = −m_p a, M = −m_p r × a",
+            (m_p, *places),
+            rigid,
+            ("specific_force",),
+            must_show=(0,),
+            kernel=kernel_rigid,
+            kernel_values=_without_products,
+        ),
         Form(
             "slung",
             "F = m_p (e·n + L |n'|²) n, M = z ẑ × F, n'' = (e − (e·n) n)/L − |n'|² n − 2ζω n', e = g − a",

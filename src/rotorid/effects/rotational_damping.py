@@ -22,6 +22,21 @@ def isotropic(motion, vehicle, values):
     return Contribution(moment=-values[0] * motion.angular_velocity)
 
 
+def kernel(m, v, p, w):
+    for j in range(3):
+        w.moment[j] -= p[j] * m.angular_velocity[j]
+
+
+def kernel_quadratic(m, v, p, w):
+    for j in range(3):
+        w.moment[j] -= p[j] * abs(m.angular_velocity[j]) * m.angular_velocity[j]
+
+
+def _alike(values):
+    """c as the kernel's values."""
+    return (values[0],) * 3
+
+
 def forms(vehicle):
     needs = ("angular_velocity",)
     most = scale(vehicle).damping
@@ -29,9 +44,9 @@ def forms(vehicle):
     square = tuple(Parameter(f"c_{a}", "N m s2/rad2", 0.0, most, meaning=f"damping about {a}") for a in "xyz")
     one = Parameter("c", "N m s/rad", 0.0, most, meaning="damping about every axis")
     return (
-        Form("one constant", "M = −c Ω", (one,), isotropic, needs),
-        Form("linear", "M_j = −c_j Ω_j", each, linear, needs),
-        Form("quadratic", "M_j = −c_j |Ω_j| Ω_j", square, quadratic, needs),
+        Form("one constant", "M = −c Ω", (one,), isotropic, needs, kernel=kernel, kernel_values=_alike),
+        Form("linear", "M_j = −c_j Ω_j", each, linear, needs, kernel=kernel),
+        Form("quadratic", "M_j = −c_j |Ω_j| Ω_j", square, quadratic, needs, kernel=kernel_quadratic),
     )
 
 

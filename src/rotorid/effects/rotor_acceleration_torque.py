@@ -13,6 +13,11 @@ def reaction(motion, vehicle, values):
     return Contribution(moment=moment)
 
 
+def kernel(m, v, p, w):
+    for i in range(v.rotors):
+        w.moment[2] += p[0] * m.rotor_acceleration[i] * v.yaw_sign[i]
+
+
 def forms(vehicle):
     return (
         Form(
@@ -21,6 +26,7 @@ def forms(vehicle):
             (rotor_inertia(vehicle),),
             reaction,
             ("rotor_acceleration",),
+            kernel=kernel,
         ),
     )
 

@@ -39,6 +39,27 @@ def linear_in_speed(motion, vehicle, values):
     return Contribution(force=-values[0] * motion.air_velocity * IN_PLANE)
 
 
+def kernel_at_the_hubs(m, v, p, w):
+    for i in range(v.rotors):
+        w.hub_force[i, 0] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 0]
+        w.hub_force[i, 1] -= p[1] * m.rotor_speed[i] * m.hub_velocity[i, 1]
+
+
+def kernel_at_the_centre(m, v, p, w):
+    w.force[0] -= p[0] * m.rotor_speed_sum * m.air_velocity[0]
+    w.force[1] -= p[1] * m.rotor_speed_sum * m.air_velocity[1]
+
+
+def kernel_linear_in_speed(m, v, p, w):
+    w.force[0] -= p[0] * m.air_velocity[0]
+    w.force[1] -= p[0] * m.air_velocity[1]
+
+
+def _alike(values):
+    """k_d as the kernels' values."""
+    return (values[0],) * 2
+
+
 def forms(vehicle):
     needs = ("velocity", "rotor_speed")
     size, unit = scale(vehicle), "N s2/(rad m)"
@@ -47,17 +68,41 @@ def forms(vehicle):
     axes = tuple(Parameter(f"k_d_{a}", unit, 0.0, most, meaning=f"{k_d.meaning} along {a}") for a in "xy")
     d = Parameter("d", "N s/m", 0.0, size.drag_per_speed, meaning="linear drag")
     return (
-        Form("at the hubs", "F_i = −k_d ω_i v_i,⊥", (k_d,), at_the_hubs, needs),
-        Form("at the centre of mass", "F = −k_d Σω v_⊥", (k_d,), at_the_centre, needs),
-        Form("per axis", "F = −Σω (k_d,x v_x, k_d,y v_y, 0)", axes, per_axis, needs),
+        Form(
+            "at the hubs",
+            "F_i = −k_d ω_i v_i,⊥",
+            (k_d,),
+            at_the_hubs,
+            needs,
+            kernel=kernel_at_the_hubs,
+            kernel_values=_alike,
+        ),
+        Form(
+            "at the centre of mass",
+            "F = −k_d Σω v_⊥",
+            (k_d,),
+            at_the_centre,
+            needs,
+            kernel=kernel_at_the_centre,
+            kernel_values=_alike,
+        ),
+        Form("per axis", "F = −Σω (k_d,x v_x, k_d,y v_y, 0)", axes, per_axis, needs, kernel=kernel_at_the_centre),
         Form(
             "per axis, at the hubs",
             "F_i = −ω_i (k_d,x v_x,i, k_d,y v_y,i, 0)",
             axes,
             per_axis_at_the_hubs,
             needs,
+            kernel=kernel_at_the_hubs,
         ),
-        Form("independent of rotor speed", "F = −d v_⊥", (d,), linear_in_speed, ("velocity",)),
+        Form(
+            "independent of rotor speed",
+            "F = −d v_⊥",
+            (d,),
+            linear_in_speed,
+            ("velocity",),
+            kernel=kernel_linear_in_speed,
+        ),
     )
 
 

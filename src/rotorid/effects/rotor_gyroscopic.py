@@ -18,6 +18,14 @@ def gyroscopic(motion, vehicle, values):
     return Contribution(moment=-np.cross(motion.angular_velocity, momentum))
 
 
+def kernel(m, v, p, w):
+    momentum = 0.0
+    for i in range(v.rotors):
+        momentum -= p[0] * m.rotor_speed[i] * v.yaw_sign[i]
+    w.moment[0] -= m.angular_velocity[1] * momentum
+    w.moment[1] += m.angular_velocity[0] * momentum
+
+
 def forms(vehicle):
     return (
         Form(
@@ -26,6 +34,7 @@ def forms(vehicle):
             (rotor_inertia(vehicle),),
             gyroscopic,
             ("angular_velocity", "rotor_speed"),
+            kernel=kernel,
         ),
     )
 

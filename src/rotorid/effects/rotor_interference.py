@@ -1,5 +1,7 @@
 """Rear rotors work in the wake of the front ones in forward flight."""
 
+from math import sqrt
+
 import numpy as np
 
 from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
@@ -32,6 +34,22 @@ def saturating(motion, vehicle, values):
     return _loss(values[0] * speed / (speed + inflow) * _rear_weight(motion, vehicle), motion, vehicle)
 
 
+def kernel_growing(m, v, p, w):
+    speed = sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
+    x, y = m.air_velocity[0] / max(speed, 1e-6), m.air_velocity[1] / max(speed, 1e-6)
+    for i in range(v.rotors):
+        rear = min(max(-(x * v.hub[i, 0] + y * v.hub[i, 1]) / v.reach, 0.0), 1.0)
+        w.hub_force[i, 2] += p[0] * speed * rear * m.thrust[i]
+
+
+def kernel_saturating(m, v, p, w):
+    speed = sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
+    x, y = m.air_velocity[0] / max(speed, 1e-6), m.air_velocity[1] / max(speed, 1e-6)
+    for i in range(v.rotors):
+        rear = min(max(-(x * v.hub[i, 0] + y * v.hub[i, 1]) / v.reach, 0.0), 1.0)
+        w.hub_force[i, 2] += p[0] * speed / (speed + v.hover_inflow) * rear * m.thrust[i]
+
+
 def forms(vehicle):
     needs = ("velocity", "rotor_speed")
     return (
@@ -43,6 +61,7 @@ def forms(vehicle):
             needs,
             (),
             3,
+            kernel=kernel_growing,
         ),
         Form(
             "saturating",
@@ -52,6 +71,7 @@ def forms(vehicle):
             needs,
             (),
             3,
+            kernel=kernel_saturating,
         ),
     )
 

@@ -27,6 +27,19 @@ def rotor_force(motion, vehicle, values):
     return at_hubs(motion.rotor_speed[:, :, None] * wind[:, None, :], vehicle.rotor_positions_m())
 
 
+def kernel_world_force(m, v, p, w):
+    for j in range(3):
+        w.force[j] += m.rotation[0, j] * p[0] + m.rotation[1, j] * p[1]
+
+
+def kernel_rotor_force(m, v, p, w):
+    x = m.rotation[0, 0] * p[0] + m.rotation[1, 0] * p[1]
+    y = m.rotation[0, 1] * p[0] + m.rotation[1, 1] * p[1]
+    for i in range(v.rotors):
+        w.hub_force[i, 0] += m.rotor_speed[i] * x
+        w.hub_force[i, 1] += m.rotor_speed[i] * y
+
+
 def forms(vehicle):
     size = scale(vehicle)
     force = MOST_WEIGHTS * size.weight_n
@@ -38,8 +51,23 @@ def forms(vehicle):
     )
     on_frame = tuple(Parameter(f"f_{d}", "N", -force, force, meaning=f"force to the {d}") for d in directions)
     return (
-        Form("on the rotors", "F_i = ω_i P Rᵀ k_d w", on_rotors, rotor_force, ("rotation", "rotor_speed")),
-        Form("on the airframe", "F = Rᵀ f_w", on_frame, world_force, ("rotation",), excited_by=("always",)),
+        Form(
+            "on the rotors",
+            "F_i = ω_i P Rᵀ k_d w",
+            on_rotors,
+            rotor_force,
+            ("rotation", "rotor_speed"),
+            kernel=kernel_rotor_force,
+        ),
+        Form(
+            "on the airframe",
+            "F = Rᵀ f_w",
+            on_frame,
+            world_force,
+            ("rotation",),
+            excited_by=("always",),
+            kernel=kernel_world_force,
+        ),
     )
 
 

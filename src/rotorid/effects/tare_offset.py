@@ -9,7 +9,7 @@ ZERO = "reading without a load"
 
 
 def _own_in_each_run(instrument):
-    runs, channels = instrument.training or instrument.runs, instrument.channels
+    runs, channels = instrument.runs, instrument.channels
 
     def contribution(loading, vehicle, values):
         reading = np.zeros((loading.size, 6))

@@ -42,6 +42,25 @@ def constant_and_square(motion, vehicle, values):
     return lift_at_hubs(values[0] + values[1] * motion.rotor_speed**2, vehicle)
 
 
+def kernel(m, v, p, w):
+    """T_i += c_0 + c_1 ω_i + Δc_2 ω_i² + c_3 ω_i³; `p` holds the four."""
+    for i in range(v.rotors):
+        speed = m.rotor_speed[i]
+        w.hub_force[i, 2] -= p[0] + speed * (p[1] + speed * (p[2] + speed * p[3]))
+
+
+def _powers(*powers):
+    """Kernel values of a form whose parameters are the coefficients of these powers."""
+
+    def kernel_values(values):
+        out = [0.0] * 4
+        for power, value in zip(powers, values, strict=True):
+            out[power] = value
+        return out
+
+    return kernel_values
+
+
 def forms(vehicle):
     needs = ("rotor_speed",)
     size = scale(vehicle)
@@ -59,8 +78,25 @@ def forms(vehicle):
     c2 = Parameter(SQUARE, "N s2/rad2", -0.8 * thrust / speed**2, thrust / speed**2, meaning="squared term beyond C_F")
     always = ("always",)
     return (
-        Form("linear term", "T_i = C_F ω_i² + c_1 ω_i", (c1,), linear_term, needs),
-        Form("constant term", "T_i = C_F ω_i² + c_0", (c0,), constant_term, needs, excited_by=always),
+        Form(
+            "linear term",
+            "T_i = C_F ω_i² + c_1 ω_i",
+            (c1,),
+            linear_term,
+            needs,
+            kernel=kernel,
+            kernel_values=_powers(1),
+        ),
+        Form(
+            "constant term",
+            "T_i = C_F ω_i² + c_0",
+            (c0,),
+            constant_term,
+            needs,
+            excited_by=always,
+            kernel=kernel,
+            kernel_values=_powers(0),
+        ),
         Form(
             "linear and constant",
             "T_i = C_F ω_i² + c_1 ω_i + c_0",
@@ -68,6 +104,8 @@ def forms(vehicle):
             linear_and_constant,
             needs,
             excited_by=always,
+            kernel=kernel,
+            kernel_values=_powers(0, 1),
         ),
         Form(
             "linear term and its own square",
@@ -76,6 +114,8 @@ def forms(vehicle):
             linear_and_square,
             needs,
             must_show=(0, 1),
+            kernel=kernel,
+            kernel_values=_powers(1, 2),
         ),
         Form(
             "constant term and its own square",
@@ -85,8 +125,18 @@ def forms(vehicle):
             needs,
             must_show=(0, 1),
             excited_by=always,
+            kernel=kernel,
+            kernel_values=_powers(0, 2),
         ),
-        Form("cubic term", "T_i = C_F ω_i² + c_3 ω_i³", (c3,), cubic_term, needs),
+        Form(
+            "cubic term",
+            "T_i = C_F ω_i² + c_3 ω_i³",
+            (c3,),
+            cubic_term,
+            needs,
+            kernel=kernel,
+            kernel_values=_powers(3),
+        ),
     )
 
 

@@ -44,23 +44,75 @@ def _single(k):
     return one
 
 
+def kernel_at_the_hubs(m, v, p, w):
+    """F_i += T_i (ε_x,i, ε_y,i, 0), M -= ±Q_i (ε_x,i, ε_y,i, 0); `p` is ε_x, ε_y of each rotor."""
+    for i in range(v.rotors):
+        torque = v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
+        for j in range(2):
+            w.hub_force[i, j] += m.thrust[i] * p[2 * i + j]
+            w.moment[j] -= torque * p[2 * i + j]
+
+
+def kernel_thrust_alone(m, v, p, w):
+    for i in range(v.rotors):
+        for j in range(2):
+            w.hub_force[i, j] += m.thrust[i] * p[j]
+
+
+def kernel_force_only(m, v, p, w):
+    for i in range(v.rotors):
+        for j in range(2):
+            w.force[j] += m.thrust[i] * p[j]
+
+
+def _of_rotors(leaning):
+    """Kernel values of a tilt that the rotors lean by where `leaning` (k,) is 1."""
+    return lambda values: [weight * value for weight in leaning for value in values]
+
+
 def forms(vehicle):
     tilt = tuple(Parameter(f"eps_{a}", "rad", -0.5, 0.5, meaning=f"tilt of the thrust along {a}") for a in "xy")
     needs = ("rotor_speed",)
     singles = [
-        Form(f"rotor {k + 1}", f"F_{k + 1} = T_{k + 1} (ε_x, ε_y, −1)", tilt, _single(k), needs, (), 2)
+        Form(
+            f"rotor {k + 1}",
+            f"F_{k + 1} = T_{k + 1} (ε_x, ε_y, −1)",
+            tilt,
+            _single(k),
+            needs,
+            (),
+            2,
+            kernel=kernel_at_the_hubs,
+            kernel_values=_of_rotors(np.eye(vehicle.rotor_count)[k]),
+        )
         for k in range(vehicle.rotor_count)
     ]
     return (
-        Form("all rotors, at the hubs", "F_i = T_i (ε_x, ε_y, −1)", tilt, at_the_hubs, needs),
+        Form(
+            "all rotors, at the hubs",
+            "F_i = T_i (ε_x, ε_y, −1)",
+            tilt,
+            at_the_hubs,
+            needs,
+            kernel=kernel_at_the_hubs,
+            kernel_values=_of_rotors(np.ones(vehicle.rotor_count)),
+        ),
         Form(
             "all rotors, at the hubs, thrust alone",
             "F_i = T_i (ε_x, ε_y, −1), torques upright",
             tilt,
             thrust_alone,
             needs,
+            kernel=kernel_thrust_alone,
         ),
-        Form("all rotors, at the centre of mass", "F = T (ε_x, ε_y, −1)", tilt, force_only, needs),
+        Form(
+            "all rotors, at the centre of mass",
+            "F = T (ε_x, ε_y, −1)",
+            tilt,
+            force_only,
+            needs,
+            kernel=kernel_force_only,
+        ),
         *singles,
     )
 

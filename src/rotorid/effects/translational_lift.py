@@ -22,12 +22,29 @@ def at_the_centre(motion, vehicle, values):
     return lift_at_hubs(np.repeat(extra[:, None], vehicle.rotor_count, axis=1), vehicle)
 
 
+def kernel_at_the_hubs(m, v, p, w):
+    for i in range(v.rotors):
+        w.hub_force[i, 2] -= p[0] * (m.hub_velocity[i, 0] ** 2 + m.hub_velocity[i, 1] ** 2)
+
+
+def kernel_at_the_centre(m, v, p, w):
+    for i in range(v.rotors):
+        w.hub_force[i, 2] -= p[0] * (m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
+
+
 def forms(vehicle):
     most = MOST_SHARE_PER_SQUARE * scale(vehicle).thrust_n
     k_h = Parameter("k_h", "N s2/m2", 0.0, most, meaning="lift per rotor and squared in-plane airspeed")
     return (
-        Form("at the hubs", "T_i += k_h v_h,i²", (k_h,), at_the_hubs, ("velocity",)),
-        Form("at the centre of mass", "T_i += k_h v_h²", (k_h,), at_the_centre, ("velocity",)),
+        Form("at the hubs", "T_i += k_h v_h,i²", (k_h,), at_the_hubs, ("velocity",), kernel=kernel_at_the_hubs),
+        Form(
+            "at the centre of mass",
+            "T_i += k_h v_h²",
+            (k_h,),
+            at_the_centre,
+            ("velocity",),
+            kernel=kernel_at_the_centre,
+        ),
     )
 
 

@@ -1,5 +1,7 @@
 """Rotors that are not alike: thrust or torque coefficients differ between them."""
 
+from functools import partial
+
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
@@ -56,6 +58,30 @@ def _one(k, count, function):
     return single
 
 
+def kernel(m, v, p, w):
+    """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i); `p` is d_i, q_i of each rotor."""
+    for i in range(v.rotors):
+        w.hub_force[i, 2] -= p[2 * i] * m.thrust[i]
+        w.moment[2] += p[2 * i + 1] * v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
+
+
+def _excess(function, weights):
+    """Kernel values of `function` (both, thrust_only or torque_only) for what each rotor has in excess."""
+    thrust = 0.0 if function is torque_only else 1.0
+    torque = 0.0 if function is thrust_only else 1.0
+    return [share * weight for weight in weights for share in (thrust, torque)]
+
+
+def _of_one(k, count, function, values):
+    """Kernel values where rotor `k` alone differs."""
+    return _excess(function, [values[0] if i == k else 0.0 for i in range(count)])
+
+
+def _of_contrast(function, values):
+    """Kernel values where the last rotor has what the others lack."""
+    return _excess(function, [*values, -sum(values)])
+
+
 def forms(vehicle):
     needs = ("rotor_speed",)
     count = vehicle.rotor_count
@@ -63,16 +89,41 @@ def forms(vehicle):
     both_text = "C_F,{0} = C_F (1 + d_{0}), C_Q,{0} = C_Q (1 + d_{0})"
     thrust_text, torque_text = "C_F,{0} = C_F (1 + d_{0})", "C_Q,{0} = C_Q (1 + d_{0})"
     singles = [
-        Form(name.format(i + 1), text.format(i + 1), (symbols[i],), _one(i, count, function), needs, (), 2)
+        Form(
+            name.format(i + 1),
+            text.format(i + 1),
+            (symbols[i],),
+            _one(i, count, function),
+            needs,
+            (),
+            2,
+            kernel=kernel,
+            kernel_values=partial(_of_one, i, count, function),
+        )
         for name, text, function in (("rotor {}", both_text, both), ("thrust of rotor {}", thrust_text, thrust_only))
         for i in range(count)
     ]
     free, closed = symbols[:-1], ", Σ d_i = 0"
     return (
         *singles,
-        Form("thrust and torque", both_text.format("i") + closed, free, _contrast(both), needs, (), 2),
-        Form("thrust", thrust_text.format("i") + closed, free, _contrast(thrust_only), needs, (), 2),
-        Form("torque", torque_text.format("i") + closed, free, _contrast(torque_only), needs, (), 2),
+        *(
+            Form(
+                name,
+                text.format("i") + closed,
+                free,
+                _contrast(function),
+                needs,
+                (),
+                2,
+                kernel=kernel,
+                kernel_values=partial(_of_contrast, function),
+            )
+            for name, text, function in (
+                ("thrust and torque", both_text, both),
+                ("thrust", thrust_text, thrust_only),
+                ("torque", torque_text, torque_only),
+            )
+        ),
     )
 
 

@@ -1,5 +1,7 @@
 """Vortex ring state: thrust is lost (and fluctuates) in a descent close to the hover inflow."""
 
+from math import exp
+
 import numpy as np
 
 from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
@@ -17,6 +19,14 @@ def mean_loss(motion, vehicle, values):
     return lift_at_hubs(-values[0] * bump[:, None] * rotor_thrusts(motion, vehicle), vehicle)
 
 
+def kernel(m, v, p, w):
+    x = m.air_velocity[2] / v.hover_inflow
+    slow = (m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2) / v.hover_inflow**2
+    bump = max(1.0 - ((x - 1.0) / 0.7) ** 2, 0.0) * exp(-slow)
+    for i in range(v.rotors):
+        w.hub_force[i, 2] += p[0] * bump * m.thrust[i]
+
+
 def forms(vehicle):
     return (
         Form(
@@ -25,6 +35,7 @@ def forms(vehicle):
             (Parameter("k", "1", 0.0, 0.8, meaning="largest share of thrust lost"),),
             mean_loss,
             ("velocity", "rotor_speed"),
+            kernel=kernel,
         ),
     )
 

@@ -1,4 +1,4 @@
-"""A vehicle as RotorPy parameters, as a MuJoCo model and as PX4 parameters.
+"""A vehicle as RotorPy parameters, as models of MuJoCo, Gazebo and gym-pybullet-drones, and as PX4 parameters.
 
 Those tools have the body forward-left-up: y and z of places change sign, and a rotor that turns counter-clockwise seen
 from above pushes the airframe about minus z.
@@ -121,10 +121,7 @@ def rotorpy(vehicle: Vehicle) -> Exported:
              "com_offset", "inertia_products"}  # fmt: skip
     parts = parts_of(vehicle, knows)
     left = list(parts.left_out)
-    for words, values in (("thrust", parts.thrust), ("torque", parts.torque)):
-        if np.ptp(values) > 0:
-            shown = ", ".join(f"{v:.4g}" for v in values)
-            left.append(f"{words} coefficients differ between rotors ({shown}): their mean is taken")
+    left += _left_of_each_rotor(parts)
     up, down = parts.tau_s
     if up != down:
         left.append(f"motor_lag: {up:.4g} s up and {down:.4g} s down: the mean is taken")
@@ -235,7 +232,197 @@ def px4(vehicle: Vehicle) -> Exported:
     return Exported("\n".join([*comments, *lines]) + "\n", "vehicle.params", tuple(left))
 
 
-FORMS: dict[str, Callable[[Vehicle], Exported]] = {"rotorpy": rotorpy, "mjcf": mjcf, "px4": px4}
+def _left_of_each_rotor(parts: Parts) -> list[str]:
+    """Sentences for tools that know one coefficient for all rotors."""
+    left = []
+    for words, values in (("thrust", parts.thrust), ("torque", parts.torque)):
+        if np.ptp(values) > 0:
+            shown = ", ".join(f"{v:.4g}" for v in values)
+            left.append(f"{words} coefficients differ between rotors ({shown}): their mean is taken")
+    return left
+
+
+def sdf(vehicle: Vehicle) -> Exported:
+    """A Gazebo model: a body with a link and a joint a rotor, each driven by Gazebo's multicopter motor model.
+
+    That model has thrust C_F ω², torque momentConstant times thrust, a lag up and down, and a drag of the hub
+    −rotorDragCoefficient |ω| v⊥. Rotor speeds are commanded in rad/s on `command/motor_speed`. Source: gz-sim,
+    `src/systems/multicopter_motor_model`; the models of PX4's x500.
+    """
+    parts = parts_of(vehicle, {"rotor_drag", "motor_lag", "com_offset", "inertia_products"})
+    left = list(parts.left_out)
+    up, down = parts.tau_s
+    if up == 0:
+        left.append(f"rotors that follow at once: Gazebo's motor model needs a lag, {AT_ONCE_S:g} s is taken")
+    if vehicle.gravity_m_s2 != 9.81:
+        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it belongs to Gazebo's world file")
+    j = _in_flu(parts.inertia)
+    most = (vehicle.rotor_speed_limits_rad_s or (0.0, 10 * _hover(vehicle)))[1]
+    share = min(1e-3 * parts.mass_kg, 0.005)
+    radius = vehicle.rotor_radius_m or 0.05
+    links, motors = [], []
+    for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
+        at = " ".join(f"{v:.9g}" for v in place * FLU)
+        # A light rotor of its own: its mass is taken off the body's; its inertia is small enough to do nothing.
+        spin = 1e-7
+        links.append(f"""    <link name="rotor_{i}">
+      <pose>{at} 0 0 0</pose>
+      <inertial><mass>{share:.9g}</mass>
+        <inertia><ixx>{spin}</ixx><iyy>{spin}</iyy><izz>{spin}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia>
+      </inertial>
+      <visual name="disc">
+        <geometry><cylinder><radius>{radius:.6g}</radius><length>0.002</length></cylinder></geometry>
+      </visual>
+    </link>
+    <joint name="rotor_{i}_joint" type="revolute">
+      <parent>base_link</parent><child>rotor_{i}</child>
+      <axis><xyz>0 0 1</xyz><limit><lower>-1e16</lower><upper>1e16</upper></limit></axis>
+    </joint>""")
+        motors.append(f"""    <plugin filename="gz-sim-multicopter-motor-model-system"
+            name="gz::sim::systems::MulticopterMotorModel">
+      <jointName>rotor_{i}_joint</jointName>
+      <linkName>rotor_{i}</linkName>
+      <turningDirection>{"ccw" if signed > 0 else "cw"}</turningDirection>
+      <timeConstantUp>{up or AT_ONCE_S:.9g}</timeConstantUp>
+      <timeConstantDown>{down or AT_ONCE_S:.9g}</timeConstantDown>
+      <maxRotVelocity>{most:.9g}</maxRotVelocity>
+      <motorConstant>{parts.thrust[i]:.9g}</motorConstant>
+      <momentConstant>{parts.torque[i] / parts.thrust[i]:.9g}</momentConstant>
+      <commandSubTopic>command/motor_speed</commandSubTopic>
+      <motorNumber>{i}</motorNumber>
+      <rotorDragCoefficient>{parts.drag[0]:.9g}</rotorDragCoefficient>
+      <rollingMomentCoefficient>0</rollingMomentCoefficient>
+      <rotorVelocitySlowdownSim>10</rotorVelocitySlowdownSim>
+      <motorType>velocity</motorType>
+    </plugin>""")
+    # What the rotors' links carry must not be carried twice.
+    body = parts.mass_kg - share * len(parts.places)
+    off = -share * (parts.places * FLU).sum(0) / body
+    spread = np.zeros((3, 3))
+    for place, m in [*((p * FLU, share) for p in parts.places), (off, body)]:
+        spread += m * (place @ place * np.eye(3) - np.outer(place, place))
+    own = j - spread - 1e-7 * len(parts.places) * np.eye(3)
+    inertia = "".join(f"<i{a}{b}>{own['xyz'.index(a), 'xyz'.index(b)]:.9g}</i{a}{b}>"
+                      for a, b in ("xx", "yy", "zz", "xy", "xz", "yz"))  # fmt: skip
+    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    nl = "\n"
+    text = f"""<?xml version="1.0"?>
+<sdf version="1.9">
+{comments}  <model name={quoteattr(vehicle.name)}>
+    <pose>0 0 0.3 0 0 0</pose>
+    <link name="base_link">
+      <inertial>
+        <pose>{off[0]:.9g} {off[1]:.9g} {off[2]:.9g} 0 0 0</pose>
+        <mass>{body:.9g}</mass>
+        <inertia>{inertia}</inertia>
+      </inertial>
+      <collision name="body"><geometry><box><size>0.1 0.1 0.04</size></box></geometry></collision>
+      <visual name="body"><geometry><box><size>0.1 0.1 0.04</size></box></geometry></visual>
+    </link>
+{nl.join(links)}
+{nl.join(motors)}
+  </model>
+</sdf>
+"""
+    return Exported(text, "model.sdf", tuple(left))
+
+
+def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
+    """The URDF of gym-pybullet-drones: its `properties` hold what its physics is made of, links 0 to 3 are the rotors.
+
+    It has the thrust kf n² and the yaw torque km n² (n in turns a minute) with the senses −, +, −, + of rotors 0 to 3
+    about z up, a ground effect, and a drag by the sum of rotor speeds at the centre. Source: gym-pybullet-drones,
+    `BaseAviary._parseURDFParameters`, `_physics`, `_drag`, `_groundEffect`, and `cf2x.urdf`.
+    """
+    if vehicle.rotor_count != 4:
+        raise InputError(f"{vehicle.name}: gym-pybullet-drones knows four rotors, found {vehicle.rotor_count}")
+    parts = parts_of(vehicle, {"rotor_drag", "com_offset"})
+    left = [*parts.left_out, *_left_of_each_rotor(parts)]
+    if parts.drag[0]:
+        left.append("rotor drag at the hubs: it acts at the centre of mass there, and with Physics.PYB_DRAG alone")
+    order, turned = _round_the_left(parts.places, vehicle.yaw_signs(), vehicle.name)
+    left.append(f"order of the rotors: its links 0 to 3 are rotors {', '.join(str(i + 1) for i in order)} here")
+    if turned:
+        left.append("senses of the rotors: they are those of its DroneModel.RACE, not CF2X; choose that one")
+    j = parts.inertia
+    if np.abs(j - np.diag(np.diag(j))).max() > 0 or any(e["id"] == "inertia_products" for e in vehicle.effects):
+        left.append("products of inertia: it takes the diagonal alone")
+    left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it has 9.8")
+    hover = _hover(vehicle)
+    limit = (vehicle.rotor_speed_limits_rad_s or (0.0, 2 * hover))[1]
+    lift = float(parts.thrust.sum() * limit**2 / (parts.mass_kg * vehicle.gravity_m_s2))
+    # kf and km are by the square of turns a minute, the drag by the sum of rad/s.
+    per_rpm = (2 * np.pi / 60) ** 2
+    arm = float(np.linalg.norm(parts.places[:, :2], axis=1).mean())
+    properties = {
+        "arm": arm,
+        "kf": float(parts.thrust.mean()) * per_rpm,
+        "km": float(parts.torque.mean()) * per_rpm,
+        "thrust2weight": lift,
+        "max_speed_kmh": 100.0,
+        "gnd_eff_coeff": 0.0,
+        "prop_radius": vehicle.rotor_radius_m or arm / 2,
+        "drag_coeff_xy": parts.drag[0],
+        "drag_coeff_z": 0.0,
+        "dw_coeff_1": 0.0,
+        "dw_coeff_2": 0.0,
+        "dw_coeff_3": 0.0,
+    }
+    shown = " ".join(f'{k}="{v:.9g}"' for k, v in properties.items())
+    links = []
+    for k, i in enumerate(order):
+        at = " ".join(f"{v:.9g}" for v in parts.places[i] * FLU)
+        links.append(f"""  <link name="prop{k}_link">
+    <inertial><origin rpy="0 0 0" xyz="{at}"/><mass value="0.0"/>
+      <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
+  </link>
+  <joint name="prop{k}_joint" type="fixed"><parent link="base_link"/><child link="prop{k}_link"/></joint>""")
+    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    nl = "\n"
+    text = f"""<?xml version="1.0" ?>
+<robot name={quoteattr(vehicle.name)}>
+{comments}  <properties {shown}/>
+  <link name="base_link">
+    <inertial><origin rpy="0 0 0" xyz="0 0 0"/><mass value="{parts.mass_kg:.9g}"/>
+      <inertia ixx="{j[0, 0]:.9g}" ixy="0.0" ixz="0.0" iyy="{j[1, 1]:.9g}" iyz="0.0" izz="{j[2, 2]:.9g}"/></inertial>
+    <visual><origin rpy="0 0 0" xyz="0 0 0"/><geometry><cylinder radius="{arm:.6g}" length="0.03"/></geometry></visual>
+    <collision><origin rpy="0 0 0" xyz="0 0 0"/>
+      <geometry><cylinder radius="{arm:.6g}" length="0.03"/></geometry></collision>
+  </link>
+{nl.join(links)}
+  <link name="center_of_mass_link">
+    <inertial><origin rpy="0 0 0" xyz="0 0 0"/><mass value="0.0"/>
+      <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
+  </link>
+  <joint name="center_of_mass_joint" type="fixed"><parent link="base_link"/><child link="center_of_mass_link"/></joint>
+</robot>
+"""
+    return Exported(text, "vehicle.urdf", tuple(left))
+
+
+def _round_the_left(places: np.ndarray, signs: np.ndarray, name: str) -> tuple[list[int], bool]:
+    """Rotors front left, rear left, rear right, front right, and whether their senses are the mirrored ones.
+
+    The yaw torque there is (−z0 + z1 − z2 + z3) about z up: 0 and 2 turn counter-clockwise; of `RACE` clockwise.
+    """
+    corners = {(int(np.sign(x)), int(np.sign(y))): i for i, (x, y, _) in enumerate(places)}
+    wanted = ((1, -1), (-1, -1), (-1, 1), (1, 1))
+    if set(corners) != set(wanted):
+        raise InputError(f"{name}: gym-pybullet-drones wants four rotors in X shape")
+    order = [corners[corner] for corner in wanted]
+    senses = [int(signs[i]) for i in order]
+    if senses not in ([1, -1, 1, -1], [-1, 1, -1, 1]):
+        raise InputError(f"{name}: gym-pybullet-drones wants rotors whose senses alternate around the vehicle")
+    return order, senses[0] < 0
+
+
+FORMS: dict[str, Callable[[Vehicle], Exported]] = {
+    "rotorpy": rotorpy,
+    "mjcf": mjcf,
+    "sdf": sdf,
+    "gym-pybullet-drones": gym_pybullet_drones,
+    "px4": px4,
+}
 
 
 def export_vehicle(vehicle: Vehicle, to: str) -> Exported:

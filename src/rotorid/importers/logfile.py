@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.importers import crazyflie, neurobem, px4_ulog, rcbenchmark
+from rotorid.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
 from rotorid.importers.clean import true_stretches
 from rotorid.importers.known import Known, px4_vehicle
 from rotorid.importers.mapping import Mapping, read_by_mapping
@@ -20,16 +20,15 @@ SHORTEST_FLIGHT_S = 4.0
 AFTER_TAKE_OFF_S = 1.0
 BEFORE_LANDING_S = 0.5
 
-NOT_YET = (
-    (b"H Product:Blackbox", "a Betaflight or INAV blackbox log", "blackbox_decode"),
-    (b"\xa3\x95", "an ArduPilot DataFlash log", "mavlogdump.py --format csv"),
-    (b"#ROSBAG V2.0", "a ROS 1 bag", "rostopic echo -p"),
-    (b"\x89MCAP0", "an MCAP file", "the export of Foxglove or PlotJuggler"),
-    (b"SQLite format 3", "a ROS 2 bag", "the export of Foxglove or PlotJuggler"),
+BY_FIRST_BYTES = (
+    (b"H Product:Blackbox", "betaflight"),
+    (b"\xa3\x95", "ardupilot"),
+    (b"#ROSBAG V2.0", "ros"),
+    (b"\x89MCAP0", "ros"),
+    (b"SQLite format 3", "ros"),
 )
-"""Formats that are recognised but not read: first bytes, name, what makes a CSV of them."""
-TEMPLATES = {"px4": "x500", "crazyflie": "crazyflie-2.1"}
-"""Template vehicle that stands in for what a log of an autopilot does not say."""
+TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
+"""Template vehicle that stands in for what a log of an autopilot or format does not say."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +44,18 @@ class Imported:
 
 
 def format_of(path: Path) -> str:
-    """`px4`, `crazyflie`, `neurobem`, `rcbenchmark`, `csv` or `parquet`; InputError for what is none of them."""
+    """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
+
+    InputError for what is none of them.
+    """
     try:
         with open(path, "rb") as file:
             head = file.read(4096)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except IsADirectoryError:
+        if (path / "metadata.yaml").is_file():
+            return "ros"
         raise InputError(f"{path}: expected a log, found a folder") from None
     if not head:
         raise InputError(f"{path}: the file is empty")
@@ -61,19 +65,16 @@ def format_of(path: Path) -> str:
         return "crazyflie"
     if head.startswith(b"PAR1"):
         return "parquet"
-    for start, name, way in NOT_YET:
+    for start, name in BY_FIRST_BYTES:
         if head.startswith(start):
-            raise InputError(
-                f"{path}: this is {name}, which rotorid does not read yet; turn it into CSV ({way}), then "
-                "`rotorid import FILE.csv`"
-            )
+            return name
     if path.suffix.lower() == ".mat":
         return "neurobem"
     text = head.decode("utf-8", errors="replace")
     if "\0" in text:
         raise InputError(
-            f"{path}: not a log that rotorid knows (PX4 ULog, Crazyflie uSD, NeuroBEM .mat, RCbenchmark CSV, any CSV, "
-            "Parquet); its first bytes are " + head[:8].hex(" ")
+            f"{path}: not a log that rotorid knows (PX4 ULog, Betaflight, ArduPilot, ROS bag, MCAP, Crazyflie uSD, "
+            "NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
         )
     return "rcbenchmark" if "ESC signal" in text and "Thrust" in text else "csv"
 
@@ -86,6 +87,18 @@ def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
         return _px4(path)
     if kind == "crazyflie":
         return _crazyflie(path)
+    if kind == "betaflight":
+        runs, faults = betaflight.read_betaflight(path)
+        axes = "body forward-left-up, turned by half a turn about x into FRD"
+        return Imported(kind, runs, tuple(faults), axes, Known("betaflight"))
+    if kind == "ardupilot":
+        runs, faults, order = ardupilot.read_ardupilot(path)
+        axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
+        return Imported(kind, runs, tuple(faults), axes, Known(order))
+    if kind == "ros":
+        runs, faults = ros.read_ros(path)
+        axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
+        return Imported(kind, runs, tuple(faults), axes)
     if kind == "neurobem":
         table, faults = neurobem.read_neurobem(path)
         return Imported(kind, {path.stem: table}, tuple(faults), "NeuroBEM's, turned into FRD and NED")

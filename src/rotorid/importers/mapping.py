@@ -33,7 +33,8 @@ from rotorid.importers.clean import drop_repeated_times, report_gaps
 from rotorid.importers.frames import continuous
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
-from rotorid.recordings.files import explain, read_yaml
+from rotorid.recordings.explain import explain
+from rotorid.recordings.files import read_yaml
 
 G = 9.80665
 UNITS: dict[str, dict[str, float]] = {
@@ -106,7 +107,7 @@ def read_mapping(path: Path) -> Mapping:
     try:
         mapping = Mapping.model_validate(read_yaml(Path(path)))
     except ValidationError as error:
-        raise InputError(f"{path}: {explain(error)}") from None
+        raise InputError(f"{path}: {explain(error, Mapping)}") from None
     for name, channel in mapping.channels.items():
         if name not in CHANNELS:
             raise InputError(f"{path}: channels: {name}: no such channel{_near(name, CHANNELS)}")

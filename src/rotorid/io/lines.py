@@ -4,6 +4,7 @@
     baud_rate: 9600
     form: csv                # csv, key=value, or fixed (places in the line)
     separator: ","           # of csv and key=value; left out: any white space
+    decimal: ","             # where numbers are written 0,25; left out: a point
     columns:
       force_x_n: {field: 0, scale: 4.44822}     # value = scale × number; csv: the field's number from 0
       force_z_n: {field: 2, scale: 4.44822}     # key=value: the key; fixed: {start: 10, stop: 18}
@@ -13,21 +14,24 @@ The raw log keeps the bytes as they came, and the metadata the description, so a
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import pandas as pd
-import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from rotorid.errors import InputError
+from rotorid.io.models import Number, read_model
 from rotorid.io.rawlog import RECEIVED, read_raw
 from rotorid.io.session import SessionError, read_session, session_path
+from rotorid.recordings.explain import explain
 
 MAX_LINE = 4096
 
 
-class DescriptionError(ValueError):
+class DescriptionError(InputError):
     """The description is not what it should be; the sentence names file and place."""
 
 
@@ -41,22 +45,27 @@ class Column(_Model):
     field: int | str | None = None
     start: int | None = None
     stop: int | None = None
-    scale: float = 1.0
+    scale: Number = 1.0
 
 
 class Description(_Model):
     """How an instrument's lines are read."""
 
     name: str
-    baud_rate: int = 9600
+    baud_rate: int = Field(default=9600, ge=50, le=12_000_000)
     form: Literal["csv", "key=value", "fixed"] = "csv"
-    separator: str | None = None
+    separator: str | None = Field(default=None, min_length=1)
+    decimal: Literal[".", ","] = "."
     begin: str = ""  # sent to start it, escapes as in YAML: "R\r\n"
     end: str = ""  # sent to stop it
     columns: dict[str, Column]
 
     @model_validator(mode="after")
     def _fits(self) -> Description:
+        if not self.columns:
+            raise ValueError("columns: expected at least one")
+        if self.separator == self.decimal and self.form != "fixed":
+            raise ValueError("separator and decimal are the same sign; no line could be read")
         for name, column in self.columns.items():
             if self.form == "fixed" and (column.start is None or column.stop is None):
                 raise ValueError(f"columns.{name}: form `fixed` needs `start` and `stop`")
@@ -80,20 +89,21 @@ class Description(_Model):
                 texts = [found[column.field] for column in self.columns.values()]
             except KeyError as error:
                 raise ValueError(f"no field {error} in {line!r}") from error
-        return tuple(float(text) * column.scale for text, column in zip(texts, self.columns.values(), strict=True))
+        numbers = [self._number(text) for text in texts]
+        return tuple(number * column.scale for number, column in zip(numbers, self.columns.values(), strict=True))
+
+    def _number(self, text: str) -> float:
+        """Raises ValueError for what is no finite number: a heading, an overload written as text."""
+        text = text.strip().strip('"')
+        number = float(text if self.decimal == "." else text.replace(",", "."))
+        if not math.isfinite(number) or "_" in text or (self.decimal == "," and "." in text):
+            raise ValueError(f"{text!r} is no number")
+        return number
 
 
 def read_description(path: Path) -> Description:
     """Read and validate. Raises DescriptionError."""
-    try:
-        return Description.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise DescriptionError(f"{path}: cannot be read ({error.strerror})") from error
-    except yaml.YAMLError as error:
-        raise DescriptionError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise DescriptionError(f"{path}: {'.'.join(map(str, first['loc'])) or 'file'}: {first['msg']}") from error
+    return read_model(path, Description, DescriptionError)
 
 
 class LineDecoder:
@@ -135,12 +145,16 @@ class LineLog:
 
 
 def read_line_log(path: Path, description: Description | None = None) -> LineLog:
-    """Read a log of plain lines by its own description or by another. Raises SessionError, NotALog, OSError."""
+    """Read a log of plain lines by its own description or by another. Raises SessionError, NotALog."""
     if description is None:
         stored = read_session(session_path(path)).procedure.get("description")
         if stored is None:
             raise SessionError(f"{session_path(path)}: holds no description of lines; is this a log of frames?")
-        description = Description.model_validate(stored)
+        try:
+            description = Description.model_validate(stored)
+        except ValidationError as error:
+            where = f"{session_path(path)}: procedure.description."
+            raise SessionError(where + explain(error, Description)) from None
     raw, decoder, rows = read_raw(path), LineDecoder(description), []
     for chunk in raw.chunks:
         if chunk.tag == RECEIVED:

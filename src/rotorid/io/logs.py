@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import DATA, END, START
 from rotorid.io.intake import Intake
@@ -22,7 +23,7 @@ from rotorid.io.session import Ended, Session, SessionError, read_session, sessi
 from rotorid.io.wire.base import STREAMING
 
 
-class LogError(ValueError):
+class LogError(InputError):
     """A log that no table can be made of; the sentence names the file and what was expected."""
 
 
@@ -73,7 +74,7 @@ def read_log(path: str | Path) -> Log:
     """Parse a raw log (`.rlog` or `.rlog.gz`), whole, cut or damaged.
 
     Raises LogError where no start record tells the instrument (and no metadata does either) or where the log and
-    the metadata beside it are of two recordings, NotALog where the file is none, OSError where there is no file.
+    the metadata beside it are of two recordings, NotALog where the file is none or is not there.
     """
     path = Path(path)
     raw = rawlog.read_raw(path)

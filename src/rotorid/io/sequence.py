@@ -15,6 +15,7 @@ from rotorid.io.wire.base import BOOTED
 
 UNKNOWN_BOOT = -1  # a reset was noticed whose start record never came
 LATE_US = 1_000_000  # a frame that comes late or twice is not older than this
+LATEST_GAPS = 1000  # a late frame's gap is one of the last; looking through more would take for ever on a ruined line
 
 
 class Quality(IntFlag):
@@ -165,7 +166,7 @@ class Tracker:
         self._flags |= Quality.AFTER_GAP
 
     def _old(self, index: int, clock: int) -> Placed | None:
-        for i in range(len(self.gaps) - 1, -1, -1):  # a late frame's gap is one of the last
+        for i in range(len(self.gaps) - 1, max(len(self.gaps) - LATEST_GAPS, 0) - 1, -1):
             gap = self.gaps[i]
             if gap.segment == self.segment and gap.first_index <= index < gap.first_index + gap.count:
                 self.gaps[i : i + 1] = _split(gap, index, clock / 1e6)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
+from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-try:  # the C loader is ten times faster where PyYAML was built with it
-    from yaml import CSafeLoader as Loader
-except ImportError:  # pragma: no cover - depends on the platform
-    from yaml import SafeLoader as Loader
+from rotorid.errors import InputError
+from rotorid.io.models import Number, Whole, read_model
+
+LARGEST_METADATA, MOST_VALUES = 10_000_000, 200_000
 
 
 class Ended(StrEnum):
@@ -37,12 +38,15 @@ class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
+Place = Annotated[list[Number], Field(min_length=3, max_length=3)]
+
+
 class Air(_Model):
     """Air during the recording."""
 
-    temperature_c: float
-    pressure_pa: float
-    relative_humidity: float = Field(ge=0, le=1)
+    temperature_c: Number = Field(ge=-90, le=70)
+    pressure_pa: Number = Field(ge=10_000, le=120_000)
+    relative_humidity: Number = Field(ge=0, le=1)
 
     @property
     def density_kg_m3(self) -> float:
@@ -60,22 +64,24 @@ class Setup(_Model):
     operator: str | None = None
     platform: str | None = None  # al, pla, jr3; stand
     axis: str | None = None  # of the applied load: x, y, z
-    load_gf: float | None = None
+    load_gf: Number | None = None
     load_items: list[str] | None = None
-    repeat: int | None = None
-    cell: int | None = None
-    experiment: int | None = None  # table A.1
-    throttle: float | None = None
-    motor: int | None = None
+    repeat: Whole | None = None
+    cell: Whole | None = None
+    experiment: Whole | None = None  # table A.1
+    throttle: Number | None = None
+    motor: Whole | None = None
     specimen: str | None = None
-    infill_percent: int | None = None
-    gauge_length_mm: float | None = None
-    cross_section_mm2: float | None = None
+    infill_percent: Whole | None = None
+    gauge_length_mm: Number | None = None
+    cross_section_mm2: Number | None = None
     propeller: str | None = None
     battery: str | None = None
-    mount_roll_deg: float | None = None
-    mount_pitch_deg: float | None = None
-    sensor_position_m: list[float] | None = None  # body axes, from the believed centre of mass
+    mount_roll_deg: Number | None = None
+    mount_pitch_deg: Number | None = None
+    sensor_position_m: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = (
+        None  # body axes, from the believed centre of mass
+    )
     tared: bool | None = None  # the reading was zeroed with the vehicle in place
     air: Air | None = None
     remarks: str | None = None
@@ -124,7 +130,7 @@ class Counts(_Model):
 class Session(_Model):
     """One recording of one instrument."""
 
-    format: str = "rotorid-session-1"
+    format: Literal["rotorid-session-1"] = "rotorid-session-1"
     id: str
     group: str | None = None  # recordings that belong together (quadrotor and wrench of one experiment)
     instrument: str
@@ -138,7 +144,7 @@ class Session(_Model):
     setup: Setup = Setup()
     procedure: dict[str, Any] = {}  # what the recorder was told to do
     marks: dict[str, int] = {}  # step: value of the table's column `index` at its first (or last) sample
-    tare: dict[str, float] | None = None  # column: mean of the 25 tare samples
+    tare: dict[str, Number] | None = None  # column: mean of the 25 tare samples
     promised_rate_hz: float | None = None
     measured_rate_hz: float | None = None  # samples over device time
     device_clock_ratio: float | None = None  # device seconds per host second
@@ -153,8 +159,24 @@ class Session(_Model):
     log: str  # file name beside this file
     log_sha256: str | None = None  # of the unpacked log
 
+    @field_validator("started")
+    @classmethod
+    def _is_a_time(cls, text: str) -> str:
+        try:
+            datetime.fromisoformat(text)
+        except ValueError:
+            raise ValueError(f"found {text!r}, expected a time such as 2024-03-04T09:00:00-06:00") from None
+        return text
 
-class SessionError(ValueError):
+    @field_validator("log")
+    @classmethod
+    def _lies_beside(cls, name: str) -> str:
+        if name in ("", ".", "..") or "/" in name or "\0" in name:
+            raise ValueError(f"found {name!r}, expected the name of a file beside this one")
+        return name
+
+
+class SessionError(InputError):
     """The metadata file is missing, unreadable or not what it should be."""
 
 
@@ -166,10 +188,14 @@ def session_path(log: str | Path) -> Path:
 
 def write_session(session: Session, path: str | Path) -> None:
     """Write atomically: a reader sees the old file or the new one, never half of either."""
-    path = Path(path)
     text = yaml.safe_dump(
         session.model_dump(mode="json", exclude_none=True), sort_keys=False, allow_unicode=True, width=110
     )
+    replace_text(Path(path), text)
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Put a whole new text in the place of a file, or leave it as it is. Raises OSError."""
     temporary = path.with_name(path.name + ".tmp")
     try:
         with open(temporary, "w", encoding="utf-8") as file:
@@ -184,13 +210,7 @@ def write_session(session: Session, path: str | Path) -> None:
 
 def read_session(path: str | Path) -> Session:
     """Read and validate. Raises SessionError naming the file and the first key that is wrong."""
-    try:
-        return Session.model_validate(yaml.load(Path(path).read_text(encoding="utf-8"), Loader))
-    except FileNotFoundError as error:
-        raise SessionError(f"{path}: no such file; every log has its metadata beside it") from error
-    except yaml.YAMLError as error:
-        raise SessionError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the file"
-        raise SessionError(f"{path}: {where}: {first['msg']}") from error
+    path = Path(path)
+    if not path.exists() and not path.is_symlink():
+        raise SessionError(f"{path}: no such file; every log has its metadata beside it")
+    return read_model(path, Session, SessionError, LARGEST_METADATA, MOST_VALUES, compiled=True)

@@ -12,8 +12,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.mismatch import within_trust
-from rotorid.mismatch.carried import on_board
+from rotorid.mismatch import rules, within_trust
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
@@ -26,6 +25,7 @@ from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
+from rotorid.mismatch.payload_windows import on_board
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.refitted import refitted
 from rotorid.mismatch.regime import regime_variables
@@ -300,7 +300,7 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
 
 def rectified(findings: list[Finding]) -> list[Finding]:
     """An error of the accelerometer beside a vibration is what the sensor makes of the vibration."""
-    if not any(f.id == "vibration" for f in findings):
+    if not any(f.id == "vibration" for f in findings) or not rules.RECTIFIED.on:
         return findings
     why = "an error of the accelerometer did not hold: a vibration that the sensor rectifies looks the same"
     held = ("established", "ambiguous")
@@ -321,7 +321,7 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in CLAIMED]
     offset = next((f for f in stated if "com_offset" in (f.id, *f.alternatives)), None)
-    if offset is None or not heavier:
+    if not rules.PAYLOAD_OR_OFFSET(offset is not None and heavier):
         return findings
     out = []
     for f in findings:
@@ -333,7 +333,7 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
 
 def throttle_or_thrust(finding: Finding) -> Finding:
     """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
-    if finding.id != "thrust_curve" or finding.status not in ("established", "ambiguous"):
+    if not rules.THROTTLE_OR_THRUST(finding.id == "thrust_curve" and finding.status in CLAIMED):
         return finding
     both = tuple(sorted({"thrust_curve", "throttle_curve", *finding.alternatives}))
     return replace(finding, status="ambiguous", alternatives=both)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-LEAST_EXCITED = 0.1
-"""Mean square of an effect on the held-out part, beside that on the fitted one, from which the former can judge it."""
 LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
 
@@ -33,28 +31,6 @@ def growth(
     return np.nan_to_num(ratio, nan=1.0), np.nan_to_num(change.mean(axis=0) / np.maximum(doubt, 1e-300))
 
 
-def excited(parts: list[np.ndarray], held: list[np.ndarray]) -> bool:
-    """Whether contributions (n,) to a channel are large enough on the held-out rows beside the others."""
-    squares = [
-        np.concatenate([p[m] ** 2 for p, m in zip(parts, masks, strict=True)]) for masks in (held, inverted(held))
-    ]
-    here, there = (float(s.mean()) if len(s) else 0.0 for s in squares)
-    return here >= LEAST_EXCITED * there
-
-
-def inverted(masks: list[np.ndarray]) -> list[np.ndarray]:
-    return [~mask for mask in masks]
-
-
 def long_enough(held: list[np.ndarray], per: int) -> bool:
     """Whether there are LEAST_BLOCKS of `per` rows held out."""
     return sum(int(mask.sum()) // per for mask in held) >= LEAST_BLOCKS
-
-
-def helps(ratio: np.ndarray, z: np.ndarray, channels: list[int]) -> float:
-    """How surely the error of one of some channels grows without an effect: `growth` from with it to without.
-
-    Infinite without a channel: what shows in the comparison of two sensors alone is not judged by the wrench, nor what
-    does not act on the held-out part.
-    """
-    return max((float(z[c]) if ratio[c] > 1.0 else 0.0 for c in channels), default=np.inf)

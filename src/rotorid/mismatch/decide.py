@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch import rules
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
@@ -212,7 +213,7 @@ def wrong_values(
     doubtful = set(refused)
     at_limits: list[list[str]] = []
     while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
-        if (extra := spare(regression, always, named, loose)) is not None:
+        if rules.SPARE_VALUE((extra := spare(regression, always, named, loose)) is not None):
             doubtful.add(extra)
             continue
         fit = regression.fit(always + named, loose=loose)
@@ -224,10 +225,11 @@ def wrong_values(
             check = float(coefficients(reverse or regression, other, key)[0][0])
             noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
             agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
+            agrees = not rules.VALUE_AGREES(not agrees)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
-            fails = fails_elsewhere(regression, always, named, key, loose)
+            fails = rules.VALUE_TRANSFER(fails_elsewhere(regression, always, named, key, loose))
             if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 
+from rotorid.mismatch import rules
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.forward import Forward, forward_channels, prove
@@ -30,16 +31,23 @@ def deliver(
     page_path: Path,
     improved_path: Path,
     progress: Callable[[str], None] = LOG.info,
+    off: Collection[str] = (),
 ) -> Verdict:
-    """Analyse a set and write its verdict, its page and the improved vehicle."""
+    """Analyse a set and write its verdict, its page and the improved vehicle; rules named in `off` are left out."""
     progress(f"{recordings.name}: analysing {len(recordings.runs)} runs")
-    return write_files(analysis_of(recordings), verdict_path, page_path, improved_path, progress)
+    return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path, progress)
 
 
-def analysis_of(recordings: RecordingSet) -> Analysis:
-    """The analysis for the kind of the set; InputError in one sentence where the set does not suffice."""
+def analysis_of(recordings: RecordingSet, off: Collection[str] = ()) -> Analysis:
+    """The analysis for the kind of the set, without the rules named in `off`.
+
+    InputError in one sentence where the set does not suffice, or no rule has such a name.
+    """
     usable = sufficient(recordings)
-    analysis = analyse(usable) if usable.vehicle.kind == "flight" else analyse_instrument(usable)
+    with rules.asking(off) as asked:
+        analysis = analyse(usable) if usable.vehicle.kind == "flight" else analyse_instrument(usable)
+    without = tuple(f"Judged without the rule {name}: {rules.RULES[name].decides}" for name in sorted(asked.off))
+    analysis = replace(analysis, fired=dict(asked.fired), notes=(*without, *analysis.notes))
     recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with mistakes put right are made anew
     analysis = replace(analysis, recordings=recordings, notes=(*usable.left_out, *analysis.notes))
     return with_rounded_model(analysis)

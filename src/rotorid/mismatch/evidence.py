@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.mismatch import rules
 from rotorid.mismatch.comparison import VOTES_FROM
 from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.shares import fitted_part
@@ -61,12 +62,12 @@ class Evidence:
         if not self.ratios:
             return "the runs held out say nothing about it"
         worse = next((r for r in self.ratios if r.low > WORSE_RATIO), None)
-        if worse is not None:
+        if rules.WORSE(worse is not None):
             percent = f"{100 * (worse.value - 1):.0f} %"
             return f"on the runs held out the error of the {channel_words(worse.channel)} is {percent} larger with it"
-        if self.ratios[0].high >= 1.0:
+        if rules.NOT_BETTER(self.ratios[0].high >= 1.0):
             return "on the runs held out no channel is surely better with it"
-        if not self.beyond_leftover:
+        if rules.BELOW_LEFTOVER(not self.beyond_leftover):
             return "it is smaller than what the model leaves over"
         return ""
 
@@ -111,9 +112,10 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: 
     if finding.windows and not found.ratios:
         # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
         found = evidence(analysis, without, [in_windows(t, finding.windows) for t in analysis.traces])
-    reason = found.objection or ("" if away_from_nothing(finding) else "every number of it may be nothing")
+    nothing = rules.MAY_BE_NOTHING(not away_from_nothing(finding))
+    reason = found.objection or ("every number of it may be nothing" if nothing else "")
     slight = found.ratios and found.ratios[0].value > PLAIN_RATIO
-    if not reason and share < LEAST_SHARE and slight and not finding.windows:
+    if rules.SLIGHT(bool(not reason and share < LEAST_SHARE and slight and not finding.windows)):
         reason = f"it carries {100 * share:.1f} % of the error that goes"
     best = found.ratios[0] if found.ratios else None
     finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))

@@ -128,6 +128,8 @@ class Analysis:
     """Things a reader must know (what was derived, what was corrected)."""
     instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Wrong value to others, in words, that would explain as much in its place: `yaw inertia −9.8 ± 0.4 %`."""
+    fired: Mapping[str, int] = field(default_factory=dict)
+    """How often each rule's condition held during the analysis (`rules`)."""
     put_right: tuple[str, ...] = ()
     """Values put right within what was believed of them, in words: `thrust coefficient −0.7 %`."""
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.contract import Form
-from rotorid.mismatch.carried import Windows, carried_windows, changes, laden
-from rotorid.mismatch.decide import wrong_values
+from rotorid.mismatch import rules
+from rotorid.mismatch.decide import coefficients, wrong_values
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.gusts import with_gusts
+from rotorid.mismatch.payload_windows import Windows, carried_windows, changes, laden
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
@@ -41,6 +42,10 @@ RUN_SPREAD = 0.007
 """Relative spread of the thrust coefficient between runs below which one number serves all."""
 RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
+
+ROUNDS = 4
+MOVED = 0.3
+"""Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict."""
 
 Chain = tuple[SpeedResult, float, float | None]
 """What lies between command and speed, the full speed in rad/s, and the voltage at which it is reached."""
@@ -101,7 +106,7 @@ def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
         # A thrust curve in its place is the same column over again, with the torque's share left to a wrong value.
         renamed = any(plain.search.terms[k].effect == "thrust_curve" for k in plain.selection.active)
         limit = cost_of(model, model.regression.filters) + curve_cost(chain[0])
-        if not renamed and cost_of(plain, model.regression.filters) < limit:
+        if rules.CURVE_OR_ROTORS(not renamed and cost_of(plain, model.regression.filters) < limit):
             return (nothing_between(chain[0]), *chain[1:]), plain
     return chain, model
 
@@ -109,16 +114,17 @@ def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
     model = with_own_scales(prepared, segments, noisy)
-    if windows := carried_windows(model):
+    if rules.CARRIED(bool(windows := carried_windows(model))):
         segments, noisy, model = with_payload(prepared, model, windows)
     terms = list(model.terms)
-    for _ in range(2 if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0):
+    for _ in range(
+        ROUNDS if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
+    ):
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
-        again = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
-        same = set(again.selection.active) == set(model.selection.active)
-        model = again
-        if same:
+        before = model
+        model = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
+        if converged(before, model):
             break
     model = with_wind(prepared, model, segments, noisy, terms)
     if model.wind is not None:
@@ -126,10 +132,21 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     return with_gusts(prepared, model, terms)
 
 
+def converged(before: WrenchModel, after: WrenchModel) -> bool:
+    """Whether two rounds have the same terms at work, and no coefficient that moved by MOVED of its error."""
+    if set(before.selection.active) != set(after.selection.active):
+        return False
+    for key in after.selection.active:
+        (old, _), (new, covariance) = (coefficients(m.regression, m.selection.fit, key) for m in (before, after))
+        if np.any(np.abs(new - old) > MOVED * np.sqrt(np.diag(covariance))):
+            return False
+    return True
+
+
 def with_own_scales(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search over all terms, where thrust differs between runs with a scale for each."""
     model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
-    if not thrust_differs(model):
+    if not rules.OWN_SCALES(thrust_differs(model)):
         return model
     return wrench_model(prepared, with_run_scales(prepared.terms, prepared), segments=segments, noisy_segments=noisy)
 

@@ -14,14 +14,14 @@ import numpy as np
 from scipy.stats import chi2
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch import rules
 from rotorid.mismatch.bursts import gust_terms, windows
+from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.findings import Estimate, Finding
-from rotorid.mismatch.louder import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import Fit, Regression, build
 from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import BURST_SIZE
 from rotorid.mismatch.wrench import (
     FEELS_THE_AIR,
     WrenchModel,
@@ -47,8 +47,8 @@ MOST_EXTRAPOLATION = 1.05
 """Speed in a window, beside the fastest that is fitted, up to which the drag is known."""
 GUST_P = 1e-6
 BESIDE_A_BURST = 1.0
-"""Size, in units of the noise, of a gust that is believed where a stronger one (BURST_SIZE) blew: left out, it would be
-noise to the others."""
+"""Size, in units of the noise, of a gust that is believed where a stronger one blew: left out, it would be noise to the
+others."""
 STEPS, ROUNDS = 4, 2
 """Gauss-Newton steps for the wind alone, and searches repeated in it."""
 LARGEST_STEP_M_S = 4.0
@@ -306,7 +306,7 @@ def gust_of(term: Term, wind: np.ndarray, covariance: np.ndarray) -> Gust:
 def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
     """Those beyond chance that are strong, and the weaker ones beside them; nothing where none is strong."""
     sizes = [(g, size_of(g, model)) for g in gusts if g.p_value < GUST_P]
-    if max((size for _, size in sizes), default=0.0) <= BURST_SIZE:
+    if max((size for _, size in sizes), default=0.0) <= rules.OVERSHADOWED["times_for_burst"]:
         return []
     return [g for g, size in sizes if size > BESIDE_A_BURST]
 

@@ -10,6 +10,7 @@ import json
 import math
 
 from rotorid.mismatch.findings import Analysis, Finding
+from rotorid.mismatch.rules import RULES
 from rotorid.mismatch.verdict import Verdict
 from rotorid.writing import rounded
 
@@ -24,6 +25,7 @@ def ledger(analysis: Analysis, verdict: Verdict) -> list[dict]:
     out += [entry("within_trust", "values", sentence=text) for text in analysis.put_right]
     left = {"share_left": verdict.unexplained.share}
     out.append(entry("word_from_numbers", verdict.verdict, left, verdict.unexplained.description))
+    out += [entry(name, "search", {"fired": n}, RULES[name].decides) for name, n in sorted(analysis.fired.items())]
     return [e for e in out if e]
 
 

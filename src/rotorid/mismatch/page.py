@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import html
 import json
 import math
@@ -77,13 +78,16 @@ def make_page(
     data = page_data(analysis, verdict, main)
     data["regimes"]["first"] = first_variable(verdict, main, data["regimes"]["variables"])
     claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
+    scripts = page_file("uPlot.iife.min.js"), page_file("page.js")
     page = environment.from_string(page_file("page.html")).render(
         css=Markup(page_file("uPlot.min.css") + page_file("page.css")),
-        library=Markup(page_file("uPlot.iife.min.js")),
-        script=Markup(page_file("page.js")),
+        policy=policy_for(*scripts),
+        library=Markup(scripts[0]),
+        script=Markup(scripts[1]),
         data=embedded(data),
         has_figure=bool(data["traces"]),
         has_regimes=bool(data["regimes"]["channels"]),
+        has_replay=data["replay"] is not None,
         set=verdict.set,
         runs=runs_text(verdict),
         word=WORDS[verdict.verdict],
@@ -103,7 +107,7 @@ def make_page(
         values=[value_range(name, *v) for name, v in analysis.values.items()],
         better_text=better_text(verdict),
         forward_text=forward_text(verdict),
-        table=error_table(verdict.channels),
+        table=error_table(verdict.channels, data["fit_percent"]),
         rest=rest_text(verdict),
         ruled_out=[ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
         silent=listed(silent),
@@ -113,6 +117,16 @@ def make_page(
         notes=notes(analysis, forward_notes),
     )
     return spoken(page, analysis)
+
+
+def policy_for(*scripts: str) -> str:
+    """Content security policy under which these scripts alone run, nothing is fetched and nothing sent."""
+    hashes = (base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
+    allowed = " ".join(f"'sha256-{h}'" for h in hashes)
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        "form-action 'none'"
+    )
 
 
 def embedded(data: Mapping) -> Markup:
@@ -185,7 +199,7 @@ def ranges_html(rows: Sequence[Mapping]) -> Markup:
     """Table of parameters, each with its interval drawn on the range that is physically plausible."""
     if not rows:
         return Markup("")
-    out = [Markup("<table>")]
+    out = [Markup('<table class="ranges">')]
     for row in rows:
         marks = Markup("")
         if row["scale"] is not None:
@@ -430,8 +444,8 @@ def better_text(verdict: Verdict) -> str:
     )
 
 
-def error_table(channels: Mapping[str, Channel]) -> list[dict]:
-    """Rows of errors, inverse dynamics and simulation run forward apart."""
+def error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float, float]]) -> list[dict]:
+    """Rows of errors, inverse dynamics and simulation run forward apart; `fits` in per cent, before and after."""
     groups = []
     for name, chosen in (
         ("inverse dynamics", [c for c in channels if c not in FORWARD_WORDS]),
@@ -443,6 +457,7 @@ def error_table(channels: Mapping[str, Channel]) -> list[dict]:
                 "unit": unit_text(channels[c].unit),
                 "noise": cell(channels[c].noise_floor),
                 "bars": bars(channels[c]),
+                "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
                 "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in ("before", "refitted", "after")],
                 "training": [cell(getattr(channels[c].rmse.training, s)) for s in ("before", "refitted", "after")],
             }

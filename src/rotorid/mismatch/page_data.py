@@ -13,12 +13,14 @@ import numpy as np
 
 from rotorid.mismatch.findings import Analysis, Trace
 from rotorid.mismatch.locate import REGIME_BLOCK_S
-from rotorid.mismatch.shares import fitted_part
+from rotorid.mismatch.page_replay import replay
+from rotorid.mismatch.page_signals import fit_percent, measured
+from rotorid.mismatch.shares import fitted_part, segments_of
 from rotorid.mismatch.verdict import Verdict
 from rotorid.mismatch.words import FORWARD_WORDS, channel_words, regime_words
 
-BUDGET = 600_000
-"""Values that the page may hold of all traces together; 600 000 are 1.6 MB."""
+BUDGET = 800_000
+"""Values that the page may hold of all traces together; 800 000 are 2.2 MB."""
 MOST_BLOCKS = 4000
 LONGEST_LAG_S = 1.0
 MOST_LAGS = 60
@@ -44,15 +46,21 @@ def packed_times(time_s: np.ndarray) -> str:
 def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
     """Everything that the page's script draws: traces by run and channel, locations, regimes, correlation."""
     channels = [c for c in verdict.channels if c not in FORWARD_WORDS]
+    segments = segments_of(analysis)
+    readings = measured(analysis, segments)
     by_pair: dict[tuple[str, str], list[Trace]] = {}
-    for trace in analysis.traces:
+    read_by_pair: dict[tuple[str, str], list[np.ndarray]] = {}
+    for trace, reading in zip(analysis.traces, readings, strict=True):
         if trace.channel in channels:
             by_pair.setdefault((trace.run, trace.channel), []).append(trace)
-    total = sum(3 * len(t.time_s) for traces in by_pair.values() for t in traces)
+            read_by_pair.setdefault((trace.run, trace.channel), []).append(reading)
+    total = sum(4 * len(t.time_s) for traces in by_pair.values() for t in traces)
     every = max(1, int(np.ceil(total / BUDGET)))
     runs = list(dict.fromkeys(run for run, _ in by_pair))
+    loudest = _loudest_run(analysis, verdict, main)
+    flown = replay(analysis, verdict, loudest, segments)
     return {
-        "main": {"channel": main, "run": _loudest_run(analysis, verdict, main)},
+        "main": {"channel": main, "run": loudest},
         "every": every,
         "channels": {
             c: {"name": channel_words(c), "unit": verdict.channels[c].unit, "noise": verdict.channels[c].noise_floor}
@@ -61,7 +69,9 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
         },
         "runs": {r: {"held_out": r in verdict.runs.held_out and verdict.runs.held_out != verdict.runs.training}
                  for r in runs},
-        "traces": [_series(run, channel, traces, every) for (run, channel), traces in by_pair.items()],
+        "traces": [_series(*pair, traces, read_by_pair[pair], every) for pair, traces in by_pair.items()],
+        "fit_percent": {c: [round(v, 2) for v in fit] for c, fit in fit_percent(analysis, readings).items()},
+        "replay": None if flown is None else _frames(loudest, flown),
         "locations": [
             {"run": loc.run, "channel": loc.channel, "start": loc.start_s, "stop": loc.stop_s}
             for loc in verdict.locations
@@ -81,23 +91,32 @@ def _loudest_run(analysis: Analysis, verdict: Verdict, main: str) -> str:
     return max(held, key=lambda t: float(np.nanmean(t.before**2) - np.nanmean(t.after**2))).run
 
 
-def _series(run: str, channel: str, traces: Sequence[Trace], every: int) -> dict:
-    def joined(name: str) -> np.ndarray:
+def _series(run: str, channel: str, traces: Sequence[Trace], readings: Sequence[np.ndarray], every: int) -> dict:
+    """One channel of one run: what was measured, and what the believed and the improved model leave of it."""
+
+    def joined(series: Sequence[np.ndarray]) -> np.ndarray:
         parts = []
-        for k, trace in enumerate(traces):
+        for k, values in enumerate(series):
             if k:
                 parts.append(np.array([np.nan]))
-            parts.append(getattr(trace, name)[::every])
+            parts.append(values[::every])
         return np.concatenate(parts)
 
-    time = joined("time_s")
+    time = joined([t.time_s for t in traces])
     # A row between two stretches keeps their lines apart; it needs an instant of its own.
     holes = np.flatnonzero(np.isnan(time))
     time[holes] = (time[holes - 1] + time[holes + 1]) / 2
     out = {"run": run, "channel": channel, "time": packed_times(time)}
-    # The reading itself, where an analysis hands it on beside the errors.
-    names = ("before", "after") + (("measured",) if getattr(traces[0], "measured", None) is not None else ())
-    return out | {name: packed(joined(name)) for name in names}
+    out |= {name: packed(joined([getattr(t, name) for t in traces])) for name in ("before", "after")}
+    reading = joined(readings)
+    return out | ({"measured": packed(reading)} if np.isfinite(reading).any() else {})
+
+
+def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
+    """The replay's frames as the page's script reads them."""
+    out = {"run": run, "time": packed_times(flown["time_s"]), "rotors": np.round(flown["rotors"], 5).tolist()}
+    names = [n for n in flown if n not in ("time_s", "rotors")]
+    return out | {name: packed(flown[name].ravel()) for name in names}
 
 
 def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[Trace]]) -> dict:

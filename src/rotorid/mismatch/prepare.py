@@ -10,7 +10,8 @@ from scipy.signal import welch
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, not_testable_reason
-from rotorid.mismatch.louder import louder
+from rotorid.mismatch import rules
+from rotorid.mismatch.excess_noise import noise_factors
 from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments, full_speed
 from rotorid.mismatch.rows import (
     OFFSETS,
@@ -267,7 +268,9 @@ def prepare(
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng, full)
     thinner = Thinner(rate_hz, cutoff)
-    if len(noisy) == len(segments) and (factors := louder(segments, noisy, vehicle, thinner)):
+    if len(noisy) == len(segments) and rules.COLOURED_NOISE(
+        bool(factors := noise_factors(segments, noisy, vehicle, thinner))
+    ):
         noise = {k: v * factors.get(k, 1.0) for k, v in noise.items()}
         noisy = []
         for run in recordings.runs:

@@ -44,6 +44,10 @@ MOST_OF_ACTIVE_SET = 20
 HOLD = 1e6
 RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
+NEVER_EXCITED = 1e-24
+"""Diagonal of a normal matrix up to which a column is not excited at all."""
+UNKNOWN = 1e12
+"""Variance of a coefficient of which nothing is known."""
 NOISE_SAFETY = 2.0
 """Sensor noise is often more than its white part; energies of it are taken this much larger when they exclude."""
 
@@ -150,7 +154,7 @@ class Regression:
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
         self._explained: dict[tuple[str, ...], float] = {}
         self._fits: dict[tuple, Fit] = {}
-        self._left_out: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}
+        self._left_out: dict[tuple, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def with_room(self, least: float) -> Regression:
         """The same with believed values that may move by at least a share `least`."""
@@ -308,6 +312,12 @@ class Regression:
         self, keys: Iterable[str], whole_runs: bool, loose: dict[str, float] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Columns (k,) of terms and their coefficients fitted without each fold in turn, (folds, k)."""
+        return self._without_folds(keys, whole_runs, loose)[:2]
+
+    def _without_folds(
+        self, keys: Iterable[str], whole_runs: bool, loose: dict[str, float] | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
             if len(self._left_out) > MOST_REMEMBERED:
@@ -315,7 +325,7 @@ class Regression:
             self._left_out[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
-    def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray]:
+    def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         kinds = {t.key: t for t in self.terms}
         winds = [k for k in keys if kinds[k].kind == "wind" and kinds[k].run]
         if winds:
@@ -326,25 +336,32 @@ class Regression:
             precision = precision.copy()
             for key, sd in loose:
                 precision[self.columns([key])] = 1.0 / sd**2
-        found = []
+        found, inverses = [], []
         for out in range(fold.max() + 1):
             mask = self.training & (fold != out)
             gram, cross, bias, bias_cross = self._normal(cols, mask)
             normal = gram - bias + np.diag(precision[cols])
-            found.append(bounded(normal, cross - bias_cross, self.limit[cols])[0])
+            beta, inverse = bounded(normal, cross - bias_cross, self.limit[cols])[:2]
+            found.append(beta)
+            # Of a column that only this fold excites nothing is known without it.
+            dead = np.diag(normal) <= NEVER_EXCITED
+            inverses.append(np.where(np.diag(dead), UNKNOWN, inverse))
             self._fit_held_out_scales(cols, found[-1], mask)
-        return cols, np.array(found)
+        return cols, np.array(found), np.array(inverses)
 
-    def _leave_out_in_wind(self, keys, winds, whole_runs, loose) -> tuple[np.ndarray, np.ndarray]:
+    def _leave_out_in_wind(self, keys, winds, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The same where winds of single runs blow: they belong to the run and are found in it, left out or not."""
-        cols, betas = self.without_winds().left_out(keys, whole_runs, dict(loose))
+        cols, betas, known = self.without_winds()._without_folds(keys, whole_runs, dict(loose))
         own = self.columns(winds)
         both = np.concatenate([cols, own])
         gram, cross, bias, bias_cross = self._normal(both, self.training)
         normal, right, count = gram - bias + np.diag(self.precision[both]), cross - bias_cross, len(cols)
         inverse = ridge_inverse(normal[count:, count:])
         blowing = (right[count:, None] - normal[count:, :count] @ betas.T).T @ inverse
-        return both, np.concatenate([betas, blowing], axis=1)
+        # The winds are of the run that is left out, so their own errors are not those of another run's numbers.
+        inverses = np.zeros((len(betas), len(both), len(both)))
+        inverses[:, :count, :count] = known
+        return both, np.concatenate([betas, blowing], axis=1), inverses
 
     def compare(
         self, more: list[str], fewer: list[str], loose: dict[str, float] | None = None, whole_runs: bool | None = None
@@ -361,7 +378,8 @@ class Regression:
             return apart if apart.answers else self.compare(more, fewer, loose, False)
         fold = self.folds(whole_runs)
         environment = environments(self.run[self.training], self.block_s)
-        (cols, a), (others, b) = (self.left_out(keys, whole_runs, loose) for keys in (more, fewer))
+        more_of, fewer_of = (self._without_folds(keys, whole_runs, loose) for keys in (more, fewer))
+        (cols, a, _), (others, b, _) = more_of, fewer_of
         index = np.flatnonzero(self.training)
         a, b = a[fold[index]], b[fold[index]]
         left = [
@@ -375,21 +393,20 @@ class Regression:
         shift[:, shared] -= b[:, at]
         gram = self.gram[np.ix_(index, cols, cols)]
         promised = np.einsum("bk,bkl,bl->b", shift, gram, shift)
-        # What the fitted blocks of each fold hold of the same change of coefficients.
-        every = gram.sum(axis=0)
-        seen = np.empty(len(index))
-        for out in np.unique(fold[index]):
-            own = fold[index] == out
-            one = shift[own][0]
-            seen[own] = one @ (every - gram[own].sum(axis=0)) @ one
+        doubt = self._doubt(index, cols, fold, more_of[2]) - self._doubt(index, others, fold, fewer_of[2])
         count = int(environment.max()) + 1
         size = np.bincount(environment, minlength=count)
         return Comparison(
             np.bincount(environment, left[1] - left[0], count),
             np.bincount(environment, promised, count),
-            np.bincount(environment, seen, count) / size,
+            np.bincount(environment, doubt, count),
             np.bincount(environment, fold[index], count) / size,
         )
+
+    def _doubt(self, index: np.ndarray, cols: np.ndarray, fold: np.ndarray, inverses: np.ndarray) -> np.ndarray:
+        """Squares that errors of coefficients fitted without a block's fold are expected to make in it, (blocks,)."""
+        gram = self.gram[np.ix_(index, cols, cols)]
+        return np.einsum("bkl,bkl->b", gram, inverses[fold[index]])
 
     def shown(self, key: str) -> np.ndarray:
         """Which columns of a term act in any row fitted, (k,)."""
@@ -536,7 +553,7 @@ def trusted(shift: np.ndarray, normal: np.ndarray, values: np.ndarray, precision
 
 def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
-    dead = diagonal <= 1e-24
+    dead = diagonal <= NEVER_EXCITED
     return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
 
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.carried import carried_windows, laden
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.gusts import with_gusts_of_new_runs
 from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.payload_windows import carried_windows, laden
 from rotorid.mismatch.prepare import assemble_rows, prepare_like
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import RUN_SCALE, Rows, Term

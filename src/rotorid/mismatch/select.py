@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from rotorid.mismatch import rules
 from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
@@ -20,10 +21,8 @@ FINAL_P = 1e-3
 """The same with a jackknife over blocks, which no single moment of the flight can decide."""
 COST_PER_PARAMETER = 8.0
 """Whitened squares that each further parameter must explain before a richer form is preferred."""
-SMALLEST_SIZE = 0.15
-"""An effect below this share of the channel's noise (its strongest tenth of the seconds) does not matter."""
-SHARE_OF_LARGEST = 0.04
-"""Nor does one below this share of the largest effect in its channel: no form is known better than that."""
+SMALLEST_SIZE = rules.SIZE["least"]
+SHARE_OF_LARGEST = rules.OVERSHADOWED["share"]
 COST_PER_EFFECT = 20.0
 """Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
 COST_OF_UNKNOWN = 40.0
@@ -37,30 +36,13 @@ SAME_DIRECTION = 0.05
 """Share of the strongest combination of a term's parameters below which another is not told from it."""
 MOST_EXTRA_PARAMETERS = 3
 """An alternative with more further parameters than this explains by its freedom, not by its cause."""
-SHARE_OF_LARGEST_BURST = 0.15
-BURST_SIZE = 3.0
-"""A burst must be this many times larger than an effect that acts throughout."""
 MOST_EFFECTS = 10
 MOST_TRIALS = 12
 """Exchanges looked at closely, the most promising first."""
-LEAST_TRANSFER = 0.6
-"""Share of what an effect promises that it must gain on environments it was not fitted on. Effects known to be at work
-in simulated flights gained 0.94 to 1.00, effects of published size on real ones 0.92 to 1.18; names that only fill a
-gap 0.3 to 0.55."""
-LEAST_WON = 0.7
-"""Share of the environments exciting an effect in which it must gain, beside that expected of its strength: effects at
-work gained in 0.88 to 1.00 of them."""
-LEAST_PROMISE = 25.0
-"""Whitened squares that an effect must promise before its failing counts."""
-MOST_STRAIN = 4.0
-"""Standard deviations of trust that an effect may push a believed value to."""
+LEAST_TRANSFER = rules.TRANSFER["share"]
+LEAST_PROMISE = rules.TRANSFER["promise"]
 NEAR_LIMIT = 0.98
 """Share of the furthest that a believed value may move at which it counts as held there."""
-CANCELLED = 0.1
-"""Two contributions cancel each other in a channel where their sum is this share of either."""
-UNSTEADY_P = 1e-6
-UNSTEADY_SHARE = 0.4
-"""A coefficient that spreads by more than this share of itself between runs is no constant of the vehicle."""
 
 
 @dataclass(frozen=True)
@@ -138,15 +120,15 @@ class Search:
 
     def physical(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
         """Whether coefficients are within their bounds, and large enough for what the form says."""
-        if not self.within_bounds(term, beta, error):
+        if rules.BOUNDS(not self.within_bounds(term, beta, error)):
             return False
         if not term.form.linear:
             return True
         for index, value, sd in zip(term.form.linear, beta, error, strict=True):
-            if index in term.form.must_show and abs(value) < 2.0 * sd:
+            if rules.MUST_SHOW(index in term.form.must_show and abs(value) < 2.0 * sd):
                 return False
         limits = [term.form.parameters[i].negligible for i in term.form.linear]
-        return any(abs(value) > limit for value, limit in zip(beta, limits, strict=True))
+        return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
 
     def judge(self, key: str, active: list[str], base: Fit, jackknife: bool = False) -> Candidate:
         """A term added to (or, if in `active`, kept in) the model."""
@@ -162,8 +144,8 @@ class Search:
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         if physical:
             own, noise = self.regression.own_part(keys, key, beta)
-            physical = own > SHARE_OF_LARGEST**2 and noise < MOST_ATTENUATION
-        physical = physical and not self.strains(fit, base)
+            physical = not rules.OWN_PART(own <= SHARE_OF_LARGEST**2 or noise >= MOST_ATTENUATION)
+        physical = physical and not rules.STRAIN(self.strains(fit, base))
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
     def strains(self, fit: Fit, base: Fit) -> bool:
@@ -172,7 +154,7 @@ class Search:
             if term.kind != "value":
                 continue
             column = self.regression.start[term.key]
-            most = min(MOST_STRAIN * term.prior_sd[0], NEAR_LIMIT * self.regression.limit[column])
+            most = min(rules.STRAIN["deviations"] * term.prior_sd[0], NEAR_LIMIT * self.regression.limit[column])
             with_it = abs(fit.beta[fit.columns == column][0])
             without = abs(base.beta[base.columns == column][0])
             if with_it > most and with_it > without + term.prior_sd[0]:
@@ -190,10 +172,12 @@ class Search:
                 cols = self.regression.columns([k])
                 where = fit.places(cols)
                 largest = np.maximum(largest, self.ask.sizes_of(k, fit.beta[where]))
-        if self.terms[key].run:
-            # A burst is easily imitated by what the form of a strong effect leaves over.
-            return float(np.where(own >= SHARE_OF_LARGEST_BURST * largest, own, 0.0).max()) / BURST_SIZE
-        return float(np.where(own >= SHARE_OF_LARGEST * largest, own, 0.0).max())
+        limits, burst = rules.OVERSHADOWED, self.terms[key].run
+        dwarfed = own < (limits["share_of_burst"] if burst else limits["share"]) * largest
+        if limits(bool(dwarfed.any())):
+            own = np.where(dwarfed, 0.0, own)
+        # A burst is easily imitated by what the form of a strong effect leaves over.
+        return float(own.max()) / (limits["times_for_burst"] if burst else 1.0)
 
     def without(self, key: str, active: list[str]) -> Fit:
         return self.regression.fit(self.always + [k for k in active if k != key])
@@ -232,7 +216,7 @@ class Search:
 
         Drag and inflow at the hubs, for example, are the same as at the centre of mass with a damping beside them.
         """
-        if len(active) < 2:
+        if len(active) < 2 or not rules.SIMPLER.on:
             return None
         best, found = self.worth(active), None
         for gone in active:
@@ -263,6 +247,8 @@ class Search:
 
         The newcomer must hold by itself: what it displaces is not looked at again, and would be lost with it.
         """
+        if not rules.EXCHANGE.on:
+            return None
         taken = {self.terms[k].once for k in active} | set(dropped)
         least = self.worth(active) + COST_PER_PARAMETER / 2
         trials = []
@@ -296,7 +282,7 @@ class Search:
             return None
         wide = reg.with_room(VALUE_LIMITS[1])
         enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
-        return wide if enough else None
+        return wide if rules.VALUES_FIRST(enough) else None
 
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
@@ -310,7 +296,7 @@ class Search:
             reason = Reason("significance", f"p = {judged.p_value:.2g} beside the others")
         elif not judged.physical:
             reason = Reason("physical_bounds", "its coefficients are outside physical bounds")
-        elif size < SMALLEST_SIZE:
+        elif rules.SIZE(size < SMALLEST_SIZE):
             reason = Reason("size", f"its size is {size:.2g} of the noise")
         return reason, judged.score
 
@@ -352,14 +338,14 @@ class Search:
                 if better != key:
                     active[active.index(key)] = better
                     trail.append(f"  {key} → {better}")
-            if (simpler := self.simpler(active)) is not None:
+            if (simpler := self.simpler(active)) is not None and rules.SIMPLER(True):
                 trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
                 for key in active:
                     if self.terms[key].once not in {self.terms[k].once for k in simpler}:
                         dropped[self.terms[key].once] = Reason("simpler", "the others explain as much in other forms")
                 active = simpler
             exchanged = None if added else self.swapped(active, dropped)
-            if exchanged is not None:
+            if exchanged is not None and rules.EXCHANGE(True):
                 trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
                 for gone in set(active) - set(exchanged):
                     dropped[self.terms[gone].once] = Reason("exchange", "another explains more in its place")
@@ -384,28 +370,30 @@ class Search:
             if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
                 continue
             size = self.weight(candidate.key, candidate.beta, active)
-            if size >= SMALLEST_SIZE:
+            if not rules.SIZE(size < SMALLEST_SIZE):
                 return [candidate.key]
             dropped.setdefault(effect, Reason("size", f"its size is {size:.2g} of the noise"))
         return None
 
     def _turn(self, candidate: Candidate) -> int:
         """When a candidate is looked at: one that could be two effects, or has no name, where nothing else enters."""
-        return int(self.terms[candidate.key].form.compound) if candidate.named else 2
+        later = self.terms[candidate.key].form.compound if candidate.named else False
+        return int(rules.COMPOUND_LAST(later)) if candidate.named else 2
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
         """A term that another sensor, the held-out runs or the runs among themselves speak against, with the reason."""
         if self.ask.contradicted is not None:
             fit = self.regression.fit(self.always + active)
-            if (none := next((k for k in active if self.ask.contradicted(k, fit)), None)) is not None:
+            none = next((k for k in active if self.ask.contradicted(k, fit)), None)
+            if rules.TWO_SENSORS(none is not None):
                 return none, Reason("two_sensors", "the comparison of two sensors shows nothing of it")
-        if (failed := self.refuted_elsewhere(active)) is not None:
+        if rules.TRANSFER((failed := self.refuted_elsewhere(active)) is not None):
             return failed, Reason("transfer", "where it was not fitted it does not keep what it promises")
-        if (unsteady := self.unsteady(active)) is not None:
+        if rules.STEADY((unsteady := self.unsteady(active)) is not None):
             return unsteady, Reason("steady", "it differs from run to run")
-        if (leaning := self.leaning(active)) is not None:
+        if rules.CANCELS_UNNAMED((leaning := self.leaning(active)) is not None):
             return leaning, Reason("cancels_unnamed", "it only cancels a cause without a name")
-        if (cancelling := self.cancelling(active)) is not None:
+        if rules.CANCELS((cancelling := self.cancelling(active)) is not None):
             return cancelling, Reason("cancels", "where it is strongest it only cancels another")
         return None
 
@@ -430,7 +418,7 @@ class Search:
             for key in pair:
                 c = int(np.argmax(alone[key]))
                 least = min(alone[k][c] for k in pair)
-                if least > SMALLEST_SIZE and both[c] < CANCELLED * least:
+                if least > SMALLEST_SIZE and both[c] < rules.CANCELS["share"] * least:
                     found.add(key)
         return min(found, key=lambda k: fit.gain - self.without(k, active).gain, default=None)
 
@@ -440,7 +428,7 @@ class Search:
             fit = self.regression.fit(self.always + active, jackknife=True)
             final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
             doubtful = max(active, key=lambda k: final[k], default=None)
-            if doubtful is None or final[doubtful] <= FINAL_P:
+            if doubtful is None or not rules.JACKKNIFE(final[doubtful] > FINAL_P):
                 return fit, final
             active.remove(doubtful)
             dropped[self.terms[doubtful].once] = Reason(
@@ -463,7 +451,7 @@ class Search:
                 continue
             kept = (
                 seen.transfer
-                if seen.won >= LEAST_WON * seen.expected_won
+                if seen.won >= rules.TRANSFER["won"] * seen.expected_won
                 else min(seen.transfer, LEAST_TRANSFER - 1e-9)
             )
             if kept < worst:
@@ -503,13 +491,14 @@ class Search:
             runs = len(np.unique(self.regression.run[self.regression.training]))
             # Coefficients of one term have different units: what counts is how much of its contribution changes.
             gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
-            if p < UNSTEADY_P and np.diag(gram) @ spread * runs > UNSTEADY_SHARE**2 * (beta @ gram @ beta):
+            changes = np.diag(gram) @ spread * runs > rules.STEADY["spread"] ** 2 * (beta @ gram @ beta)
+            if p < rules.STEADY["p_value"] and changes:
                 return key
         return None
 
     def pair(self, active: list[str], dropped: dict[str, str], most: int = 14) -> list[str] | None:
         """Two terms that mask each other: neither enters alone, both hold together."""
-        if len(active) > MOST_EFFECTS - 2:
+        if len(active) > MOST_EFFECTS - 2 or not rules.PAIR.on:
             return None
         base = self.regression.explained(self.always + active)
         best: dict[str, tuple[float, Term]] = {}
@@ -527,7 +516,7 @@ class Search:
                 gain -= COST_PER_PARAMETER * (one.size + other.size)
                 if gain < max(one_gain, 0) + max(other_gain, 0) + COST_PER_EFFECT or gain <= top:
                     continue
-                if all(self._holds(k, active + keys) for k in keys):
+                if rules.PAIR(all(self._holds(k, active + keys) for k in keys)):
                     winner, top = keys, gain
         return winner
 
@@ -537,7 +526,7 @@ class Search:
             judged.p_value < ENTER_P / 10
             and judged.physical
             and judged.score > 0
-            and self.weight(key, judged.beta, active) > SMALLEST_SIZE
+            and not rules.SIZE(self.weight(key, judged.beta, active) <= SMALLEST_SIZE)
         )
 
     def alternatives(self, key: str, active: list[str]) -> list[str]:
@@ -556,7 +545,7 @@ class Search:
                 continue
             if term.effect in found or term.effect in UNKNOWNS:
                 continue
-            if self._stands_in(term.key, own, rest, base) or self._shares(term.key, key, rest):
+            if self._stands_in(term.key, own, rest, base) or rules.SHARED_CLASS(self._shares(term.key, key, rest)):
                 found.append(term.effect)
         return found
 
@@ -572,7 +561,7 @@ class Search:
             return False
         both = self.judge(own.key, [*rest, other], beside)
         alike = len(instead.beta) < len(own.beta) and both.gain < SHARE_OF_LARGEST**2 * own.gain
-        return both.p_value > ALTERNATIVE_P or alike
+        return both.p_value > ALTERNATIVE_P or rules.ALIKE(alike)
 
     def directions(self, term: Term) -> int:
         """How many parameters of a term these recordings tell from each other, by the size of what they do.

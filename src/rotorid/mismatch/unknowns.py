@@ -107,7 +107,7 @@ def gain_forms(instrument):
     low, high = instrument.temperatures_c
     if high > low:
         forms.append(_gain("with temperature", "1/K", loaded, lambda x: x.temperature_c - low))
-    runs = instrument.training or instrument.runs
+    runs = instrument.runs
     if len(runs) > 1:
         forms.append(_mixture_of_each(runs, loaded, instrument.channels))
     for run in runs if len(runs) > 1 else ():

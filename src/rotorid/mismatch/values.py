@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.thrust_curve import SQUARE
+from rotorid.mismatch import rules
 from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.findings import Estimate, Finding
@@ -167,4 +168,6 @@ def without_values_in_question(findings: list[Finding], values: dict) -> dict:
     """Values less those that would be right, or others, if another member of an open class were at work."""
     members = {i for f in findings if f.status == "ambiguous" for i in f.alternatives}
     open_values = {key for i, keys in IN_QUESTION.items() if i in members for key in keys}
+    if not rules.VALUE_IN_QUESTION(bool(open_values & set(values))):
+        return values
     return {k: v for k, v in values.items() if k not in open_values}

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from rotorid.mismatch import rules
 from rotorid.mismatch.channel_errors import growth
 from rotorid.mismatch.decide import coefficients, relative_change
 from rotorid.mismatch.delivered import (
@@ -88,7 +89,7 @@ def pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray]
     """
     ratio, z = growth(plain, free, held, per)
     worse, better = (ratio > WORSE_RATIO) & (z > LEAST_Z), (ratio < BETTER_RATIO) & (z < -LEAST_Z)
-    return bool(better.any() and not worse.any())
+    return rules.SETTLED(bool(better.any() and not worse.any()))
 
 
 def in_words(moved: Values, names: Mapping[str, str] = PARAMETER_NAMES) -> tuple[str, ...]:

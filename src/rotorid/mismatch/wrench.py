@@ -9,9 +9,10 @@ from scipy.optimize import minimize_scalar
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
+from rotorid.mismatch import rules
+from rotorid.mismatch.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.contributions import Contributions
-from rotorid.mismatch.echo import echo_s
-from rotorid.mismatch.louder import NOISE_BAND, band_power
+from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
@@ -356,7 +357,12 @@ def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None =
         force_z = 2 if "force" in groups else None
         rate_hz = prepared.thinner.rate_hz
         noisy = [s for s in prepared.noisy_segments if s.run in prepared.split.training]
-        late_s = echo_s(segments, noisy, vehicle, prepared.thinner.cutoff_hz) if noisy and "moment" in groups else 0.0
+        late_s = (
+            closed_loop_bias_s(segments, noisy, vehicle, prepared.thinner.cutoff_hz)
+            if noisy and "moment" in groups
+            else 0.0
+        )
+        late_s = late_s if rules.CLOSED_LOOP_BIAS(late_s > 0.0) else 0.0
         problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
     return SpeedSearch(problem, candidate_forms(segments, full_voltage is not None)).run(), full_speed, full_voltage
 

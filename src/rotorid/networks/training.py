@@ -9,15 +9,22 @@ from __future__ import annotations
 
 import logging
 import os
+import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
+from rotorid.errors import InputError
 from rotorid.networks.network import Network, gradients
+from rotorid.recordings.text_files import check_file
+from rotorid.wording import printable
 
 LOGGER = logging.getLogger("rotorid.networks")
+LARGEST_CHECKPOINT = 100_000_000
+"""Bytes of a checkpoint's arrays."""
 Method = Literal["batch", "stochastic", "mini-batch"]
 
 
@@ -111,15 +118,40 @@ def _store(path: Path, epoch: int, weights, biases, history) -> None:
 
 
 def _restore(path: Path, weights, biases, history) -> int:
-    with np.load(path) as held:
-        names = [f"w{i}" for i in range(len(weights))] + [f"b{i}" for i, b in enumerate(biases) if b is not None]
-        mine = [*weights, *(b for b in biases if b is not None)]
-        if set(names) | {"epoch", "history"} != set(held.files) or any(
-            held[n].shape != m.shape for n, m in zip(names, mine, strict=True)
-        ):
-            raise ValueError(f"{path}: a checkpoint of another network; delete it to start anew")
-        for name, array in zip(names, mine, strict=True):
-            array[...] = held[name]
-        rows = min(len(history), len(held["history"]))
-        history[:rows] = held["history"][:rows]
-        return int(held["epoch"])
+    """Fill weights, biases and history from a checkpoint; the epoch to go on with. InputError where it is none."""
+    stored = _stored_arrays(path)
+    mine = {f"w{i}": w for i, w in enumerate(weights)} | {f"b{i}": b for i, b in enumerate(biases) if b is not None}
+    if set(mine) | {"epoch", "history"} != set(stored) or any(stored[n].shape != m.shape for n, m in mine.items()):
+        raise InputError(f"{path}: a checkpoint of another network; delete it to start anew")
+    epoch, past = stored["epoch"], stored["history"]
+    numbers = all(array.dtype == float for name, array in stored.items() if name != "epoch")
+    counted = epoch.shape == () and epoch.dtype.kind in "iu" and epoch >= 0
+    if not numbers or not counted or past.ndim != 2 or past.shape[1] != history.shape[1]:
+        raise InputError(f"{path}: no checkpoint of a training; delete it to start anew")
+    if not all(np.isfinite(stored[name]).all() for name in mine):
+        raise InputError(f"{path}: holds weights that are no numbers; delete it to start anew")
+    for name, array in mine.items():
+        array[...] = stored[name]
+    rows = min(len(history), len(past))
+    history[:rows] = past[:rows]
+    return int(epoch)
+
+
+def _stored_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Arrays of an .npz, no code of it run, its unpacked size looked at first."""
+    try:
+        check_file(path)
+        with ZipFile(path) as parts:
+            size = sum(part.file_size for part in parts.infolist())
+            if size > LARGEST_CHECKPOINT:
+                most = f"{LARGEST_CHECKPOINT / 1e6:g}"
+                raise InputError(f"{path}: unpacks to {size / 1e6:.3g} MB, expected at most {most}")
+            if parts.testzip() is not None:  # numpy stops reading before the checksum
+                raise BadZipFile("its checksum does not fit")
+        with np.load(path, allow_pickle=False) as held:
+            return {name: held[name] for name in held.files}
+    except InputError:
+        raise
+    except (OSError, EOFError, BadZipFile, ValueError, TypeError, KeyError, RuntimeError, zlib.error) as error:
+        what = printable(error)
+        raise InputError(f"{path}: cannot be read as a checkpoint ({what}); delete it to start anew") from None

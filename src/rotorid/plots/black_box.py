@@ -35,7 +35,7 @@ def training(history: pd.DataFrame) -> Figure:
 
 def samples(tested: pd.DataFrame) -> Figure:
     """Measured and predicted wrench of the held-out samples (figure 4.26)."""
-    fig, axes = style.figure(4.4, 2, 3, sharex=True)
+    fig, axes = style.figure(3.5, 2, 3, sharex=True)
     number = np.arange(1, len(tested) + 1)
     for axis, (name, (label, unit)) in zip(axes.flat, OUTPUTS.items(), strict=True):
         axis.vlines(number, tested[name], tested[f"predicted_{name}"], color=style.GREY, linewidth=0.8)
@@ -52,7 +52,7 @@ def comparison(metrics: pd.DataFrame) -> Figure:
     """RMSE of each model and output on whole experiments held out, with intervals."""
     from matplotlib.ticker import NullFormatter
 
-    fig, axes = style.figure(4.2, 2, 3, sharey=True)
+    fig, axes = style.figure(3.6, 2, 3, sharey=True)
     models = list(dict.fromkeys(metrics["model"]))[::-1]
     for axis, (name, (label, unit)) in zip(axes.flat, OUTPUTS.items(), strict=True):
         part = metrics[metrics["output"] == name].set_index("model").loc[models]
@@ -78,7 +78,7 @@ def comparison(metrics: pd.DataFrame) -> Figure:
 
 def coverage(predictions: pd.DataFrame, metrics: pd.DataFrame, model: str, name: str) -> Figure:
     """Out-of-fold predictions of one model against the measured wrench, with its calibrated interval."""
-    fig, axes = style.figure(4.4, 2, 3)
+    fig, axes = style.figure(3.6, 2, 3)
     widths = metrics[metrics["model"] == name].set_index("output")["half_width"]
     for axis, (output, (label, unit)) in zip(axes.flat, OUTPUTS.items(), strict=True):
         measured, predicted = predictions[output], predictions[f"{model}_{output}"]

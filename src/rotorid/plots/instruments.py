@@ -54,7 +54,7 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
     """The six cells from above (x up, y right), and the tube from the side with the distances of table 2.3 (mm)."""
     from matplotlib.patches import Circle, Rectangle
 
-    fig, (top, side) = style.figure(3.6, 1, 2, width_ratios=(1.25, 1))
+    fig, (top, side) = style.figure(3.0, 1, 2, width_ratios=(1.25, 1))
     for radius in (
         np.hypot(distances_mm["D_1x"], distances_mm["D_1y"]),
         np.hypot(distances_mm["D_2x"], distances_mm["D_2y"]),
@@ -76,7 +76,9 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
                 edgecolor=colour,
             )
         )
-        top.text(y, x, str(cell), ha="center", va="center", fontweight="bold", color=colour)
+        # The rings nearly cover each other: numbers stand outside of the upper ring and inside of the lower one.
+        out = 1 + (24 if upper else -24) / np.hypot(x, y)
+        top.text(out * y, out * x, str(cell), ha="center", va="center", fontweight="bold", color=colour)
     top.plot(0, 0, "o", color="black", markersize=5)
     top.text(6, -13, "foot {T}", fontsize=8.5)
     _arrow(top, (0, 0), (0, 38), "$x$")
@@ -90,9 +92,9 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
     side.add_patch(Rectangle((-6, 0), 12, length, facecolor="#eeeeee", edgecolor="black", lw=0.7))
     for height, colour, name in ((low, style.RED, "cells 1, 3, 5"), (high, style.BLUE, "cells 2, 4, 6")):
         side.plot([-60, 60], [height, height], color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
-        side.text(64, height, f"{name}: {height:.1f} mm", color=colour, va="center", fontsize=8.5)
+        side.text(68, height, f"{name}: {height:.1f} mm", color=colour, va="center", fontsize=8.5)
     side.plot([-62, 62], [length, length], color="black", lw=3)
-    side.text(64, length, f"vehicle {{B}}: $L$ = {length:.0f} mm", va="center", fontsize=8.5)
+    side.text(68, length, f"vehicle {{B}}: $L$ = {length:.0f} mm", va="center", fontsize=8.5)
     _arrow(side, (-90, 150), (-90, 95), "$z$")
     _arrow(side, (0, length + 8), (0, length + 50), "thrust", fontsize=8.5)
     side.set_xlim(-105, 190)
@@ -106,7 +108,7 @@ def vehicle(flown: Vehicle) -> Figure:
     """Rotor numbers, spins and body axes from above, and the frames from behind and the side."""
     from matplotlib.patches import Arc, Circle
 
-    fig, (top, side) = style.figure(3.2, 1, 2, width_ratios=(1.15, 1))
+    fig, (top, side) = style.figure(2.7, 1, 2, width_ratios=(1.15, 1))
     places = 1000 * flown.rotor_positions_m()
     radius = 1000 * float(flown.rotor_radius_m or 0.0635)
     for number, ((x, y, _), spin) in enumerate(zip(places, flown.yaw_signs(), strict=True), 1):

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+FEWEST_CASES = 10
+"""Cases behind each point of an effect's own power curve: with fewer it goes up and down by chance."""
 LAST_COLUMNS = ("several", "a value", "nothing")
 
 
@@ -19,7 +21,7 @@ def targets(summary: pd.DataFrame) -> Figure:
     """Each rate that has a target, its 95 % interval, and the stretch that the target allows; grey: not refuted."""
     rows = summary[summary["at_least"].notna() | summary["at_most"].notna()]
     rows = rows[rows["value"].notna() & ~rows["id"].str.endswith(("oracle", "better", "failed"))].iloc[::-1]
-    fig, ax = style.figure(0.9 + 0.27 * len(rows))
+    fig, ax = style.figure(0.8 + 0.2 * len(rows))
     for k, row in enumerate(rows.itertuples()):
         low = row.at_least if np.isfinite(row.at_least) else 0.0
         high = row.at_most if np.isfinite(row.at_most) else 1.0
@@ -49,7 +51,7 @@ def confusion(table: pd.DataFrame) -> Figure:
     shown = ax.imshow(grid, cmap="Blues", vmin=0, vmax=1, aspect="auto")
     for (i, j), share in np.ndenumerate(grid):
         if 0 < share and len(truths) < 45:
-            ax.text(j, i, f"{share:.1f}".lstrip("0") if share < 1 else "1", ha="center", va="center", fontsize=5.5,
+            ax.text(j, i, f"{share:.1f}".lstrip("0") if share < 1 else "1", ha="center", va="center", fontsize=7,
                     color="white" if share > 0.5 else "black")  # fmt: skip
     ax.set_xticks(range(len(said)), [plain(t) for t in said], rotation=90, fontsize=7)
     ax.set_yticks(range(len(truths)), [plain(t) for t in truths], fontsize=7)
@@ -66,12 +68,16 @@ def plain(name: str) -> str:
 
 
 def power(table: pd.DataFrame) -> Figure:
-    """Share detected against the effect's size over the noise; thick: all effects together, with intervals."""
+    """Share detected against the effect's size over the noise, with intervals: all effects together.
+
+    An effect has a curve of its own where `FEWEST_CASES` cases stand behind each of its points.
+    """
     if table.empty:
         return nothing("No cases of growing size in this proof.")
     fig, ax = style.figure(2.9)
     for effect, own in table[table["effect"] != "all"].groupby("effect"):
-        ax.plot(own["size_over_noise"], own["detected"], lw=0.7, alpha=0.7, label=plain(effect))
+        if own["cases"].min() >= FEWEST_CASES:
+            ax.plot(own["size_over_noise"], own["detected"], lw=0.7, alpha=0.7, label=plain(effect))
     pooled = table[table["effect"] == "all"]
     ax.fill_between(pooled["size_over_noise"], pooled["low_95"], pooled["high_95"], color="black", alpha=0.12, lw=0)
     ax.plot(pooled["size_over_noise"], pooled["detected"], "o-", color="black", lw=1.8, label="all")
@@ -79,7 +85,8 @@ def power(table: pd.DataFrame) -> Figure:
     ax.set_xlabel("rms of the effect over rms of the noise, below 20 Hz")
     ax.set_ylabel("share of cases named")
     ax.set_ylim(-0.03, 1.03)
-    ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    if len(ax.lines) > 1:
+        ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return fig
 
 
@@ -105,7 +112,7 @@ def oracle(cases: pd.DataFrame) -> Figure:
     ax.set_yscale("log")
     ax.set_xticks(range(len(families)), [plain(f) for f in families], rotation=45, ha="right")
     ax.set_ylabel("held-out error / true model's")
-    ax.legend(loc="upper right", ncols=3)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.0, markerscale=3)
     return fig
 
 

@@ -48,7 +48,7 @@ def clocks(arrivals: Mapping[str, pd.DataFrame], table: pd.DataFrame) -> Figure:
 
 def experiment(run: pd.DataFrame, start_s: float, stop_s: float) -> Figure:
     """One experiment (fig. 3.21): throttles, forces and moments; shaded: what the mean is taken of."""
-    fig, axes = style.figure(4.6, 3, 1, sharex=True)
+    fig, axes = style.figure(3.7, 3, 1, sharex=True)
     time_s = run["time_s"].to_numpy()
     for colour, number in zip(style.CYCLE, (1, 2, 3, 4), strict=False):
         axes[0].plot(time_s, 100 * run[f"throttle_{number}"], color=colour, label=f"motor {number}", linewidth=0.9)
@@ -60,14 +60,14 @@ def experiment(run: pd.DataFrame, start_s: float, stop_s: float) -> Figure:
     for axis, label in zip(axes, ("throttle (%)", "force (N)", "moment (mN m)"), strict=True):
         axis.axvspan(start_s, stop_s, color=style.GREY, alpha=0.15, linewidth=0)
         axis.set_ylabel(label)
-        axis.legend(loc="upper right", ncols=4)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=4, borderaxespad=0.0)
     axes[-1].set_xlabel("time (s)")
     return fig
 
 
 def steady(table: pd.DataFrame) -> Figure:
     """Steady wrench of the 48 experiments: measured with 95 % intervals, and what the believed vehicle gives."""
-    fig, axes = style.figure(4.8, 3, 2, sharex=True)
+    fig, axes = style.figure(3.7, 3, 2, sharex=True)
     for k, (name, label) in enumerate(zip(WRENCH, NAMES, strict=True)):
         axis = axes[k % 3, k // 3]
         scale = 1.0 if k < 3 else 1e3

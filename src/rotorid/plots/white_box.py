@@ -21,7 +21,7 @@ def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figu
 
     `thrust` and `torque` have columns `speed_rad_s` and `value` (N, N m); `fits` has `c_f` and `c_q`.
     """
-    fig, axes = style.figure(3.9, 2, 2, sharex="col", height_ratios=(2.2, 1))
+    fig, axes = style.figure(3.2, 2, 2, sharex="col", height_ratios=(2.2, 1))
     for column, (points, fit, label, scale, unit) in enumerate(
         ((thrust, fits["c_f"], "thrust", 1.0, "N"), (torque, fits["c_q"], "torque", 1000.0, "mN m"))
     ):
@@ -43,7 +43,7 @@ def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figu
 
 def attitude(flight: pd.DataFrame) -> Figure:
     """Euler angles and their references over time (figure 4.9b)."""
-    fig, axes = style.figure(3.4, 3, 1, sharex=True)
+    fig, axes = style.figure(2.8, 3, 1, sharex=True)
     for axis, angle in zip(axes, ANGLES, strict=True):
         axis.plot(
             flight["time_s"],
@@ -61,7 +61,7 @@ def attitude(flight: pd.DataFrame) -> Figure:
 
 def motion(flight: pd.DataFrame) -> Figure:
     """Body rates, angular accelerations and moments (figure 4.9c-e)."""
-    fig, axes = style.figure(4.6, 3, 3, sharex=True)
+    fig, axes = style.figure(3.8, 3, 3, sharex=True)
     kinds = (
         ("angular_velocity_{}_rad_s", "rate (rad/s)", 1.0),
         ("angular_acceleration_{}_rad_s2", "acceleration (rad/s²)", 1.0),
@@ -82,32 +82,82 @@ def motion(flight: pd.DataFrame) -> Figure:
     return fig
 
 
-def view(flight: pd.DataFrame, every_s: float = 0.5) -> Figure:
-    """The vehicle's frame along its path in three dimensions (figure 4.9a)."""
-    import matplotlib.pyplot as plt
+TILTS_DRAWN = 3
+"""Roll and pitch are drawn this many times as large: five degrees would hardly show."""
+ELEVATION_DEG, AZIMUTH_DEG = 24.0, 35.0
+ROTOR_SHARE = 0.62
+"""Radius of a rotor over the distance of its hub from the centre."""
 
+
+def pose(roll_rad: float, pitch_rad: float, yaw_rad: float) -> list[np.ndarray]:
+    """Lines of the vehicle at an attitude as a camera sees them, (n, 2) each: four arms, then four rotors' circles.
+
+    Unit: the distance of a hub from the centre; first across, then up. Tilts are drawn `TILTS_DRAWN` times as large.
+    """
     from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 
-    style.use()
-    fig = plt.figure(figsize=(style.TEXT_WIDTH_IN, 2.3))
-    axes = fig.add_subplot(projection="3d")
+    angles = np.array([TILTS_DRAWN * roll_rad, TILTS_DRAWN * pitch_rad, yaw_rad])
+    rotation = rotation_from_quaternion(quaternion_from_euler(angles))
+    lift, turn = np.radians(ELEVATION_DEG), np.radians(AZIMUTH_DEG)
+    # North, east, down to across and up, from behind and above.
+    across = np.array([-np.sin(turn), np.cos(turn), 0.0])
+    up = np.array([np.sin(lift) * np.cos(turn), np.sin(lift) * np.sin(turn), -np.cos(lift)])
+    camera = np.stack([across, up], axis=1)
+    hubs = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]]) / np.sqrt(2)
+    around = np.linspace(0, 2 * np.pi, 21)
+    circle = ROTOR_SHARE * np.stack([np.cos(around), np.sin(around), 0 * around], axis=1)
+    lines = [np.stack([np.zeros(3), hub]) for hub in hubs] + [hub + circle for hub in hubs]
+    return [line @ rotation.T @ camera for line in lines]
+
+
+def view(flight: pd.DataFrame, every_s: float = 1.0) -> Figure:
+    """Key poses of the simulated flight (figure 4.9a), one beside the other, with the angles that they have."""
     step = float(flight["time_s"].iloc[1])
-    rows = flight.iloc[:: max(int(every_s / step), 1)]
-    places = rows[[f"position_{a}_m" for a in "xyz"]].to_numpy()
-    euler = rows[["roll_rad", "pitch_rad", "yaw_rad"]].to_numpy()
-    # Drawn at every half second beside one another: the fall would otherwise hide the attitude.
-    arms = 0.0884 * np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
-    for number, (place, angles) in enumerate(zip(places, euler, strict=True)):
-        hubs = arms @ rotation_from_quaternion(quaternion_from_euler(angles)).T
-        hubs = hubs + [0.32 * number, place[1], 0.0]
-        for a, b in ((0, 2), (1, 3)):
-            axes.plot(*(np.array([hubs[a], hubs[b]]) * [1, -1, -1]).T, color=style.BLACK, linewidth=1.2)
-        for hub, colour in zip(hubs, (style.RED, style.RED, style.BLUE, style.BLUE), strict=True):
-            axes.plot(*(hub[None] * [1, -1, -1]).T, "o", color=colour, markersize=4)
-    axes.set_box_aspect((4.2, 1.0, 0.7), zoom=2.1)
-    axes.set_xticks([0.32 * i for i in range(0, len(rows), 2)], [f"{every_s * i:g}" for i in range(0, len(rows), 2)])
-    axes.set_yticks([])
-    axes.set_zticks([])
-    axes.set_xlabel("time (s)", labelpad=12)
-    axes.view_init(elev=28, azim=-75)
+    rows = flight.iloc[:: max(int(round(every_s / step)), 1)]
+    fig, axes = style.figure(1.75, 1, len(rows), gridspec_kw={"wspace": 0.02})
+    for axis, row in zip(np.atleast_1d(axes), rows.itertuples(), strict=True):
+        for number, line in enumerate(pose(row.roll_rad, row.pitch_rad, row.yaw_rad)):
+            front = number % 4 < 2
+            colour = style.BLACK if number < 4 else style.RED if front else style.BLUE
+            axis.plot(*line.T, color=colour, linewidth=1.5 if number < 4 else 1.1)
+        axis.set_xlim(-1.75, 1.75)
+        axis.set_ylim(-1.3, 1.3)
+        axis.set_aspect("equal")
+        axis.set_axis_off()
+        axis.set_title(f"{row.time_s:.1f} s")
+        said = [f"{np.degrees(getattr(row, f'{angle}_rad')):.1f}°".replace("-", "−") for angle in ANGLES]
+        text = "\n".join(f"{angle} {value}" for angle, value in zip(ANGLES, said, strict=True))
+        axis.text(0.5, -0.02, text, transform=axis.transAxes, ha="center", va="top", fontsize=8.5)
     return fig
+
+
+def animation(flight: pd.DataFrame, every_s: float = 0.1) -> str:
+    """The same flight as a moving drawing (SVG), at its own speed and over and over, for the page."""
+    step = float(flight["time_s"].iloc[1])
+    rows = flight.iloc[:: max(int(round(every_s / step)), 1)]
+    whole_s = every_s * len(rows)
+    frames = []
+    for number, row in enumerate(rows.itertuples()):
+        start, stop = number / len(rows), (number + 1) / len(rows)
+        values, times = ("visible;hidden", f"0;{stop:.4f}") if number == 0 else (
+            "hidden;visible;hidden", f"0;{start:.4f};{stop:.4f}"
+        )  # fmt: skip
+        if number == len(rows) - 1:
+            values, times = "hidden;visible", f"0;{start:.4f}"
+        lines = []
+        for k, line in enumerate(pose(row.roll_rad, row.pitch_rad, row.yaw_rad)):
+            colour = style.BLACK if k < 4 else style.RED if k % 4 < 2 else style.BLUE
+            points = " ".join(f"{315 + 110 * x:.1f},{125 - 110 * y:.1f}" for x, y in line)
+            lines.append(f'<polyline points="{points}" stroke="{colour}"/>')
+        said = ", ".join(
+            f"{angle} {np.degrees(getattr(row, f'{angle}_rad')):.1f}°".replace("-", "\u2212") for angle in ANGLES
+        )
+        frames.append(
+            f'<g visibility="{"visible" if number == 0 else "hidden"}"><animate attributeName="visibility" '
+            f'calcMode="discrete" values="{values}" keyTimes="{times}" dur="{whole_s:g}s" repeatCount="indefinite"/>'
+            f'{"".join(lines)}<text x="315" y="288" text-anchor="middle">{row.time_s:.1f} s: {said}</text></g>'
+        )
+    return (
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 630 300" font-family="serif" font-size="16" '
+        f'fill="none" stroke-width="2.5"><g>{"".join(frames)}</g></svg>\n'
+    ).replace("<text ", '<text fill="black" stroke="none" ')

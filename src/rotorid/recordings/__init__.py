@@ -1,6 +1,14 @@
 """Recording sets: what goes into the mismatch stage (the recording contract)."""
 
-from rotorid.recordings.files import list_sets, read_run, read_set, read_vehicle, write_set, write_vehicle
+from rotorid.recordings.files import (
+    list_sets,
+    read_run,
+    read_set,
+    read_vehicle,
+    vehicle_of,
+    write_set,
+    write_vehicle,
+)
 from rotorid.recordings.run import RecordingSet, Run, Split
 from rotorid.recordings.vehicle import Inertia, Rotor, Vehicle
 
@@ -15,6 +23,7 @@ __all__ = [
     "read_run",
     "read_set",
     "read_vehicle",
+    "vehicle_of",
     "write_set",
     "write_vehicle",
 ]

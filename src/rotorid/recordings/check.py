@@ -55,6 +55,9 @@ class SetCheck:
     def as_dict(self) -> dict:
         return asdict(self)
 
+    def __str__(self) -> str:
+        return as_text(self)
+
 
 def check_run(run: Run) -> RunCheck:
     """Sampling of one run."""
@@ -183,9 +186,13 @@ def as_text(check: SetCheck) -> str:
     return "\n".join(lines) + "\n"
 
 
-def check_folder(folder: Path) -> SetCheck:
-    """Read a set and check it; InputError if it does not fit the contract or nothing in it can be compared."""
-    recordings = read_set(Path(folder))
+def check_recordings(recordings: RecordingSet) -> SetCheck:
+    """What a set contains and lacks, useless runs named; InputError if nothing in it can be compared."""
     usable = sufficient(recordings)
     found = check_set(recordings)
     return replace(found, lacks=(*usable.left_out, *found.lacks))
+
+
+def check_folder(folder: Path) -> SetCheck:
+    """Read a set and check it; InputError if it does not fit the contract or nothing in it can be compared."""
+    return check_recordings(read_set(Path(folder)))

@@ -11,42 +11,16 @@ from pydantic import ValidationError
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import check_belief
+from rotorid.recordings.explain import explain
 from rotorid.recordings.names import hint
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import TooFewSamples, check_table, read_csv, read_parquet
 from rotorid.recordings.text_files import check_file, read_yaml
-from rotorid.recordings.vehicle import Inertia, Noise, Rotor, Vehicle
-from rotorid.wording import expected, found, printable
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.wording import printable
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
-
-
-def explain(error: ValidationError) -> str:
-    """First fault of a pydantic error as one clause: key, what was found and what was expected."""
-    entries = error.errors()
-    # A misspelled key is also a missing one: its name says more.
-    first = next((e for e in entries if e["type"] == "extra_forbidden"), entries[0])
-    location, kind = first["loc"], first["type"]
-    key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
-    if kind == "extra_forbidden":
-        return f"{key}: no such key is known{hint(str(location[-1]), _keys_at(location))}"
-    if kind == "missing":
-        return f"{key}: is missing"
-    if kind == "value_error":
-        return ": ".join(x for x in (key, str(first["ctx"]["error"])) if x)
-    return f"{key}: found {found(first)}, expected {expected(first)}"
-
-
-_BRANCHES = ("float", "tuple[float, ...]", "constrained-float")
-"""Parts of a pydantic location that name a kind of value, not a key."""
-
-
-def _keys_at(location: tuple[str | int, ...]) -> list[str]:
-    """Keys that are known where a location of a pydantic error lies."""
-    inner = {"inertia_kg_m2": Inertia, "rotors": Rotor, "noise": Noise}
-    model = inner.get(str(location[0]), Vehicle) if len(location) > 1 else Vehicle
-    return list(model.model_fields)
 
 
 def _numbers(value):
@@ -70,14 +44,18 @@ def read_vehicle(path: Path) -> Vehicle:
         near = _misnamed(path)
         if near:
             raise InputError(f"{path}: file is missing; did you mean {printable(near)}?")
-    content = read_yaml(path)
+    return vehicle_of(read_yaml(path), str(path))
+
+
+def vehicle_of(content: dict, where: str) -> Vehicle:
+    """The vehicle that the keys of a `vehicle.yaml` state; InputError names the key that is wrong."""
     content = {k: v if k in ("name", "kind") else _numbers(v) for k, v in content.items()}
     if isinstance(content.get("name"), (int, float)) and not isinstance(content["name"], bool):
         content["name"] = str(content["name"])
     try:
         return Vehicle.model_validate({str(key): value for key, value in content.items()})
     except ValidationError as error:
-        raise InputError(f"{path}: {explain(error)}") from None
+        raise InputError(f"{where}: {explain(error, Vehicle)}") from None
 
 
 def _misnamed(path: Path) -> str | None:
@@ -172,6 +150,17 @@ def read_split(path: Path, names: list[str]) -> tuple[str, ...]:
     return tuple(held_out)
 
 
+def check_rotors(run: Run, vehicle: Vehicle) -> None:
+    """InputError where a run has a column of a rotor that the vehicle does not list."""
+    for column in run.table.columns:
+        rotor = c.rotor_number(column)
+        if not rotor or vehicle.kind == "bench" or 1 <= rotor[1] <= vehicle.rotor_count:
+            continue
+        if rotor[1] < 1:
+            raise InputError(f"{run.path or run.name}, column {column}: rotors are numbered from 1")
+        raise InputError(f"{run.path or run.name}, column {column}: {VEHICLE} lists {vehicle.rotor_count} rotors only")
+
+
 def read_set(folder: Path) -> RecordingSet:
     """Read a recording set; InputError in one sentence if anything in it does not fit the contract."""
     folder = Path(folder)
@@ -191,13 +180,7 @@ def read_set(folder: Path) -> RecordingSet:
             if len(left_out) == len(paths):
                 raise
     for run in runs:
-        for column in run.table.columns:
-            rotor = c.rotor_number(column)
-            if not rotor or vehicle.kind == "bench" or 1 <= rotor[1] <= vehicle.rotor_count:
-                continue
-            if rotor[1] < 1:
-                raise InputError(f"{run.path}, column {column}: rotors are numbered from 1")
-            raise InputError(f"{run.path}, column {column}: {VEHICLE} lists {vehicle.rotor_count} rotors only")
+        check_rotors(run, vehicle)
     held_out = None
     split = folder / SPLIT
     if split.exists() or split.is_symlink():

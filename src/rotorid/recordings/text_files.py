@@ -8,15 +8,36 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from yaml.composer import Composer
+from yaml.constructor import SafeConstructor
+from yaml.resolver import Resolver
 
 from rotorid.errors import InputError
 from rotorid.wording import printable
+
+try:
+    from yaml.cyaml import CParser
+except ImportError:  # pragma: no cover - depends on the platform
+    CParser = None
 
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file; that of a vehicle has some thousand."""
 DEEPEST = 50
 MOST_NODES = 20_000
 """Values of a YAML file with all its aliases written out."""
+
+if CParser is None:  # pragma: no cover - depends on the platform
+    _Compiled = yaml.SafeLoader
+else:
+
+    class _Compiled(Composer, CParser, SafeConstructor, Resolver):
+        """libyaml's parser under the composer written in Python: libyaml's own descends until the stack is full."""
+
+        def __init__(self, stream: str) -> None:
+            CParser.__init__(self, stream)
+            Composer.__init__(self)
+            SafeConstructor.__init__(self)
+            Resolver.__init__(self)
 
 
 def check_file(path: Path) -> int:
@@ -74,25 +95,34 @@ def read_text(path: Path, most: int = LARGEST_YAML) -> str:
     return data.decode("utf-8-sig")
 
 
-def read_yaml(path: Path, as_written: bool = False) -> dict[str, Any]:
+def read_yaml(
+    path: Path,
+    as_written: bool = False,
+    most_bytes: int = LARGEST_YAML,
+    most_values: int = MOST_NODES,
+    compiled: bool = False,
+) -> dict[str, Any]:
     """A YAML mapping; InputError names the file and line of a fault.
 
-    `as_written` keeps every value as the text that stands there (`002` is no number).
+    `as_written` keeps every value as the text that stands there (`002` is no number). `compiled` reads by libyaml
+    where PyYAML was built with it.
     """
     path = Path(path)
-    text = read_text(path)
+    text = read_text(path, most_bytes)
     loader = None
     try:
-        loader = (yaml.BaseLoader if as_written else yaml.SafeLoader)(text)
+        loader = (yaml.BaseLoader if as_written else _Compiled if compiled else yaml.SafeLoader)(text)
         node = loader.get_single_node()
         if node is not None:
-            _check_node(node, path)
+            _check_node(node, path, most_values)
         content = None if node is None else loader.construct_document(node)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f", line {mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "cannot be parsed"
         raise InputError(f"{path}{line}: not valid YAML ({printable(problem)})") from None
+    except InputError:
+        raise
     except RecursionError:
         raise InputError(f"{path}: is nested too deeply, expected at most {DEEPEST} levels") from None
     except (ValueError, OverflowError) as error:  # dates and numbers that cannot be
@@ -106,7 +136,7 @@ def read_yaml(path: Path, as_written: bool = False) -> dict[str, Any]:
     return content
 
 
-def _check_node(root: yaml.Node, path: Path) -> None:
+def _check_node(root: yaml.Node, path: Path, most_values: int) -> None:
     """InputError for a key given twice, for too many levels, and for aliases that hold themselves or grow too large."""
     sizes: dict[int, int] = {}
     open_nodes: set[int] = set()
@@ -127,8 +157,8 @@ def _check_node(root: yaml.Node, path: Path) -> None:
         elif isinstance(node, yaml.SequenceNode):
             total += sum(size_of(value, depth + 1) for value in node.value)
         open_nodes.discard(id(node))
-        if total > MOST_NODES:
-            raise InputError(f"{line}: holds more than {MOST_NODES} values (aliases written out)")
+        if total > most_values:
+            raise InputError(f"{line}: holds more than {most_values} values (aliases written out)")
         sizes[id(node)] = total
         return total
 

@@ -1,157 +1,205 @@
-"""Compiled flight of plain rigid bodies with rotors: known commands, one vehicle or thousands of parameter
-sets.
-
-The same equations as `rotorid.vehicle.simulator` without effects, disturbance and controller, written as
-loops for numba because a profile of the array code showed its time to go into calls on small arrays.
-"""
+"""Compiled flights called from Python: arrays in, arrays out, vehicles spread over threads."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from rotorid.recordings.vehicle import Vehicle
-from rotorid.vehicle.mixer import wrench_matrix
+from rotorid.vehicle import compiled
+from rotorid.vehicle.kernels import ADDED, INSTANT, MOST_ROTORS, SCRATCH, Kernels
 
-STATE = "rates 0:3, quaternion 3:7, velocity 7:10, position 10:13, rotor speeds 13:"
+LOOP = np.dtype(
+    [
+        ("proportional", "f8", 3),
+        ("integral", "f8", 3),
+        ("derivative", "f8", 3),
+        ("limit", "f8", 3),
+        ("derivative_time", "f8"),
+        ("lowest", "f8"),
+        ("highest", "f8"),
+        ("allocation", "f8", (MOST_ROTORS, 4)),
+    ],
+    align=True,
+)
+"""The attitude controller's constants, SI; `allocation` gives squared rotor speeds of thrust and moments."""
 
-
-@njit(cache=True, error_model="numpy")
-def _derivative(s, command, push, mass, gravity, inertia, inverse, mixer, up, down, out):
-    p, q, r = s[0], s[1], s[2]
-    w, x, y, z = s[3], s[4], s[5], s[6]
-    thrust = roll = pitch = yaw = 0.0
-    for i in range(command.shape[0]):
-        square = s[13 + i] * s[13 + i]
-        thrust += mixer[0, i] * square
-        roll += mixer[1, i] * square
-        pitch += mixer[2, i] * square
-        yaw += mixer[3, i] * square
-        gap = command[i] - s[13 + i]
-        out[13 + i] = gap * (up if gap > 0 else down)
-    hx = inertia[0, 0] * p + inertia[0, 1] * q + inertia[0, 2] * r
-    hy = inertia[1, 0] * p + inertia[1, 1] * q + inertia[1, 2] * r
-    hz = inertia[2, 0] * p + inertia[2, 1] * q + inertia[2, 2] * r
-    mx = push[3] + roll - (q * hz - r * hy)
-    my = push[4] + pitch - (r * hx - p * hz)
-    mz = push[5] + yaw - (p * hy - q * hx)
-    for i in range(3):
-        out[i] = inverse[i, 0] * mx + inverse[i, 1] * my + inverse[i, 2] * mz
-    out[3] = -0.5 * (x * p + y * q + z * r)
-    out[4] = 0.5 * (w * p + y * r - z * q)
-    out[5] = 0.5 * (w * q + z * p - x * r)
-    out[6] = 0.5 * (w * r + x * q - y * p)
-    fx, fy, fz = push[0] / mass, push[1] / mass, (push[2] - thrust) / mass
-    out[7] = (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy + 2.0 * (x * z + w * y) * fz
-    out[8] = 2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy + 2.0 * (y * z - w * x) * fz
-    out[9] = 2.0 * (x * z - w * y) * fx + 2.0 * (y * z + w * x) * fy + (1.0 - 2.0 * (x * x + y * y)) * fz
-    out[9] += gravity
-    out[10], out[11], out[12] = s[7], s[8], s[9]
+LEAST_PER_THREAD = 16
+"""Vehicles below which a further thread is not worth its start."""
 
 
-@njit(cache=True, error_model="numpy")
-def _fly(start, commands, push, step, every, mass, gravity, inertia, inverse, mixer, up, down, out):
-    size = start.shape[1]
-    k1, k2, k3, k4 = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    trial = np.empty(size)
-    for v in range(start.shape[0]):
-        s = start[v].copy()
-        a = (mass[v], gravity[v], inertia[v], inverse[v], mixer[v], up[v], down[v])
-        c = v if commands.shape[0] > 1 else 0
-        out[v, 0] = s
-        for j in range(commands.shape[1]):
-            command = commands[c, j]
-            if a[5] == 0.0:
-                for i in range(command.shape[0]):
-                    s[13 + i] = command[i]
-            _derivative(s, command, push[v], a[0], a[1], a[2], a[3], a[4], a[5], a[6], k1)
-            for i in range(size):
-                trial[i] = s[i] + 0.5 * step * k1[i]
-            _derivative(trial, command, push[v], a[0], a[1], a[2], a[3], a[4], a[5], a[6], k2)
-            for i in range(size):
-                trial[i] = s[i] + 0.5 * step * k2[i]
-            _derivative(trial, command, push[v], a[0], a[1], a[2], a[3], a[4], a[5], a[6], k3)
-            for i in range(size):
-                trial[i] = s[i] + step * k3[i]
-            _derivative(trial, command, push[v], a[0], a[1], a[2], a[3], a[4], a[5], a[6], k4)
-            length = 0.0
-            for i in range(size):
-                s[i] += step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
-            for i in range(3, 7):
-                length += s[i] * s[i]
-            length = np.sqrt(length)
-            for i in range(3, 7):
-                s[i] /= length
-            if (j + 1) % every == 0:
-                out[v, (j + 1) // every] = s
+@dataclass(frozen=True)
+class AttitudeLoop:
+    """An attitude controller laid out for a whole flight, so that it can fly compiled (`rotorid.control.pid`)."""
+
+    proportional: np.ndarray
+    """(3,) or (n, 3), N m/rad, likewise the integral and derivative gains."""
+    integral: np.ndarray
+    derivative: np.ndarray
+    allocation: np.ndarray
+    """(k, 4), squared rotor speeds of thrust and moments."""
+    reference: np.ndarray
+    """(steps + 1, 4): roll, pitch, yaw, rad, and thrust, N."""
+    derivative_time_s: float = 0.0
+    limit_n_m: np.ndarray | None = None
+    """(3,), largest moments."""
+    more: np.ndarray | None = None
+    """(steps + 1, k), added to the squared speeds, rad²/s²."""
+    limits_rad_s: tuple[float, float] = (0.0, np.inf)
+
+    def constants(self) -> np.ndarray:
+        """As records (1 or n,) of LOOP."""
+        gains = [np.atleast_2d(np.asarray(g, float)) for g in (self.proportional, self.integral, self.derivative)]
+        loops = np.zeros(max(len(g) for g in gains), LOOP)
+        loops["proportional"], loops["integral"], loops["derivative"] = gains
+        loops["limit"] = np.inf if self.limit_n_m is None else self.limit_n_m
+        loops["derivative_time"] = self.derivative_time_s
+        loops["lowest"], loops["highest"] = self.limits_rad_s
+        loops["allocation"][:, : len(self.allocation)] = self.allocation
+        return loops
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What n vehicles did at the instants kept, each (n, kept, ...), SI."""
+
+    states: np.ndarray
+    """(n, kept, 13 + k): rates, quaternion, velocity (world), position, rotor speeds."""
+    accelerations: np.ndarray
+    """(n, kept, 6): angular acceleration, rad/s², and specific force, m/s², body axes."""
+    commands: np.ndarray
+    """(n, kept, k), rad/s."""
 
 
 def fly(
-    vehicles: Sequence[Vehicle],
+    body: np.ndarray,
+    kernels: Kernels,
     start: np.ndarray,
-    commands_rad_s: np.ndarray,
+    steps: int,
     step_s: float,
-    motor_time_s: float = 0.0,
+    commands: np.ndarray | AttitudeLoop,
+    *,
+    values: np.ndarray | None = None,
+    lags_s: np.ndarray | tuple[float, float] = (0.0, 0.0),
+    limits_rad_s: tuple[float, float] | None = None,
+    following: np.ndarray | None = None,
+    reading_errors: np.ndarray | None = None,
+    pushes: np.ndarray | None = None,
+    wind_m_s: np.ndarray | None = None,
+    ground_z_m: float | None = None,
     every: int = 1,
-) -> np.ndarray:
-    """States (n, m // every + 1, 13 + k) of n vehicles under commands held over each of m steps.
+    threads: int | None = None,
+) -> Flown:
+    """Fly n vehicles with constants `body` (1 or n,) from `start` (n, 13 + k) over `steps` steps.
 
-    Parameters
-    ----------
-    vehicles
-        n vehicles (parameter sets) with k rotors each, or a single one for all n starts.
-    start
-        States at the beginning, (n, 13 + k): rates, quaternion, velocity (world), position, rotor speeds, SI.
-    commands_rad_s
-        Rotor speeds commanded, (m, k) for all, or (n, m, k).
-    step_s
-        Step of the Runge-Kutta method.
-    motor_time_s
-        Time constant of the rotors' first-order lag; 0 follows the command at once.
-    every
-        Keep each `every`-th state.
+    `commands` are rotor speeds (steps + 1, k) for all or (n, steps + 1, k), or a controller; `values` (n, p) are the
+    kernels' values where they differ between vehicles; `lags_s` time constants up and down, (2,) or (n, 2), 0 follows
+    at once; `following`, shaped as they, what effects are told of the rotors' acceleration then. `reading_errors`
+    (n, steps + 1, 3), rad, are added to the attitude read by the controller, `pushes` (n, steps + 1, 6) to force and
+    moment. `wind_m_s` is (3,) or (n, 3), world axes.
     """
     start = np.ascontiguousarray(start, float)
-    commands = np.ascontiguousarray(commands_rad_s, float)
-    commands = commands[None] if commands.ndim == 2 else commands
-    n = len(start)
-    chosen = list(vehicles) * n if len(vehicles) == 1 else list(vehicles)
-    k = chosen[0].rotor_count
-    if len(chosen) != n or start.shape[1] != 13 + k or commands.shape[2] != k or len(commands) not in (1, n):
-        raise ValueError(
-            f"{len(vehicles)} vehicles with {k} rotors, start {start.shape} and commands {commands.shape} "
-            "do not belong together"
+    n, k = start.shape[0], start.shape[1] - 13
+    body = np.repeat(body, n) if len(body) == 1 < n else body
+    lags = np.broadcast_to(np.asarray(lags_s, float), (n, 2))
+    lags = np.divide(1.0, lags, out=np.zeros((n, 2)), where=lags > 0)
+    limits = np.broadcast_to(np.array([-np.inf, np.inf] if limits_rad_s is None else limits_rad_s), (n, 2))
+    closed = isinstance(commands, AttitudeLoop)
+    loops, references, more = np.zeros(1, LOOP), np.zeros((1, 1, 4)), np.zeros((0, k))
+    series = np.zeros((1, 1, k))
+    if closed:
+        loops, references = commands.constants(), np.ascontiguousarray(commands.reference)[None]
+        more = more if commands.more is None else np.ascontiguousarray(commands.more, float)
+    else:
+        series = np.ascontiguousarray(commands, float)
+        series = series[None] if series.ndim == 2 else series
+    told = np.zeros((0, 1, k)) if following is None else np.ascontiguousarray(following, float)
+    wind = np.zeros(3) if wind_m_s is None else wind_m_s
+    fixed = dict(
+        steps=steps,
+        step_s=step_s,
+        every=every,
+        closed=closed,
+        more=more,
+        addresses=kernels.addresses,
+        explicit=kernels.explicit,
+        offsets=kernels.offsets,
+    )
+    kept = steps // every + 1
+    own = dict(
+        body=body,
+        start=start,
+        lags=lags,
+        limits=np.ascontiguousarray(limits),
+        commands=series,
+        following=told[None] if told.ndim == 2 else told,
+        loops=loops,
+        references=references,
+        reading_errors=np.zeros((1, 1, 3)) if reading_errors is None else np.ascontiguousarray(reading_errors),
+        pushes=np.zeros((1, 1, 6)) if pushes is None else np.ascontiguousarray(pushes),
+        winds=np.atleast_2d(np.ascontiguousarray(wind, float))[:, None],
+        ground_z=np.full(n, np.nan if ground_z_m is None else ground_z_m),
+        values=np.atleast_2d(kernels.values if values is None else np.ascontiguousarray(values, float)),
+        states=np.empty((n, kept, 13 + k)),
+        accelerations_out=np.empty((n, kept, 6)),
+        commands_out=np.empty((n, kept, k)),
+    )
+
+    def part(first: int, last: int) -> None:
+        mine = {name: a[first:last] if len(a) == n else a for name, a in own.items()}
+        given = (
+            fixed | mine | dict(instant=np.zeros(1, INSTANT), added=np.zeros(1, ADDED), scratch=np.zeros(1, SCRATCH))
         )
-    lag = np.full(n, 0.0 if motor_time_s == 0 else 1.0 / motor_time_s)
-    out = np.empty((n, commands.shape[1] // every + 1, 13 + k))
-    _fly(start, commands, np.zeros((n, 6)), step_s, every, *_constants(tuple(vehicles), n), lag, lag, out)
+        compiled.fly(*(given[name] for name in _ORDER))
+
+    _spread(part, n, threads)
+    return Flown(own["states"], own["accelerations_out"], own["commands_out"])
+
+
+_ORDER = compiled.fly.py_func.__code__.co_varnames[: compiled.fly.py_func.__code__.co_argcount]
+
+
+def fly_windows(
+    body: np.ndarray, kernels: Kernels, start: np.ndarray, time_s: np.ndarray, *driven: np.ndarray
+) -> np.ndarray:
+    """States (w, m, 3, 7 or 13) of w windows; arguments as of `rotorid.vehicle.compiled.fly_windows`."""
+    start, time_s = np.ascontiguousarray(start, float), np.ascontiguousarray(time_s, float)
+    driven = tuple(np.ascontiguousarray(a, float) for a in driven)
+    out = np.empty((*time_s.shape, start.shape[1]))
+    if not len(start):
+        return out
+
+    def part(first: int, last: int) -> None:
+        mine = (a[first:last] for a in (start, time_s, *driven))
+        compiled.fly_windows(
+            body,
+            *mine,
+            kernels.addresses,
+            kernels.explicit,
+            kernels.offsets,
+            kernels.values,
+            np.zeros(1, INSTANT),
+            np.zeros(1, ADDED),
+            np.zeros(1, SCRATCH),
+            out[first:last],
+        )
+
+    _spread(part, len(start), 1)
     return out
 
 
-class Stepper:
-    """One step at a time for n alike vehicles, for whoever has to decide between steps (a controller)."""
-
-    def __init__(self, vehicle: Vehicle, size: int, time_up_s: float, time_down_s: float | None = None):
-        down = time_up_s if time_down_s is None else time_down_s
-        self._constants = _constants((vehicle,), size)
-        self._lags = tuple(np.full(size, 0.0 if t == 0 else 1.0 / t) for t in (time_up_s, down))
-        self._out = np.empty((size, 2, 13 + vehicle.rotor_count))
-
-    def step(self, state: np.ndarray, command: np.ndarray, push: np.ndarray, step_s: float) -> np.ndarray:
-        """States (n, 13 + k) after a step under commands (n, k), rad/s, and a body wrench (n, 6), N, N m."""
-        _fly(state, command[:, None, :], push, step_s, 1, *self._constants, *self._lags, self._out)
-        return self._out[:, 1].copy()
+def _spread(part, n: int, threads: int | None) -> None:
+    """Call `part(first, last)` on shares of n vehicles, in as many threads as pay."""
+    count = min(_cores() if threads is None else threads, max(n // LEAST_PER_THREAD, 1))
+    if count == 1:
+        part(0, n)
+        return
+    edges = np.linspace(0, n, count + 1).astype(int)
+    with ThreadPoolExecutor(count) as pool:
+        list(pool.map(part, edges[:-1], edges[1:]))
 
 
-def _constants(vehicles: tuple[Vehicle, ...], n: int) -> tuple[np.ndarray, ...]:
-    inertia = np.array([v.inertia_kg_m2.matrix() for v in vehicles])
-    parts = (
-        np.array([v.mass_kg for v in vehicles]),
-        np.array([v.gravity_m_s2 for v in vehicles]),
-        inertia,
-        np.linalg.inv(inertia),
-        np.array([wrench_matrix(v) for v in vehicles]),
-    )
-    return tuple(np.ascontiguousarray(np.repeat(p, n, axis=0)) if len(p) == 1 < n else p for p in parts)
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -33,18 +33,18 @@ def active_forms(vehicle: Vehicle) -> list[ActiveForm]:
     InputError names the entry and what was expected. Forms between command and rotor speed and forms that spoil
     the recorded set are passed over here: `active_speed_forms` and `active_set_forms` have them.
     """
-    return [found for found in _all(vehicle) if isinstance(found[0], Form)]
+    return [found for found in all_forms(vehicle) if isinstance(found[0], Form)]
 
 
 def active_speed_forms(vehicle: Vehicle) -> list[ActiveSpeedForm]:
     """Forms of `vehicle.effects` that act between command and rotor speed, in the order of the path."""
-    found = [found for found in _all(vehicle) if isinstance(found[0], SpeedForm)]
+    found = [found for found in all_forms(vehicle) if isinstance(found[0], SpeedForm)]
     return sorted(found, key=lambda pair: pair[0].stage)
 
 
 def active_set_forms(vehicle: Vehicle) -> list[ActiveSetForm]:
     """Forms of `vehicle.effects` that spoil the recorded set, in the order of the file."""
-    return [found for found in _all(vehicle) if isinstance(found[0], SetForm)]
+    return [found for found in all_forms(vehicle) if isinstance(found[0], SetForm)]
 
 
 def speeds_of_commands(
@@ -70,7 +70,8 @@ def speeds_of_commands(
     return speed
 
 
-def _all(vehicle: Vehicle) -> list[ActiveForm | ActiveSpeedForm | ActiveSetForm]:
+def all_forms(vehicle: Vehicle) -> list[ActiveForm | ActiveSpeedForm | ActiveSetForm]:
+    """Every form of `vehicle.effects` with its values, in the order of the file."""
     return [_active(entry, number, vehicle) for number, entry in enumerate(vehicle.effects, 1)]
 
 

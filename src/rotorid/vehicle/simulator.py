@@ -1,9 +1,9 @@
 """The general simulator: vehicles with motors, effects, disturbances, sensors and a controller, n at a time.
 
 Rigid body by quaternion inside, Euler angles outside. The controller and the disturbance are held over each
-step; the motion between is integrated by the classical Runge-Kutta method: compiled where no effect is
-switched on, by array code that calls the effects' own functions otherwise. A test holds that both fly the
-same.
+step; the motion between is integrated by the classical Runge-Kutta method. It flies compiled where every effect has a
+kernel and the commands, or the controller's whole plan, are known beforehand (`rotorid.vehicle.fast`), else by array
+code that calls the effects' own functions. A test holds that both fly the same.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle import fast
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,
     normalised,
@@ -30,6 +31,7 @@ from rotorid.vehicle.attitude import (
 )
 from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
 from rotorid.vehicle.integrate import rk4_step
+from rotorid.vehicle.kernels import body_of, kernels_of
 
 MEMORY_ROUNDS = 12
 """Flights simulated in a row, at most, where an effect has a memory of its own; each takes its wrench from the last."""
@@ -38,7 +40,11 @@ MEMORY_SETTLED = 1e-7
 
 
 class Controller(Protocol):
-    """Anything that turns time and measured attitude into rotor commands."""
+    """Anything that turns time and measured attitude into rotor commands.
+
+    One that is an attitude loop may lay itself out for a whole flight, `attitude_loop(time_s)` (m,), s, giving a
+    `rotorid.vehicle.fast.AttitudeLoop` or None; it then flies compiled.
+    """
 
     def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
         """Commanded rotor speeds (n, k), rad/s, from attitudes (n, 3), rad."""
@@ -62,8 +68,9 @@ class Commands:
         """Rotor accelerations (k,), rad/s2, that go with the commands."""
         return 0.0 if self.rotor_acceleration is None else self.rotor_acceleration[self._index(time_s)]
 
-    def _index(self, time_s: float) -> int:
-        return max(int(np.searchsorted(self.time_s, time_s + 1e-9, side="right")) - 1, 0)
+    def _index(self, time_s):
+        """Which command holds at a time, or at each of several."""
+        return np.maximum(np.searchsorted(self.time_s, np.asarray(time_s) + 1e-9, side="right") - 1, 0)
 
 
 @dataclass(frozen=True)
@@ -151,13 +158,14 @@ def simulate(
     rng: np.random.Generator | None = None,
     wind_m_s: np.ndarray | None = None,
     voltage_v: float | None = None,
+    compiled: bool = True,
 ) -> Trace:
     """Fly n vehicles (as many as `start` has) for `duration_s` in steps of `step_s`.
 
     `effects` as from `rotorid.vehicle.improved.active_forms`. `noise` reaches the controller through the
     measured attitude; readings with noise are made of the trace by `recording`. `rng` is needed with noise or
     disturbance. `wind_m_s` (3,) is the velocity of the air, world axes. Heights come from the vehicle's
-    `ground_z_m`.
+    `ground_z_m`. `compiled` False flies by array code whatever could be flown compiled.
     """
     start, motors = start or Start(), motors or Motors()
     noise, disturbance = noise or Noise(), disturbance or Disturbance()
@@ -177,7 +185,7 @@ def simulate(
     readings = np.zeros((steps + 1, start.size, 3))
     if noise.attitude_rad > 0:
         readings = rng.normal(0.0, noise.attitude_rad, readings.shape)
-    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v)
+    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, compiled)
     trace = flight.fly(_fresh(controller), pushes, readings)
     # A load as heavy as the vehicle would make plain repetition diverge: Aitken's relaxation (Küttler and Wall,
     # Computational Mechanics 43, 2008) takes the step from how the last one turned out.
@@ -191,7 +199,7 @@ def simulate(
             change = gap - last
             share *= -float((last * change).sum() / (change**2).sum())
         added, last = added + share * gap, gap
-        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v)
+        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, compiled)
         trace = flight.fly(_fresh(controller), pushes + added, readings)
     return trace
 
@@ -199,6 +207,17 @@ def simulate(
 def _fresh(controller: Controller) -> Controller:
     """A copy of the controller as it is before the flight, so that a flight can be repeated."""
     return copy.deepcopy(controller)
+
+
+def _known_commands(controller: Controller, time_s: np.ndarray) -> np.ndarray | fast.AttitudeLoop | None:
+    """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call can tell."""
+    if isinstance(controller, Commands):
+        return controller.rotor_speed[controller._index(time_s)]
+    # The plan is that of the class that commands; who puts another command in its place is called.
+    commanding = next((c for c in type(controller).__mro__ if "rotor_command" in vars(c)), None)
+    if "rotor_command" in vars(controller) or commanding is None or "attitude_loop" not in vars(commanding):
+        return None
+    return controller.attitude_loop(time_s)
 
 
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
@@ -218,20 +237,65 @@ def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) ->
 class _Flight:
     """One simulation: state columns rates 0:3, quaternion 3:7, velocity 7:10, position 10:13, rotors 13:."""
 
-    def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, voltage_v):
+    def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, voltage_v, compiled=True):
         self.vehicle, self.motors, self.step_s = vehicle, motors, step_s
         self.start, self.size = start, start.size
         self.dynamics = Dynamics(vehicle, effects, start.size)
         self.wind = None if wind_m_s is None else np.asarray(wind_m_s, float)
         self.voltage = None if voltage_v is None else np.full(start.size, float(voltage_v))
+        self.kernels = kernels_of(effects, vehicle) if compiled else None
 
     def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
-        steps, k = len(pushes) - 1, self.vehicle.rotor_count
-        state = np.zeros((self.size, 13 + k))
+        """The flight under a controller, a disturbance (steps + 1, n, 6) and errors of attitude (steps + 1, n, 3)."""
+        commands = None if self.kernels is None else _known_commands(controller, self.step_s * np.arange(len(pushes)))
+        if commands is None:
+            return self._trace(*self._by_arrays(controller, pushes, attitude_errors))
+        return self._trace(*self._compiled(controller, commands, pushes, attitude_errors))
+
+    def _start(self) -> np.ndarray:
+        """States at the beginning, (n, 13 + k), rotors at rest."""
+        state = np.zeros((self.size, 13 + self.vehicle.rotor_count))
         state[:, 0:3] = self.start.angular_velocity_rad_s
         state[:, 3:7] = quaternion_from_euler(self.start.euler_rad)
         state[:, 7:10] = self.start.velocity_m_s
         state[:, 10:13] = self.start.position_m
+        return state
+
+    def _compiled(self, controller, commands, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+        """States, accelerations and commands, each (n, steps + 1, ...)."""
+        steps, limits = len(pushes) - 1, self.motors.limits_rad_s
+        state = self._start()
+        if self.start.rotor_speed_rad_s is not None:
+            state[:, 13:] = self.start.rotor_speed_rad_s
+        else:
+            euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[0]
+            first = np.asarray(_fresh(controller).rotor_command(0.0, euler), float)
+            state[:, 13:] = first if limits is None else np.clip(first, *limits)
+        following = None
+        if isinstance(controller, Commands) and controller.rotor_acceleration is not None:
+            following = controller.acceleration(self.step_s * np.arange(steps + 1))
+        down = self.motors.time_up_s if self.motors.time_down_s is None else self.motors.time_down_s
+        flown = fast.fly(
+            body_of(self.vehicle),
+            self.kernels,
+            state,
+            steps,
+            self.step_s,
+            commands,
+            lags_s=(self.motors.time_up_s, down),
+            limits_rad_s=limits,
+            following=following,
+            reading_errors=np.moveaxis(attitude_errors, 0, 1) if attitude_errors.any() else None,
+            pushes=np.moveaxis(pushes, 0, 1) if pushes.any() else None,
+            wind_m_s=self.wind,
+            ground_z_m=self.vehicle.ground_z_m,
+        )
+        return flown.states, flown.accelerations, flown.commands
+
+    def _by_arrays(self, controller, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+        """The same by array code."""
+        steps, k = len(pushes) - 1, self.vehicle.rotor_count
+        state = self._start()
         states = np.empty((steps + 1, self.size, 13 + k))
         accelerations = np.empty((steps + 1, self.size, 6))
         commands = np.empty((steps + 1, self.size, k))
@@ -258,13 +322,16 @@ class _Flight:
             if i < steps:
                 state = rk4_step(self.derivative, 0.0, state, self.step_s)
                 state[:, 3:7] = normalised(state[:, 3:7])
+        return np.moveaxis(states, 0, 1), np.moveaxis(accelerations, 0, 1), np.moveaxis(commands, 0, 1)
+
+    def _trace(self, states, accelerations, commands) -> Trace:
+        """States (n, m, 13 + k), accelerations (n, m, 6) and commands (n, m, k) by name."""
         if not np.isfinite(states).all():
             raise InputError(
                 "the simulation ran away (values not finite): check gains, inertia and the size of the step"
             )
-        states, accelerations = np.moveaxis(states, 0, 1), np.moveaxis(accelerations, 0, 1)
         return Trace(
-            time_s=self.step_s * np.arange(steps + 1),
+            time_s=self.step_s * np.arange(states.shape[1]),
             position=states[..., 10:13],
             velocity=states[..., 7:10],
             quaternion=states[..., 3:7],
@@ -272,7 +339,7 @@ class _Flight:
             angular_acceleration=accelerations[..., :3],
             specific_force=accelerations[..., 3:],
             rotor_speed=states[..., 13:],
-            rotor_command=np.moveaxis(commands, 0, 1),
+            rotor_command=commands,
         )
 
     def derivative(self, share: float, state: np.ndarray) -> np.ndarray:

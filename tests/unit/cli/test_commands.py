@@ -75,7 +75,7 @@ def test_a_verdict_has_the_bytes_of_the_workflow_and_a_mismatch_is_no_error(flig
         (lambda p: p.mkdir(), "no vehicle.yaml and no log in it"),
         (lambda p: p.write_bytes(b""), "the file is empty"),
         (lambda p: p.write_bytes(b"\x7fELF\0\0\0\0" * 8), "not a log that rotorid knows"),
-        (lambda p: p.write_bytes(b"\xa3\x95" * 80), "ArduPilot DataFlash"),
+        (lambda p: p.write_bytes(b"\xa3\x95" * 80), "DataFlash log"),
         (lambda p: p.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8)), "to take the clock from"),
         (lambda p: p.write_text("a,b\n1,2\n3,4\n"), "--write-mapping"),
     ],

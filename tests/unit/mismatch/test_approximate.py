@@ -11,7 +11,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import forms_of, rotation_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.approximate import hats, later, without_company
+from rotorid.mismatch.instrument.approximate import hats, later, without_leftovers_of_forms
 from rotorid.mismatch.instrument.columns import OFFSET, form_reading, make_terms
 from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model, reading_model
 from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
@@ -211,8 +211,8 @@ def test_an_effect_of_its_own_stays_beside_a_strong_one() -> None:
     setup = set_up(stand_set(change, rotors=1))
     model = fitted_model(setup, make_terms(setup)[0])
     before = {model.search.terms[k].effect for k in model.selection.active}
-    model, company = without_company(model)
-    assert company == ()
+    model, leftovers = without_leftovers_of_forms(model)
+    assert leftovers == ()
     assert len(before) == 3 and {"thrust_curve", "tare_offset"} < before
     assert before == {model.search.terms[k].effect for k in model.selection.active}
 
@@ -252,11 +252,11 @@ def test_a_model_says_which_effect_only_made_up_for_another() -> None:
 
     setup = set_up(stand_set(change, rotors=1, noise=(0.005, 0.0005)))
     terms = [t for t in make_terms(setup)[0] if t.form is None or t.form.name != "power of the speed"]
-    model, company = without_company(reading_model(setup, terms))
+    model, leftovers = without_leftovers_of_forms(reading_model(setup, terms))
     curves = {"thrust_curve", "load_nonlinearity"}
     kept = {model.search.terms[k].effect for k in model.selection.active}
     assert len(kept & curves) == 1
-    assert all(c.effect in model.selection.not_established and c.either for c in company if c.effect in curves)
+    assert all(c.effect in model.selection.not_established and c.either for c in leftovers if c.effect in curves)
 
 
 def test_rows_later_hold_the_first() -> None:

@@ -12,10 +12,12 @@ from rotorid.effects.hysteresis import settling
 from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import form_reading, make_terms
-from rotorid.mismatch.instrument.company import FREE, remainder, without_remainders
+from rotorid.mismatch.instrument.freer_forms import FREE, remainder, without_remainders
 from rotorid.mismatch.instrument.model import fitted_model, kept_values, reading_model
 from rotorid.mismatch.instrument.sampling import resolution
-from rotorid.mismatch.instrument.setup import session, set_up, zero_temperature
+from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
+from rotorid.mismatch.prepare import parts_of
+from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
@@ -32,7 +34,6 @@ def instrument(**changes) -> Instrument:
         duration_s=30.0,
         run_s=30.0,
         runs=("a", "b", "c"),
-        training=("a", "b", "c"),
         largest=(10.0, 10.0, 20.0, 1.0, 1.0, 1.0),
         returns=(0, 1, 2),
         temperature=True,
@@ -67,7 +68,8 @@ def test_a_session_has_pauses_where_its_clock_runs_on_and_none_where_each_run_st
         return tuple(Run(f"r{i}", pd.DataFrame({"time_s": s + np.arange(11.0)})) for i, s in enumerate(starts))
 
     def of(*starts):
-        return session(RecordingSet("s", BENCH, runs(*starts)))
+        found = session_of(RecordingSet("s", BENCH, runs(*starts)))
+        return list(found.start_s.values()), found.length_s, found.clock
 
     assert of(5.0, 35.0, 65.0) == ([0.0, 30.0, 60.0], 70.0, True)
     assert of(0.0, 0.0, 0.0) == ([0.0, 10.0, 20.0], 30.0, False)
@@ -227,7 +229,8 @@ def test_what_a_narrow_form_leaves_over_is_a_remainder():
     """
 
     def model_with(change, active):
-        setup = set_up(recorded(change, runs=3))
+        made = recorded(change, runs=3)
+        setup = set_up(parts_of(made, split_runs(made))[0], made)
         terms, _ = make_terms(setup)
         model = reading_model(setup, terms)
         fit = model.search.regression.fit(model.search.always + active)

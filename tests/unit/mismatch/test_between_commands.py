@@ -9,6 +9,8 @@ from rotorid.effects.contract import Motion, SpeedPath
 from rotorid.effects.motor_lag import lagged
 from rotorid.mismatch.instrument.chain import find_chain, moved_between_samples, unknown_courses
 from rotorid.mismatch.instrument.setup import set_up, with_speed
+from rotorid.mismatch.prepare import parts_of
+from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 DT_S, TAU_S = 0.01, 0.03
@@ -88,7 +90,9 @@ def lagging_set(between) -> RecordingSet:
 
 @pytest.mark.parametrize("between", [lambda x: x, lambda x: np.repeat(x[::FINE], FINE)], ids=["smooth", "holds"])
 def test_a_lag_is_found_whatever_the_command_did_between_its_samples(between):
-    (found,) = [f for f in find_chain(set_up(lagging_set(between))).findings if f.id == "motor_lag"]
+    made = lagging_set(between)
+    setup = set_up(parts_of(made, split_runs(made))[0], made)
+    (found,) = [f for f in find_chain(setup).findings if f.id == "motor_lag"]
     first = found.parameters[0]
     assert first.low < TAU_S < first.high
     assert first.high - first.low < 0.04 * TAU_S

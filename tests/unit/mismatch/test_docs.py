@@ -6,6 +6,8 @@ import importlib
 import re
 from pathlib import Path
 
+from rotorid.mismatch.rules import markdown
+
 PAGE = (Path(__file__).parents[3] / "docs" / "mismatch.md").read_text()
 
 
@@ -24,3 +26,8 @@ def test_the_modules_named_exist():
     assert len(names) > 12
     for name in names:
         importlib.import_module("rotorid.mismatch." + name.removeprefix("mismatch/").replace("/", "."))
+
+
+def test_the_rules_are_those_of_the_code():
+    found = PAGE.split("<!-- rules -->\n")[1].split("<!-- end of rules -->")[0]
+    assert found == markdown(), "put what rotorid.mismatch.rules.markdown() returns between the marks"

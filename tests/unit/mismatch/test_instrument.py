@@ -90,7 +90,6 @@ def instrument_for(loading: Loading, vehicle: Vehicle) -> Instrument:
         duration_s=span,
         run_s=span,
         runs=("a",),
-        training=("a",),
         largest=largest,
         tilts=True,
         returns=every,

@@ -3,8 +3,6 @@
 import base64
 import json
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +13,10 @@ from rotorid.mismatch.deliver import verdict_of, write_files
 from rotorid.mismatch.headline import MOST_WORDS, headline, tiles
 from rotorid.mismatch.page import by_share, make_page
 from rotorid.mismatch.page_data import packed
+from rotorid.mismatch.page_signals import fit_percent, measured
+from rotorid.mismatch.shares import segments_of
 from rotorid.mismatch.verdict import main_channel
+from tests.browser import CHROMIUM, Browser
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 
 NASTY = '</script><img src=x onerror="document.title=1">&'
@@ -97,17 +98,85 @@ def test_a_ledger_is_shown_on_demand():
     assert "<details>" not in page_of(made)
 
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory):
+    if CHROMIUM is None:
+        pytest.skip("needs Chromium")
+    with Browser(tmp_path_factory.mktemp("browser")) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page whose names hold markup."""
+    folder = tmp_path_factory.mktemp("page")
+    made = analysis(findings=[drag_finding()], dash=True)
+    made = replace(made, recordings=replace(made.recordings, name=NASTY), notes=(NASTY,))
+    write_files(made, folder / "verdict.json", folder / "report.html", folder / "v.yaml")
+    return folder / "report.html"
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 @pytest.mark.parametrize("width", [360, 800, 1280])
-def test_chromium_draws_the_figures_without_an_error(tmp_path: Path, width: int):
-    made = analysis(findings=[drag_finding()], dash=True)
+@pytest.mark.parametrize("dark", [False, True])
+def test_chromium_draws_the_page_at_any_width_without_an_error(browser, written: Path, width: int, dark: bool):
+    browser.said.clear()
+    browser.open(written, width, dark=dark)
+    assert browser.said == []
+    assert browser.value("document.querySelectorAll('.u-over').length") == 4
+    assert browser.value("document.documentElement.scrollWidth") <= width
+    assert "made" not in browser.value("document.title") and browser.value("document.images.length") == 1
+    background = browser.value("getComputedStyle(document.body).backgroundColor")
+    assert (sum(map(int, re.findall(r"\d+", background))) < 200) == dark
+    # Something is drawn on the replay's canvas.
+    drawn = "new Set(document.getElementById('replay').getContext('2d').getImageData(0, 0, 300, 300).data).size"
+    assert browser.value(drawn) > 3
+
+
+@pytest.mark.slow
+def test_the_page_can_be_used_by_keyboard(browser, written: Path):
+    browser.open(written, 1280)
+    shown = "(() => { const c = document.querySelector('#time .u-legend'); return c !== null; })()"
+    assert browser.value(shown)
+    order = []
+    for _ in range(12):
+        browser.press("Tab")
+        order.append(browser.value("document.activeElement.id || document.activeElement.tagName"))
+    assert [name for name in order if name in ("run", "channel", "whole", "time", "play", "frame", "replay")] == [
+        "run", "channel", "whole", "time", "play", "frame", "replay"
+    ]  # fmt: skip
+    picture = "document.getElementById('replay').toDataURL()"
+    before = browser.value(picture)
+    browser.value("document.getElementById('replay').focus()")
+    browser.press("ArrowLeft")
+    assert browser.value(picture) != before
+    browser.press(" ")
+    assert browser.value("document.getElementById('play').textContent") == "pause"
+
+
+@pytest.mark.slow
+def test_no_other_script_runs_in_the_page(browser, written: Path, tmp_path: Path):
     page = tmp_path / "report.html"
-    write_files(made, tmp_path / "verdict.json", page, tmp_path / "v.yaml")
-    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom"]
-    done = subprocess.run([*command, f"--window-size={width},900", page.as_uri()], capture_output=True, text=True)
-    assert "CONSOLE" not in done.stderr
-    assert done.stdout.count('class="u-over"') >= 2
+    page.write_text(written.read_text().replace("</main>", "<script>document.title = 'taken'</script></main>"))
+    browser.open(page, 800)
+    assert browser.value("document.title") != "taken"
+    browser.said.clear()
+
+
+def test_measured_less_simulated_is_what_is_left():
+    """On a recording whose force is mass times acceleration, the measured side is that, on the traces' instants."""
+    made = analysis(findings=[drag_finding()], dash=True)
+    readings = measured(made, segments_of(made))
+    for trace, reading in zip(made.traces, readings, strict=True):
+        if trace.channel == "force_z":
+            np.testing.assert_allclose(reading, -made.believed.mass_kg * 9.81, rtol=1e-6)
+
+
+def test_the_fit_is_a_hundred_where_nothing_is_left_and_nothing_where_the_mean_would_do():
+    made = analysis(findings=[drag_finding()], dash=True)
+    signal = [np.sin(t.time_s) for t in made.traces]
+    perfect = [replace(t, before=s - s.mean(), after=0 * s) for t, s in zip(made.traces, signal, strict=True)]
+    fits = fit_percent(replace(made, traces=tuple(perfect)), signal)
+    for before, after in fits.values():
+        assert after == pytest.approx(100)
+        assert before == pytest.approx(0, abs=1e-6)

@@ -13,7 +13,6 @@ from rotorid.vehicle.attitude import (
     rates_to_euler_rates,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.fast import fly
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.params import RigidBody
 from rotorid.vehicle.rigid_body import angular_acceleration, kinetic_energy_j
@@ -196,45 +195,6 @@ def test_motor_lag_closed_form():
 def wiggle(steps=1000, dt=0.001):
     t = dt * np.arange(steps)
     return 1073.0 * (1 + 0.03 * np.sin(2 * np.pi * t[:, None] * np.array([1.0, 1.3, 1.7, 2.1])))
-
-
-def test_compiled_flight_is_the_same_flight():
-    vehicle = thesis_vehicle(inertia_kg_m2=dict(xx=2.4e-3, yy=2.6e-3, zz=4.6e-3, xy=1e-4, xz=-2e-4, yz=5e-5))
-    commands = wiggle()
-    start = Start(
-        euler_rad=np.array([[0.1, 0.2, 0.3]]),
-        velocity_m_s=np.array([[1.0, 2.0, 3.0]]),
-        rotor_speed_rad_s=np.full((1, 4), 1000.0),
-    )
-    trace = simulate(vehicle, Commands(0.001 * np.arange(1000), commands), 1.0, 0.001, start, Motors(0.04))
-    first = np.zeros((1, 17))
-    first[0, 3:7] = quaternion_from_euler([0.1, 0.2, 0.3])
-    first[0, 7:10], first[0, 13:] = [1, 2, 3], 1000.0
-    states = fly([vehicle], np.repeat(first, 3, 0), commands, 0.001, 0.04)
-    for v in range(3):
-        np.testing.assert_allclose(states[v, :, 0:3], trace.angular_velocity[0], atol=1e-11)
-        np.testing.assert_allclose(states[v, :, 3:7], trace.quaternion[0], atol=1e-12)
-        np.testing.assert_allclose(states[v, :, 10:13], trace.position[0], atol=1e-11)
-        np.testing.assert_allclose(states[v, :, 13:], trace.rotor_speed[0], rtol=1e-12)
-
-
-def test_compiled_steps_and_array_code_fly_the_same():
-    """An effect of size zero sends the same flight through the array code."""
-    vehicle = thesis_vehicle()
-    drag = catalogue()["rotor_drag"].forms(vehicle)[0]
-    zero = [(drag, np.zeros(len(drag.parameters)))]
-    how = dict(motors=Motors(0.04, 0.02), disturbance=Disturbance(0.1, 1e-3, 0.1))
-    controller = AttitudePid(vehicle, training_reference())
-    start = Start(euler_rad=np.array([[0.1, 0.05, 0.3]]), velocity_m_s=np.array([[1.0, 0, 0]]))
-
-    def flown(effects):
-        rng = np.random.default_rng(4)
-        return simulate(vehicle, controller, 0.5, 0.002, start, effects=effects, rng=rng, **how)
-
-    fast, slow = flown([]), flown(zero)
-    for name in ("position", "quaternion", "angular_velocity", "angular_acceleration", "specific_force"):
-        np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-8, atol=1e-9)
-    np.testing.assert_allclose(fast.rotor_speed, slow.rotor_speed, rtol=1e-10)
 
 
 def test_vehicles_of_a_batch_do_not_touch_each_other():

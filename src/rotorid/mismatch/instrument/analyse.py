@@ -14,11 +14,12 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS, UNITS
+from rotorid.mismatch import rules
 from rotorid.mismatch.analyse import throttle_or_thrust
 from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
-from rotorid.mismatch.instrument.approximate import needless_values, without_company
+from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
 from rotorid.mismatch.instrument.chain import (
     ChainResult,
     find_chain,
@@ -28,18 +29,21 @@ from rotorid.mismatch.instrument.chain import (
     without_id,
 )
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
-from rotorid.mismatch.instrument.company import without_remainders
-from rotorid.mismatch.instrument.decide import findings_of
+from rotorid.mismatch.instrument.decide import findings_of, with_plainer_forms
+from rotorid.mismatch.instrument.freer_forms import without_remainders
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
+from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.instrument.useful import without_useless
 from rotorid.mismatch.instrument.values import Values, curved_gains, delivered, settled, without_needless
 from rotorid.mismatch.leave_one_out import first_s
+from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.regression import Fit
+from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import Selection
+from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import changed_vehicle, told_of_commands
 from rotorid.mismatch.within_trust import in_words
@@ -67,15 +71,21 @@ def one_load(finding: Finding, setup: Setup) -> Finding:
         return finding
     if set(finding.channels) != {"force_z"}:
         return finding
+    if not rules.ONE_LOAD(True):
+        return finding
     return replace(
         finding, status="ambiguous", alternatives=tuple(sorted({*CURVES_OF_ONE_LOAD, *finding.alternatives}))
     )
 
 
 def analyse_instrument(recordings: RecordingSet) -> Analysis:
-    """The whole analysis of a set of kind `stand` or `bench`."""
+    """The whole analysis of a set of kind `stand` or `bench`.
+
+    Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
+    """
     recordings, findings, remarks = find_mistakes(recordings)
-    setup = set_up(recordings)
+    known, unseen = parts_of(recordings, split_runs(recordings))
+    setup = set_up(known, recordings)
     terms, reasons = make_terms(setup)
     measured = all(x.measured for x in setup.loadings)
     chain = find_chain(setup)
@@ -97,9 +107,13 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         size = sizes_of_values(model)
         return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
 
-    model = without_remainders(model, once_more)
-    model = without_useless(model, once_more, lambda found: values_in(found, found.selection))
-    model, company = without_company(model)
+    def among(model: ReadingModel, terms: list[Term]) -> ReadingModel:
+        kept = {t.key for t in terms}
+        active = [k for k in model.selection.active if k in kept]
+        return fitted_model(setup, terms, active, loadings, model.search.refused)
+
+    model = with_plainer_forms(without_remainders(model, once_more), among)
+    model, leftovers = without_leftovers_of_forms(model)
     values_of = partial(values_in, model)
     if chain is None:
         reasons.update({k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in SPEED_IDS})
@@ -113,7 +127,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
-    found = [one_load(f, setup) for f in findings_of(model, company)]
+    found = [one_load(f, setup) for f in findings_of(model, leftovers)]
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:
@@ -125,14 +139,17 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     findings += absorbed(model, values, findings)
     fit, moved_values = settled(model, values, model.selection.active)
     refitted, moved_plain = settled(model, plain, [])
-    traces, before, after = make_traces(setup, model, refitted, fit)
     told = values if measured else told_of_commands(findings, values)
     next_step, separates, sigma = next_experiment(findings, model)
-    p_before, p_after, depends = dependence(model, before, after)
-    share, channels, description = leftover(model, before, after, p_after, depends, approximate_forms(model, company))
+
+    # The last decision is made: the runs held out are opened.
+    seen = on_every_run(model, chain, unseen)
+    traces, before, after = make_traces(seen, refitted, fit)
+    p_before, p_after, depends = dependence(seen, before, after)
+    share, channels, description = leftover(seen, before, after, p_after, depends, approximate_forms(model, leftovers))
     if chain is not None and measured:
-        traces += speed_traces(setup, chain)
-        lost = speed_left(setup, chain, traces)
+        traces += speed_traces(seen.setup, chain)
+        lost = speed_left(seen.setup, chain, traces)
         if lost > LOST_SHARE:
             # The reading and the speeds weigh alike.
             share, channels = (
@@ -141,7 +158,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
             )
             depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
             description = "; ".join([*([description] if description else []), SPEED_LEFT])
-    known = {f.id for f in findings if f.status in ("established", "ambiguous")}
+    claimed = {f.id for f in findings if f.status in CLAIMED}
     analysis = Analysis(
         recordings=recordings,
         split=setup.split,
@@ -150,11 +167,11 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         improved=with_full_speed(improved(setup.vehicle, {**moved_values, **values}), setup, chain),
         findings=tuple(findings),
         values=named_values(setup, told) | full_speed_value(setup, chain),
-        not_testable={k: v for k, v in reasons.items() if k not in known},
+        not_testable={k: v for k, v in reasons.items() if k not in claimed},
         traces=traces,
         noise_floor=noise_floors(setup, model, chain),
         p_values={c: (p_before[c], p_after[c]) for c in p_before},
-        regimes=regimes(model),
+        regimes=regimes(seen),
         unexplained_share=share,
         unexplained_channels=channels,
         unexplained_depends_on=tuple(depends),
@@ -165,30 +182,30 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         force_source="sensor",
         samples_per_row=setup.average,
         instrument=setup.instrument,
-        loadings=model.loadings,
+        loadings=seen.loadings,
         notes=(*remarks, *notes_of(setup)),
         put_right=in_words(moved_values, VALUE_NAMES),
-        without=without_each(setup, model, values, chain if measured else None, findings, traces),
+        without=without_each(model, seen, values, chain if measured else None, findings, traces),
     )
     return weighed(analysis)
 
 
 def without_each(
-    setup: Setup, model: ReadingModel, values: Values, chain: ChainResult | None, findings: list[Finding], traces
+    model: ReadingModel, seen: ReadingModel, values: Values, chain: ChainResult | None, findings: list[Finding], traces
 ) -> dict[str, tuple[np.ndarray, ...]]:
     """To the id of every stated effect what is left of every trace without it, all else fitted anew.
 
-    `chain` is what lies between command and speed where both are measured. Where only commands are known, what lies
-    between is not taken apart, nor is a mistake of the set.
+    `seen` is the model with the rows of every run, `chain` what lies between command and speed where both are measured.
+    Where only commands are known, what lies between is not taken apart, nor is a mistake of the set.
     """
     out, active = {}, model.selection.active
     names = {f.id for f in findings if f.status in CLAIMED}
     for effect in dict.fromkeys(model.search.terms[k].effect for k in active):
         if effect in names:
             fewer = settled(model, values, [k for k in active if model.search.terms[k].effect != effect])[0]
-            out[effect] = on_traces(traces, [(r.run, r.time_s) for r in model.rows], delivered(model, fewer))
+            out[effect] = on_traces(traces, [(r.run, r.time_s) for r in seen.rows], delivered(seen, fewer))
     for key in [] if chain is None else [k for k, _ in chain.fit.chain if k in names and k not in out]:
-        own = speed_traces(setup, without_id(setup, chain, key))
+        own = speed_traces(seen.setup, without_id(seen.setup, chain, key))
         left = {(t.run, t.channel, first_s(t.time_s)): t.after for t in own}
         out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
     return out
@@ -202,9 +219,9 @@ def on_traces(traces, parts: list[tuple[str, np.ndarray]], left: list[np.ndarray
     return tuple(known.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
 
 
-def approximate_forms(model: ReadingModel, company) -> list[str]:
+def approximate_forms(model: ReadingModel, leftovers) -> list[str]:
     """Names of effects at work whose form leaves something that others only made up for."""
-    keys = dict.fromkeys(c.stronger for c in company if c.stronger in model.selection.active)
+    keys = dict.fromkeys(c.stronger for c in leftovers if c.stronger in model.selection.active)
     return [catalogue()[model.search.terms[k].effect].name for k in keys]
 
 
@@ -323,13 +340,13 @@ def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list
     return list(out.values())
 
 
-def make_traces(setup: Setup, model: ReadingModel, refitted: Fit, fit: Fit):
+def make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
     """Traces, and residuals (n, 6) of every part as believed, and with what is delivered."""
     before = [np.nan_to_num(r.y) for r in model.rows]
     again, after = delivered(model, refitted), delivered(model, fit)
     traces = [
         Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], values[:, c], left[:, c])
         for r, y, values, left in zip(model.rows, before, again, after, strict=True)
-        for c in setup.instrument.channels
+        for c in model.setup.instrument.channels
     ]
     return tuple(traces), before, after

@@ -18,8 +18,9 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
+from rotorid.mismatch import rules
 from rotorid.mismatch.decide import WIDEST_TRUST, coefficients
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, in_training, restrain
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, everything, restrain
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.instrument.values import selection_of
 from rotorid.mismatch.regression import Regression, build
@@ -40,7 +41,7 @@ GAIN = "gain"
 
 
 @dataclass(frozen=True)
-class Companion:
+class LeftOfForm:
     """An effect that was taken out, and the stronger one whose form it made up for."""
 
     key: str
@@ -137,7 +138,7 @@ def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regr
         for r, f in zip(model.rows, free, strict=True)
     ]
     per = block_length(setup, rows)
-    out = build(rows, [*kept, term], regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz)
+    out = build(rows, [*kept, term], regression.filters, everything, per / setup.rate_hz, setup.rate_hz)
     restrain(out, setup)
     return out
 
@@ -207,12 +208,12 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     for key in (v for v in set(values) - settled if not v.startswith(GAIN)):
         if any(left_of(model, key, s, active, c) < OF_ITS_OWN for s, c in stronger_ones(model, key, active)):
             out.add(key)
-    return out
+    return out if rules.NEEDLESS_VALUE(bool(out)) else set()
 
 
-def without_company(model: ReadingModel) -> tuple[ReadingModel, tuple[Companion, ...]]:
+def without_leftovers_of_forms(model: ReadingModel) -> tuple[ReadingModel, tuple[LeftOfForm, ...]]:
     """The model without effects that only make up for the form of a stronger one, and what they were."""
-    found: list[Companion] = []
+    found: list[LeftOfForm] = []
     while True:
         active = model.selection.active
         worst = None
@@ -221,7 +222,7 @@ def without_company(model: ReadingModel) -> tuple[ReadingModel, tuple[Companion,
                 share = left_of(model, key, strong, active, channels)
                 if share < OF_ITS_OWN and (worst is None or share < worst[0]):
                     worst = (share, key, strong)
-        if worst is None:
+        if not rules.APPROXIMATE(worst is not None):
             return model, tuple(found)
         _, key, strong = worst
         effect = model.search.terms[key].effect
@@ -231,7 +232,7 @@ def without_company(model: ReadingModel) -> tuple[ReadingModel, tuple[Companion,
         selection = replace(selection, not_established=selection.not_established | {effect: reason})
         either = exchangeable(model, key, strong)
         model = replace(model, selection=selection)
-        found.append(Companion(key, effect, strong, either))
+        found.append(LeftOfForm(key, effect, strong, either))
 
 
 def exchangeable(model: ReadingModel, key: str, strong: str) -> bool:
@@ -249,4 +250,4 @@ def exchangeable(model: ReadingModel, key: str, strong: str) -> bool:
     return beyond < SHARE_OF_LARGEST**2 * own
 
 
-__all__ = ["Companion", "needless_values", "without_company"]
+__all__ = ["LeftOfForm", "needless_values", "without_leftovers_of_forms"]

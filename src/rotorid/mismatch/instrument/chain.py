@@ -20,9 +20,7 @@ from rotorid.effects.contract import SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
 from rotorid.mismatch.findings import Estimate, Finding, Trace
 from rotorid.mismatch.instrument.columns import form_reading
-from rotorid.mismatch.instrument.predict import full_voltage_of
 from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces_of, with_speed
-from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
 from rotorid.signal.kernels import causal
 
@@ -40,8 +38,6 @@ MOST_DOUBT = 3.0
 """Standard deviations by which a command may differ from the curve through its samples."""
 SUB_SAMPLE = 1.2
 """Offsets in time up to so many samples are a nuisance."""
-OTHER_SUPPLY = 0.05
-"""Relative distance between the voltages of fitted and held-out runs that makes them different supplies."""
 LEAST_SPAN = 0.02
 """Relative span of the voltage below which its effect cannot be tested."""
 BLOCK_S = 1.0
@@ -190,14 +186,9 @@ class Problem:
         self.holds = holds
         self.first_full = setup.full_speed or largest_command(setup)
         self.scaled = setup.estimated_full_speed
-        self.volts = full_voltage_of(setup.loadings)
+        self.volts = setup.full_voltage
         self.measured = all(x.measured for x in setup.loadings)
-        rule = training_rule(setup.split, list(setup.loadings))
-        self.rule = rule
-        fitted = [x for x in setup.loadings if rule(x.run, float(np.median(x.time_s))) is True]
-        self.fitted = thinned(fitted or list(setup.loadings))
-        held = [x for x in setup.loadings if rule(x.run, float(np.median(x.time_s))) is False]
-        self.held = thinned(held)
+        self.fitted = thinned(list(setup.loadings))
         self.others = others or []
         # A lag of some hundredths of a second must still show: few stretches at a fine rate rather than all coarse.
         finest = max(1, int(setup.instrument.rate_hz / RATE_HZ))
@@ -264,13 +255,6 @@ class Problem:
         return np.concatenate(
             [np.stack([causal(t, p[:, c]) for c, t in enumerate(self.taps)], axis=1).ravel() for p in parts]
         )
-
-    def other_supply(self) -> bool:
-        """Whether the held-out runs have a supply voltage that the fitted ones never had."""
-        fitted, held = volts_of(self.fitted), volts_of(self.held)
-        if not len(fitted) or not len(held):
-            return False
-        return held.max() < (1 - OTHER_SUPPLY) * fitted.min() or held.min() > (1 + OTHER_SUPPLY) * fitted.max()
 
     def neutral(self) -> np.ndarray:
         return np.array([self.first_full]) if self.scaled else np.zeros(0)
@@ -368,12 +352,6 @@ def supply_reason(setup: Setup) -> str | None:
     if len(volts) and np.ptp(volts) < LEAST_SPAN * volts.mean():
         return (
             f"the supply voltage hardly varies in the runs that are fitted ({volts.min():.1f} to {volts.max():.1f} V)"
-        )
-    if problem.other_supply():
-        held = volts_of(problem.held)
-        return (
-            f"the runs that are fitted have {volts.min():.1f} to {volts.max():.1f} V, those held out "
-            f"{held.min():.1f} to {held.max():.1f} V: too few fitted points with another voltage to tell"
         )
     return None
 
@@ -576,12 +554,6 @@ def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | 
     size = float((np.sqrt(np.quantile(change**2, 0.95, axis=0)) / np.maximum(problem.noise, 1e-12)).max())
     if size < SMALLEST_SIZE:
         return f"its size is {size:.2g} of the noise"
-    if problem.held and not problem.other_supply():
-        gain = float(np.sum(problem.white(without.chain, without.theta, problem.held) ** 2)) - float(
-            np.sum(problem.white(inner.chain, inner.theta, problem.held) ** 2)
-        )
-        if gain < 0:
-            return "it did not help on the held-out runs"
     return None
 
 
@@ -664,9 +636,6 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
         values, deviation = best.theta[where], sd[where]
         p = p_value(values - np.array(form.neutral), covariance[where, where], count)
         others = alternatives(problem, best, key, forms)
-        if key == "throttle_curve" and problem.other_supply() and "battery_sag" not in dict(best.chain):
-            # The voltage falls with the load, so a curve may be sag; the runs held out cannot judge it at theirs.
-            others.append("battery_sag")
         findings.append(
             Finding(
                 id=key,

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS
+from rotorid.mismatch import rules
 from rotorid.mismatch.decide import estimates
 from rotorid.mismatch.findings import Estimate, Finding
-from rotorid.mismatch.instrument.approximate import Companion
+from rotorid.mismatch.instrument.approximate import LeftOfForm
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     active_values,
     doubt_of_form,
     nonlinear_deviation,
 )
+from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 SHOWS = 0.33
@@ -35,10 +38,10 @@ def main_channels(model: ReadingModel, key: str) -> list[int]:
     return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]
 
 
-def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> list[Finding]:
+def findings_of(model: ReadingModel, leftovers: tuple[LeftOfForm, ...] = ()) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive.
 
-    `company` are effects that only made up for the form of a term: one that in any form does as well as it is an
+    `leftovers` are effects that only made up for the form of a term: one that in any form does as well as it is an
     alternative to it.
     """
     effects, search, selection = catalogue(), model.search, model.selection
@@ -48,17 +51,8 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
             continue  # told as unexplained
         term, effect = search.terms[key], effects[search.terms[key].effect]
         channels = main_channels(model, key)
-        values = active_values(model, key)
-        if term.form.nonlinear:
-            sd = nonlinear_deviation(model, key, model.loadings)
-            parameters = tuple(
-                Estimate(p.symbol, float(v), p.unit, float(v - REACH * s), float(v + REACH * s))
-                for p, v, s in zip(term.form.parameters, values, sd, strict=True)
-            )
-        else:
-            parameters = estimates(model.regression, selection.fit, search, key)
-        parameters = wider(parameters, doubt_of_form(model, key, model.loadings))
-        either = [c.effect for c in company if c.stronger == key and c.either]
+        values, parameters = active_values(model, key), parameters_of(model, key)
+        either = [c.effect for c in leftovers if c.stronger == key and c.either]
         alternatives = [*alternatives_of(model, key), *either]
         out.append(
             Finding(
@@ -82,6 +76,49 @@ def findings_of(model: ReadingModel, company: tuple[Companion, ...] = ()) -> lis
         text, rule = f"{name} did not hold: {reason}", getattr(reason, "rule", "")
         out.append(Finding(id=effect_id, status="not_established", sentence=text, rule=rule))
     return out
+
+
+def parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
+    """Parameters of a term at work with 95 % intervals: the doubt between forms of the same parameters is in them."""
+    term = model.search.terms[key]
+    if term.form.nonlinear:
+        values, sd = active_values(model, key), nonlinear_deviation(model, key, model.loadings)
+        parameters = tuple(
+            Estimate(p.symbol, float(v), p.unit, float(v - REACH * s), float(v + REACH * s))
+            for p, v, s in zip(term.form.parameters, values, sd, strict=True)
+        )
+    else:
+        parameters = estimates(model.regression, model.selection.fit, model.search, key)
+    return wider(parameters, doubt_of_form(model, key, model.loadings))
+
+
+def with_plainer_forms(model: ReadingModel, again: Callable[[ReadingModel, list[Term]], ReadingModel]) -> ReadingModel:
+    """The model with a plainer form of the same id wherever all numbers of a form may be nothing.
+
+    A form of two time constants explains more than one of one and says nothing of either. `again(model, terms)`
+    searches once more from a model's terms at work with others to choose from.
+    """
+    for key in list(model.selection.active):
+        term = model.search.terms[key]
+        if term.effect in UNKNOWNS or key not in model.selection.active:
+            continue
+        if not any(len(t.form.parameters) < len(term.form.parameters) for t in forms_beside(model, key)):
+            continue
+        if rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in parameters_of(model, key))):
+            others = [t for t in model.terms if t.kind != "effect" or t.effect != term.effect or plainer(t, term)]
+            model = again(model, others)
+    return model
+
+
+def forms_beside(model: ReadingModel, key: str) -> list[Term]:
+    """Terms of the same id."""
+    effect = model.search.terms[key].effect
+    return [t for t in model.terms if t.kind == "effect" and t.effect == effect and t.key != key]
+
+
+def plainer(one: Term, than: Term) -> bool:
+    """Whether a term's form has fewer parameters than another's."""
+    return len(one.form.parameters) < len(than.form.parameters)
 
 
 def wider(parameters: tuple[Estimate, ...], doubt: np.ndarray) -> tuple[Estimate, ...]:

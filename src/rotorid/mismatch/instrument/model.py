@@ -11,10 +11,11 @@ from scipy.optimize import least_squares
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading, forms_of
+from rotorid.mismatch import rules
+from rotorid.mismatch.comparison import LEAST_RUNS
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of, term_columns
 from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
-from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import (
     MOST_ATTENUATION,
     Regression,
@@ -23,18 +24,11 @@ from rotorid.mismatch.regression import (
     build,
     chi2_p,
     full_fit_residuals,
-    limited_bias,
 )
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import (
-    COST_OF_UNKNOWN,
-    COST_PER_EFFECT,
-    COST_PER_PARAMETER,
     ENTER_P,
-    LEAST_PROMISE,
     SMALLEST_SIZE,
-    UNSTEADY_P,
-    UNSTEADY_SHARE,
     Questions,
     Search,
     Selection,
@@ -59,11 +53,6 @@ MAIN_SHARE = 0.2
 ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
-NOISE_IN_A_PLAY = 0.1
-"""Share of a play's own part that may be noise of measured speeds."""
-REFUTED = 12.0
-"""Whitened squares by which another effect may do worse on the runs held out before it is no alternative."""
-LEAST_HELD_OUT = 4
 MOST_AT_ONCE = 6
 """More causes than this at once are not told apart by six channels: what they leave is stated as unexplained."""
 MOST_OF_A_FORM = 6
@@ -85,11 +74,9 @@ class ReadingSearch(Search):
     def __init__(self, regression: Regression, ask: Questions, refused: Mapping[str, str] | None = None):
         super().__init__(regression, ask)
         self.refused = refused or {}
-        self.total_gram = regression.gram[regression.training].sum(axis=0)
-        self.total_cross = regression.cross[regression.training].sum(axis=0)
 
     def _allowed(self, term: Term) -> bool:
-        if self.rich or of_single_runs(term.key):
+        if self.rich or of_single_runs(term.key) or not rules.TWO_ROUNDS.on:
             return True
         return term.size <= MOST_OF_A_FORM and (term.form is None or term.form.name not in LATER)
 
@@ -114,11 +101,13 @@ class ReadingSearch(Search):
         judged = super().judge(key, active, base, jackknife)
         if self.terms[key].effect == "hysteresis" and self.regression.bias_gram.any():
             keys = self.always + [k for k in active if k != key] + [key]
-            if self.regression.noise_share(keys, key, judged.beta) > NOISE_IN_A_PLAY:
+            noise = self.regression.noise_share(keys, key, judged.beta)
+            if rules.NOISE_IN_A_PLAY(noise > rules.NOISE_IN_A_PLAY["share"]):
                 return replace(judged, physical=False)
         terms = {self.terms[k].effect: self.terms[k] for k in (*active, key)}
         early = "delay" in terms and terms["delay"].values and terms["delay"].values[0] < 0
-        if early and "amplifier_filter" in terms and self.terms[key].effect in ("delay", "amplifier_filter"):
+        both = early and "amplifier_filter" in terms and self.terms[key].effect in ("delay", "amplifier_filter")
+        if rules.EARLY_FILTER(bool(both)):
             return replace(judged, physical=False)
         return judged
 
@@ -174,9 +163,9 @@ class ReadingSearch(Search):
             self.terms = every
 
     def second_chance(self, active):
-        """A term that passes every test beside what is at work, whatever was found of it in other company.
+        """A term that passes every test beside what is at work, whatever was found of it beside other terms.
 
-        One that the runs held out refuted may have been there with false company, which was refuted after it.
+        One that did not keep its promise may have stood beside a false term, which was refuted after it.
         """
         for c in self.candidates(active):
             holds = c.named and c.score > 0 and c.p_value < ENTER_P and c.physical
@@ -186,46 +175,6 @@ class ReadingSearch(Search):
             if self.weight(c.key, c.beta, active) >= SMALLEST_SIZE and self._refuted(trial) is None:
                 return c.key
         return None
-
-    def worth(self, keys):
-        """As for flights, from the summed Gram matrix alone; of believed values only the offset in time has a limit."""
-        reg = self.regression
-        cols = reg.columns(self.always + keys)
-        gram, cross = self.total_gram[np.ix_(cols, cols)], self.total_cross[cols]
-        share = reg.training.mean()
-        bias = limited_bias(gram, share * reg.bias_gram[np.ix_(cols, cols)])
-        normal = gram - bias + np.diag(reg.precision[cols])
-        limit = np.where(np.isin(cols, reg.columns(reg.keys_of("nuisance"))), reg.limit[cols], np.inf)
-        beta = bounded(normal, cross - share * reg.bias_cross[cols], limit)[0]
-        gain = float(2 * cross @ beta - beta @ gram @ beta)
-        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
-        parameters = sum(self.terms[k].size for k in keys)
-        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
-
-    def refuted_elsewhere(self, active):
-        """The term whose own part should help on the held-out blocks and does most harm there instead.
-
-        The other coefficients are held: on an instrument a run may load one axis only, and a believed value that
-        moves with a term must not decide about it on another axis.
-        """
-        mask = self.regression.held_out
-        if mask.sum() < 4 or not active:
-            return None
-        fit = self.regression.fit(self.always + active)
-        index = np.flatnonzero(mask)
-        worst, found = 0.0, None
-        for key in active:
-            cols = self.regression.columns([key])
-            beta = fit.beta[fit.places(cols)]
-            cross = self.regression.cross[np.ix_(index, cols)]
-            every = self.regression.gram[np.ix_(index, cols, fit.columns)]
-            own = np.array([beta @ g[:, fit.places(cols)] @ beta for g in every])
-            gains = np.sort(2 * cross @ beta - 2 * (every @ fit.beta) @ beta + own)
-            cut = max(1, len(gains) // 8)
-            gain = float(gains[cut:-cut].sum()) if len(gains) > 2 * cut else float(gains.sum())
-            if own.sum() > LEAST_PROMISE and gain < worst:
-                worst, found = gain, key
-        return found
 
     def unsteady(self, active):
         """A term one of whose coefficients differs from run to run, beyond doubt and by much.
@@ -261,48 +210,38 @@ class ReadingSearch(Search):
                 b, v = np.array(found).T
                 mean = np.sum(b / v) / np.sum(1 / v)
                 q = float(np.sum((b - mean) ** 2 / v))
-                wide = np.sqrt(np.mean((b - mean) ** 2)) > UNSTEADY_SHARE * abs(mean)
+                wide = np.sqrt(np.mean((b - mean) ** 2)) > rules.STEADY["spread"] * abs(mean)
                 main = beta**2 * total > MAIN_SHARE * np.sum(
                     fit.beta[[place[c] for c in reg.columns([key])]] ** 2
                     * np.diagonal(reg.gram[reg.training].sum(axis=0))[reg.columns([key])]
                 )
-                if wide and main and chi2_p(q, len(b) - 1) < UNSTEADY_P:
+                if wide and main and chi2_p(q, len(b) - 1) < rules.STEADY["p_value"]:
                     return key
         return None
 
     def alternatives(self, key, active):
-        """Of what could stand in for a term by the runs fitted, what the runs held out do not refute.
+        """Of what could stand in for a term by all runs together, what runs that were left out do not refute.
 
-        A stand's runs differ in their tilt: those held out may be the ones that tell a weight's moment from a tare.
+        A stand's runs differ in their tilt: one of them may tell a weight's moment from a tare. What has numbers of its
+        own for every run says nothing of one that was left out.
         """
         rest = [k for k in active if k != key]
-        own = self.held_out_gain([*rest, key])
-        found = super().alternatives(key, active)
-        if own is None:
-            return found
-        return [
-            effect
-            for effect in found
-            if max(self.held_out_gain([*rest, t.key]) for t in self.terms.values() if t.effect == effect)
-            > own - REFUTED
-        ]
+        runs = len(np.unique(self.regression.run[self.regression.training]))
 
-    def held_out_gain(self, active):
-        """What a model fitted on the training blocks explains on those held out, whitened squares; None without any."""
-        reg = self.regression
-        index = np.flatnonzero(reg.held_out)
-        if len(index) < LEAST_HELD_OUT:
-            return None
-        fit = reg.fit(self.always + active)
-        gram = reg.gram[np.ix_(index, fit.columns, fit.columns)].sum(axis=0)
-        return float(2 * reg.cross[np.ix_(index, fit.columns)].sum(axis=0) @ fit.beta - fit.beta @ gram @ fit.beta)
+        def refuted(effect):
+            own, terms = [*self.always, *rest, key], [t.key for t in self.terms.values() if t.effect == effect]
+            others = ([*self.always, *rest, t] for t in terms)
+            worse = min(self.regression.compare(own, o, whole_runs=runs >= LEAST_RUNS).total for o in others)
+            return rules.ELSEWHERE(worse > rules.ELSEWHERE["squares"])
+
+        return [effect for effect in super().alternatives(key, active) if not refuted(effect)]
 
     def run(self, active=None) -> Selection:
         """Both rounds; the second starts from what the first found, the last once more from what it left out."""
         first = super().run(active)
         self.rich = True
         second = super().run(first.active)
-        while (again := self.second_chance(second.active)) is not None:
+        while rules.SECOND_CHANCE((again := self.second_chance(second.active)) is not None):
             trail = [*second.trail, f"+ {again}: it holds by itself"]
             third = super().run([*second.active, again])
             if again not in third.active:
@@ -339,9 +278,9 @@ def kept_values(search: Search, active: list[str]) -> list[str]:
     return [k for k in search.always if k not in taken]
 
 
-def in_training(setup: Setup):
-    """Rule of prepare.training_rule for the stretches of a set."""
-    return training_rule(setup.split, list(setup.loadings))
+def everything(run: str, time_s: float) -> bool:
+    """Every block is fitted: what is held out is not here."""
+    return True
 
 
 def block_length(setup: Setup, rows: list[Rows]) -> int:
@@ -411,7 +350,7 @@ def reading_model(
     noise, taps = noise_and_filters(setup, terms, rows) if filters is None else filters
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
-    regression = build(rows, terms, taps, in_training(setup), per / setup.rate_hz, setup.rate_hz, noisy)
+    regression = build(rows, terms, taps, everything, per / setup.rate_hz, setup.rate_hz, noisy)
     restrain(regression, setup)
     joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1, resolution(setup))
     sizes = size_function(regression, joint_sizes)
@@ -479,10 +418,7 @@ def refined(model: ReadingModel) -> list[Term]:
     if not moving:
         return model.terms
     stretches = list(model.loadings)
-    rule = in_training(setup)
     owner = [k for k, x in enumerate(stretches) for _ in pieces_of(x, setup.average)]
-    fitted = [i for i, r in enumerate(model.rows) if rule(r.run, float(np.median(r.time_s))) is True]
-    fitted = fitted or list(range(len(model.rows)))
     index = {}
     for i, k in enumerate(owner):
         index[i] = pieces_of(stretches[k], setup.average)[i - owner.index(k)]
@@ -495,8 +431,8 @@ def refined(model: ReadingModel) -> list[Term]:
     def white(values):
         return np.concatenate(whitened(model, values))
 
-    y = white([np.nan_to_num(model.rows[r].y) for r in fitted])
-    base = [white([model.rows[r].x[:, :, c] for r in fitted]) for c in reg.columns(fixed)]
+    y = white([np.nan_to_num(r.y) for r in model.rows])
+    base = [white([r.x[:, :, c] for r in model.rows]) for c in reg.columns(fixed)]
     prior = reg.precision[reg.columns(fixed)]
     spans = [(k, i) for k in moving for i in search.terms[k].form.nonlinear]
     start = np.array([search.terms[k].values[i] for k, i in spans])
@@ -514,7 +450,7 @@ def refined(model: ReadingModel) -> list[Term]:
     def columns_of(term, whole_forms=()):
         whole: dict[int, list[np.ndarray]] = {}
         parts = []
-        for i in fitted:
+        for i in range(len(model.rows)):
             k = owner[i]
             if k not in whole:
                 columns = term_columns(term, stretches[k], setup.vehicle, whole_forms)
@@ -638,7 +574,7 @@ def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, lo
         rows = [Rows(r.run, r.time_s, r.y - k.x[:, :, 0], r.x) for r, k in zip(rows, known, strict=True)]
     per = block_length(setup, rows)
     regression = build(
-        rows, [*chosen, *slopes], model.regression.filters, in_training(setup), per / setup.rate_hz, setup.rate_hz
+        rows, [*chosen, *slopes], model.regression.filters, everything, per / setup.rate_hz, setup.rate_hz
     )
     restrain(regression, setup)
     fit = regression.fit([t.key for t in (*chosen, *slopes)], jackknife=True)

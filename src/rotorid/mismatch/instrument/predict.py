@@ -12,7 +12,7 @@ from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.errors import InputError
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.instrument.columns import form_reading
-from rotorid.mismatch.instrument.setup import loaded_by, with_speed
+from rotorid.mismatch.instrument.setup import full_voltage_of, loaded_by, with_speed
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import speeds_of_commands
 
@@ -71,13 +71,6 @@ def is_chain(entry: dict) -> bool:
     """Whether an entry acts between command and rotor speed."""
     effect = catalogue().get(entry.get("id"))
     return effect is not None and any(f.name == entry.get("form") for f in effect.speed_forms)
-
-
-def full_voltage_of(loadings: tuple[Loading, ...]) -> float | None:
-    """Largest battery voltage that was read in a set, V."""
-    read = [x.motion.voltage if x.voltage_read is None else x.voltage_read for x in loadings]
-    known = [float(np.max(v)) for v in read if v is not None]
-    return max(known, default=None)
 
 
 def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle) -> None:

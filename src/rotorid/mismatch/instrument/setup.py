@@ -6,6 +6,7 @@ of the rotors moved to the sensor, and the weight where the reading was not zero
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -40,6 +41,22 @@ STEADY_HZ = 5.0
 
 
 @dataclass(frozen=True)
+class Session:
+    """When the runs of a set were recorded, and how warm each was at its start."""
+
+    first_s: Mapping[str, float]
+    """First instant of every run on its own clock, s."""
+    start_s: Mapping[str, float]
+    """When in the session every run started, s."""
+    length_s: float
+    """Length of the session, s; 0 of a single run."""
+    clock: bool
+    """Whether one clock ran on through all runs, pauses and all."""
+    first_temperature_c: Mapping[str, float]
+    """Temperature at the start of every run that has one, °C."""
+
+
+@dataclass(frozen=True)
 class Setup:
     """A set of kind `stand` or `bench` ready for analysis."""
 
@@ -57,6 +74,10 @@ class Setup:
     """How long after a step of the load a bench's readings are left out, s."""
     noisier: tuple[Loading, ...] | None = None
     """The same loadings with the noise of measured rotor speeds added once more; None where there is none."""
+    full_voltage: float | None = None
+    """Voltage, V, at which the full speed is reached; None where none is recorded."""
+    session: Session | None = None
+    """When each run was recorded."""
 
     @property
     def rate_hz(self) -> float:
@@ -133,7 +154,9 @@ def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
 
-def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: float, full_speed: float | None):
+def stretches_of(
+    run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: float, full_speed: float | None, session: Session
+):
     """Loadings of one run, load still empty."""
     names = c.FORCE + c.MOMENT
     read = np.full((len(run.time_s), 6), np.nan)
@@ -198,13 +221,14 @@ def stretches_of(run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: fl
             Loading(
                 run=run.name,
                 time_s=time_s,
-                run_time_s=time_s - run.time_s[0],
+                run_time_s=time_s - session.first_s[run.name],
+                session_time_s=session.start_s[run.name] + time_s - session.first_s[run.name],
                 load=load,
                 reading=reading,
                 rest=np.zeros(6),
                 motion=motion,
                 attitude=None if tilt is None else (tilt[:, 0], tilt[:, 1]),
-                temperature=None if temperature is None else temperature - others[c.TEMPERATURE][0],
+                temperature=None if temperature is None else temperature - session.first_temperature_c[run.name],
                 temperature_c=temperature,
                 command=ordered,
                 measured=speed is not None,
@@ -246,8 +270,14 @@ def without_voltmeter_noise(loadings: list[Loading]) -> list[Loading]:
         return loadings
     steps = [x.dt_s for x in loadings]
     expected = expected_voltages(read, [x.command for x in loadings], steps)
-    if not is_noise([a - b for a, b in zip(read, expected, strict=True)], steps):
-        return loadings
+    noise = is_noise([a - b for a, b in zip(read, expected, strict=True)], steps)
+    return with_expected_voltages(loadings) if noise else loadings
+
+
+def with_expected_voltages(loadings: list[Loading]) -> list[Loading]:
+    """The loadings with the voltage that the commands make expected in place of the reading, which is kept beside."""
+    read, steps = [x.motion.voltage for x in loadings], [x.dt_s for x in loadings]
+    expected = expected_voltages(read, [x.command for x in loadings], steps)
     return [
         replace(x, motion=replace(x.motion, voltage=v), voltage_read=x.motion.voltage)
         for x, v in zip(loadings, expected, strict=True)
@@ -311,49 +341,40 @@ def first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> flo
     return float(np.sqrt(abs(square))) if square else 1000.0
 
 
-def session(recordings: RecordingSet) -> tuple[list[float], float, bool]:
-    """When in the session each run started, s; how long it was, s (0 of a single run); whether its clock ran on.
+def session_of(recordings: RecordingSet) -> Session:
+    """When each run of a set was recorded: its runs are in the order of time.
 
-    Runs are in the order of time. Where each has a clock of its own the pauses between them are not known, and the
-    next is taken to start when the one before ends.
+    Where each has a clock of its own the pauses between them are not known, and the next is taken to start when the one
+    before ends.
     """
     runs = recordings.runs
     lengths = [float(r.time_s[-1] - r.time_s[0]) for r in runs]
-    if len(runs) < 2:
-        return [0.0], 0.0, False
-    ran_on = all(b.time_s[0] > a.time_s[-1] for a, b in pairwise(runs))
-    if not ran_on:
-        starts = [0.0, *np.cumsum(lengths[:-1]).tolist()]
-        return starts, starts[-1] + lengths[-1], False
     first = float(runs[0].time_s[0])
-    return [float(r.time_s[0]) - first for r in runs], float(runs[-1].time_s[-1]) - first, True
+    clock = len(runs) > 1 and all(b.time_s[0] > a.time_s[-1] for a, b in pairwise(runs))
+    starts = [float(r.time_s[0]) - first for r in runs] if clock else [0.0, *np.cumsum(lengths[:-1]).tolist()]
+    names = [r.name for r in runs]
+    warmth = {r.name: float(_filled(r, c.TEMPERATURE)[0]) for r in runs if r.has(c.TEMPERATURE)}
+    length = starts[-1] + lengths[-1] if len(runs) > 1 else 0.0
+    times = {r.name: float(r.time_s[0]) for r in runs}
+    return Session(times, dict(zip(names, starts, strict=True)), length, clock, warmth)
 
 
-def set_up(recordings: RecordingSet) -> Setup:
-    """Split, stretches and loads of a set."""
-    vehicle = recordings.vehicle
-    channels = compared_channels(recordings)
+def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Setup:
+    """Stretches and loads of the runs of a set.
+
+    Parameters
+    ----------
+    recordings
+        The runs to be fitted.
+    whole
+        The set that they are of, if that has more: which channels every run has, when each was recorded, and which runs
+        are held out. Nothing else of the other runs is used.
+    """
+    vehicle, whole = recordings.vehicle, whole or recordings
+    channels, session = compared_channels(whole), session_of(whole)
     dt_s = float(np.median(np.concatenate([np.diff(r.time_s) for r in recordings.runs])))
-    full, estimated = None, False
-    if vehicle.rotor_count:
-        if not any(commands(r, vehicle.rotor_count)[0] is not None for r in recordings.runs) and not all(
-            r.has(*c.rotor_columns("rotor_speed", vehicle.rotor_count)) for r in recordings.runs
-        ):
-            raise InputError(f"{recordings.name}: neither rotor speeds nor commands nor throttles are recorded")
-        measured = all(r.has(*c.rotor_columns("rotor_speed", vehicle.rotor_count)) for r in recordings.runs)
-        throttle = any(commands(r, vehicle.rotor_count)[1] for r in recordings.runs)
-        if vehicle.rotor_speed_limits_rad_s is not None:
-            full = float(vehicle.rotor_speed_limits_rad_s[1])
-        elif throttle and measured:
-            full, estimated = measured_full_speed(recordings), True
-        elif throttle:
-            full, estimated = first_full_speed(recordings, channels), True
-    starts, _, _ = session(recordings)
-    loadings = [
-        replace(loaded_by(x, vehicle), session_time_s=start + x.run_time_s)
-        for run, start in zip(recordings.runs, starts, strict=True)
-        for x in stretches_of(run, vehicle, channels, dt_s, full)
-    ]
+    full, estimated = full_speed_of(recordings, channels)
+    loadings = stretches(recordings, channels, dt_s, full, session)
     noisier = None
     if vehicle.kind == "stand" and loadings:
         loadings = without_voltmeter_noise(loadings)
@@ -363,7 +384,7 @@ def set_up(recordings: RecordingSet) -> Setup:
             loadings = calm
     if not loadings:
         raise InputError(f"{recordings.name}: no run has {SHORTEST} samples in a row with every channel")
-    instrument = instrument_of(recordings, vehicle, channels, tuple(loadings), dt_s)
+    instrument = instrument_of(recordings, vehicle, channels, tuple(loadings), dt_s, session)
     wait_s = 0.0
     if instrument.bench and 1 / dt_s > STEADY_HZ:
         wait_s = settling_s(tuple(loadings), instrument.loaded, instrument.largest, dt_s)
@@ -375,7 +396,7 @@ def set_up(recordings: RecordingSet) -> Setup:
     return Setup(
         recordings=recordings,
         vehicle=vehicle,
-        split=split_runs(recordings),
+        split=split_runs(whole),
         instrument=instrument,
         loadings=tuple(distanced(x, recordings) for x in loadings),
         average=average if 1 / dt_s / average > STEADY_HZ else 1,
@@ -383,7 +404,69 @@ def set_up(recordings: RecordingSet) -> Setup:
         estimated_full_speed=estimated,
         settling_s=wait_s,
         noisier=noisier,
+        full_voltage=full_voltage_of(loadings),
+        session=session,
     )
+
+
+def with_unseen(setup: Setup, unseen: RecordingSet) -> Setup:
+    """The setup with the stretches of other runs behind its own, prepared by what was decided on its own.
+
+    Runs that lack a column which the model needs are left out.
+    """
+    vehicle, instrument = setup.vehicle, setup.instrument
+    needed = [(c.FORCE + c.MOMENT)[k] for k in instrument.channels]
+    if all(x.measured for x in setup.loadings) and vehicle.rotor_count:
+        needed += c.rotor_columns("rotor_speed", vehicle.rotor_count)
+    commanded = all(x.command is not None for x in setup.loadings)
+    runs = [r for r in unseen.runs if r.has(*needed)]
+    runs = [r for r in runs if not commanded or commands(r, vehicle.rotor_count)[0] is not None]
+    known = replace(unseen, runs=tuple(runs))
+    own = stretches(known, instrument.channels, 1.0 / instrument.rate_hz, setup.full_speed, setup.session)
+    if own and any(x.voltage_read is not None for x in setup.loadings):
+        own = with_expected_voltages(own)
+    if setup.noisier is not None:
+        own = [loaded_by(smoothed(x), vehicle) for x in own]
+    if setup.settling_s:
+        own = list(without_settling(tuple(own), instrument.loaded, instrument.largest, setup.settling_s))
+    own = [replace(x, distance=x.extra.get(instrument.distance)) if instrument.distance else x for x in own]
+    every = replace(unseen, runs=(*setup.recordings.runs, *runs))
+    return replace(setup, recordings=every, loadings=(*setup.loadings, *own))
+
+
+def full_voltage_of(loadings: Sequence[Loading]) -> float | None:
+    """Largest battery voltage that was read, V; None where none was."""
+    read = [x.motion.voltage if x.voltage_read is None else x.voltage_read for x in loadings]
+    known = [float(np.max(v)) for v in read if v is not None]
+    return max(known, default=None)
+
+
+def stretches(
+    recordings: RecordingSet, channels: tuple[int, ...], dt_s: float, full_speed: float | None, session: Session
+) -> list[Loading]:
+    """The stretches of all runs with their loads predicted."""
+    vehicle = recordings.vehicle
+    return [
+        loaded_by(x, vehicle)
+        for run in recordings.runs
+        for x in stretches_of(run, vehicle, channels, dt_s, full_speed, session)
+    ]
+
+
+def full_speed_of(recordings: RecordingSet, channels: tuple[int, ...]) -> tuple[float | None, bool]:
+    """Rotor speed at full throttle, rad/s (None where it is not stated and not needed), and whether it is estimated."""
+    vehicle = recordings.vehicle
+    if not vehicle.rotor_count:
+        return None, False
+    measured = all(r.has(*c.rotor_columns("rotor_speed", vehicle.rotor_count)) for r in recordings.runs)
+    known = [commands(r, vehicle.rotor_count) for r in recordings.runs]
+    if not measured and not any(command is not None for command, _ in known):
+        raise InputError(f"{recordings.name}: neither rotor speeds nor commands nor throttles are recorded")
+    if vehicle.rotor_speed_limits_rad_s is not None:
+        return float(vehicle.rotor_speed_limits_rad_s[1]), False
+    if not any(throttle for _, throttle in known):
+        return None, False
+    return measured_full_speed(recordings) if measured else first_full_speed(recordings, channels), True
 
 
 def measured_full_speed(recordings: RecordingSet) -> float:
@@ -414,7 +497,7 @@ def distance_column(recordings: RecordingSet) -> str:
     return ""
 
 
-def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
+def instrument_of(recordings, vehicle, channels, loadings, dt_s, session: Session) -> Instrument:
     """What the forms of effects need to know beforehand."""
     load = np.concatenate([x.load for x in loadings])
     spread = np.concatenate([x.load - x.rest for x in loadings]).std(axis=0)
@@ -427,7 +510,6 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
         loaded.insert(0, int(np.argmax(spread[:3])))
     largest = np.maximum(np.abs(np.concatenate([x.load - x.rest for x in loadings])).max(axis=0), 1e-9)
     attitudes = [np.concatenate([x.attitude[i] for x in loadings]) for i in (0, 1)] if loadings[0].attitude else []
-    _, session_s, session_clock = session(recordings)
     known = [x.temperature_c for x in loadings if x.temperature_c is not None]
     warmth = np.concatenate(known) if len(known) == len(loadings) else np.zeros(1)
     return Instrument(
@@ -438,7 +520,6 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
         duration_s=float(max(x.time_s[-1] - x.time_s[0] for x in loadings)),
         runs=tuple(r.name for r in recordings.runs),
         run_s=float(max(r.time_s[-1] - r.time_s[0] for r in recordings.runs)),
-        training=split_runs(recordings).training,
         largest=tuple(float(v) for v in largest),
         returns=tuple(k for k in loaded if comes_back(loadings, k, float(largest[k]))),
         tilts=any(np.ptp(a) > 0.02 for a in attitudes),
@@ -447,8 +528,8 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s) -> Instrument:
         temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > LEAST_WARMTH_K else (0.0, 0.0),
         first_temperature_c=float(warmth[0]),
         zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > LEAST_WARMTH_K else None,
-        session_s=session_s,
-        session_clock=session_clock,
+        session_s=session.length_s,
+        session_clock=session.clock,
         distance=distance_column(recordings),
     )
 

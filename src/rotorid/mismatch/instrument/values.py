@@ -13,8 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotorid.mismatch import rules
 from rotorid.mismatch.decide import SMALLEST_CHANGE, WIDEST_TRUST, coefficients
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, in_training, kept_values
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, kept_values
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
@@ -47,7 +48,7 @@ def without_needless(
     values = dict(values_of(model.selection))
     while values:
         richer = [(s, v) for s in richer_forms(model) if len(v := values_of(s)) < len(values)]
-        if not richer:
+        if not rules.NEEDLESS_VALUE(bool(richer)):
             break
         selection, found = max(richer, key=lambda pair: model.search.worth(pair[0].active))
         model, values = replace(model, selection=selection), dict(found)
@@ -71,7 +72,7 @@ def curved_gains(model: ReadingModel, values: Values) -> set[str]:
             slope = np.mean([slope_of(model, c, share * instrument.largest[c]) for c in of_key])
             if np.sign(change) * slope < SMALLEST_CHANGE:
                 out.add(key)
-    return out
+    return out if rules.CURVED_GAIN(bool(out)) else set()
 
 
 def slope_of(model: ReadingModel, channel: int, most: float) -> float:
@@ -124,24 +125,18 @@ def settled(model: ReadingModel, values: Values, active: list[str]) -> tuple[Fit
     """
     regression, kept = model.regression, kept_values(model.search, active)
     loose = {k: WIDEST_TRUST for k in values}
-    plain = regression.fit([*regression.keys_of("nuisance"), *values, *active], loose=loose)
-    free = regression.fit(kept + active, loose=loose)
+    keys_of_both = [[*regression.keys_of("nuisance"), *values, *active], kept + active]
+    plain, free = (regression.fit(keys, loose=loose) for keys in keys_of_both)
     moved = {}
     for key in (k for k in regression.keys_of("value") if k in kept and k not in values):
         beta, covariance = coefficients(regression, free, key)
         moved[key] = (float(beta[0]), float(np.sqrt(covariance[0, 0])))
     if strained(model, values, moved):
         return plain, {}
-    left = [delivered(model, fit) for fit in (plain, free)]
-    if not pays(*left, held_out(model), block_length(model.setup, model.rows)):
+    left = [left_out_residuals(model, keys, loose) for keys in keys_of_both]
+    if not pays(*left, judged_rows(model), block_length(model.setup, model.rows)):
         return plain, {}
     return free, moved
-
-
-def held_out(model: ReadingModel) -> list[np.ndarray]:
-    """Mask of the rows held out of every part."""
-    rule = in_training(model.setup)
-    return [np.array([rule(r.run, t) is False for t in r.time_s], bool) for r in model.rows]
 
 
 def delivered(model: ReadingModel, fit: Fit) -> list[np.ndarray]:
@@ -152,3 +147,24 @@ def delivered(model: ReadingModel, fit: Fit) -> list[np.ndarray]:
     unnamed = [k for k in model.selection.active if model.search.terms[k].effect in UNKNOWNS]
     beta = np.where(np.isin(fit.columns, model.regression.columns(unnamed)), 0.0, fit.beta)
     return [np.nan_to_num(r.y) - r.x[:, :, fit.columns] @ beta for r in model.rows]
+
+
+def left_out_residuals(model: ReadingModel, keys: list[str], loose: Mapping[str, float]) -> list[np.ndarray]:
+    """What values and named effects leave of every part where they were not fitted, (n, 6).
+
+    Each environment is judged by coefficients found without it.
+    """
+    regression = model.regression
+    cols, betas = regression.left_out(tuple(keys), False, dict(loose))
+    unnamed = [k for k in model.selection.active if model.search.terms[k].effect in UNKNOWNS]
+    betas = np.where(np.isin(cols, regression.columns(unnamed)), 0.0, betas)
+    fold = np.append(regression.folds(False), -1)  # the last stands for rows that are in no block
+    return [
+        np.nan_to_num(r.y) - np.einsum("nck,nk->nc", r.x[:, :, cols], betas[fold[block]])
+        for r, block in zip(model.rows, regression.blocks_of_rows, strict=True)
+    ]
+
+
+def judged_rows(model: ReadingModel) -> list[np.ndarray]:
+    """Mask of the rows of every part that are in an environment."""
+    return [b >= 0 for b in model.regression.blocks_of_rows]

@@ -1,0 +1,202 @@
+"""What the site is made of beside the pages written by hand: results by the rules, commands, pictures of effects.
+
+MkDocs calls the functions named `on_*`. Nothing here is part of an analysis.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+import tempfile
+import textwrap
+from pathlib import Path
+
+import yaml
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).resolve().parents[2]
+RULE = re.compile(r"^( *)(?:rule|checkpoint) ?(\w*):\n", flags=re.MULTILINE)
+RESULT = re.compile(r"\"(results/[^\"]+)\"")
+
+
+def on_files(files: Files, config) -> Files:
+    """Add the pages and pictures that are made of the code, and the measurements kept beside the benchmarks."""
+    made = {"results.md": results_page(), "commands.md": commands_page()}
+    made |= {f"benchmarks/{p.name}": p.read_text(encoding="utf-8") for p in sorted((ROOT / "benchmarks").glob("*.md"))}
+    for name, text in (made | signatures()).items():
+        files.append(File.generated(config, name, content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, page, config, files) -> str:
+    """Links to the benchmarks' pages as the site has them; equations and pictures in the catalogue of effects."""
+    markdown = markdown.replace("](../benchmarks/", "](benchmarks/")
+    return with_signatures(markdown) if page.file.src_uri == "effects.md" else markdown
+
+
+# Result files -------------------------------------------------------------------------------------
+
+
+def rules_of(path: Path) -> list[tuple[str, str, list[str]]]:
+    """Rules of a rules file with a script: name, first line of the docstring, and the results they make."""
+    text, found = path.read_text(encoding="utf-8"), []
+    for match in RULE.finditer(text):
+        body = re.match(rf"(?:{match[1]} +.*\n|\n)*", text[match.end() :])[0]
+        body = textwrap.indent(textwrap.dedent(body), "    ")
+        output = re.search(r"^    output:\n((?:        .*\n)+)", body, flags=re.MULTILINE)
+        told = re.search(r'"""(.+?)"""', body, flags=re.DOTALL)
+        if "script:" in body and output:
+            name = match[2] or re.search(r"name:\s+f?\"(\w+)", body)[1]
+            found.append((name, " ".join(told[1].split()), RESULT.findall(output[1])))
+    return found
+
+
+def results() -> dict[str, list[tuple[str, str, list[str]]]]:
+    """To each rules file's name its rules."""
+    paths = sorted((ROOT / "workflow" / "rules").glob("*.smk"))
+    return {p.stem: rules for p in paths if (rules := rules_of(p))}
+
+
+def described() -> dict[str, dict[str, str]]:
+    """What each result is and holds, by its path with <places>."""
+    return yaml.safe_load((ROOT / "workflow" / "results.yaml").read_text(encoding="utf-8"))
+
+
+def pattern_of(entry: str) -> re.Pattern[str]:
+    """The expression that the paths of an entry of `results.yaml` match; wildcards of rules stand as x."""
+    parts = re.split(r"(<\w+>|\*)", entry.rstrip("/"))
+    return re.compile("".join("[^/]+" if p.startswith("<") or p == "*" else re.escape(p) for p in parts))
+
+
+def entry_of(output: str, known: dict[str, dict[str, str]]) -> str | None:
+    """The entry that describes an output of a rule: the one that spells out most of its path."""
+    flat = re.sub(r"\{\w+(?:,[^}]*)?\}", "x", output)
+    fitting = [e for e in known if pattern_of(e).fullmatch(flat)]
+    return max(fitting, key=lambda e: len(re.sub(r"<\w+>|\*", "", e)), default=None)
+
+
+def results_page() -> str:
+    """The page of result files: a table a stage, from the rules and their descriptions."""
+    known, told = described(), set()
+    lines = [
+        "# Result files",
+        "",
+        "Made from the rules. Columns and keys carry their unit in their name or beside it.",
+        "",
+    ]
+    for stage, rules in results().items():
+        rows = {}
+        for name, _, outputs in rules:
+            for output in outputs:
+                entry = entry_of(output, known)
+                if entry is not None:
+                    rows.setdefault(entry, name)
+        if not rows:
+            continue
+        lines += [
+            f"## {stage.replace('_', ' ').capitalize()}",
+            "",
+            "| file | what | columns or keys | rule |",
+            "| --- | --- | --- | --- |",
+        ]
+        for entry, rule in rows.items():
+            own = known[entry]
+            lines.append(f"| `{entry}` | {own['what']} | {own.get('holds', '')} | `{rule}` |")
+        lines.append("")
+        told |= set(rows)
+    lines += [
+        "## Made under names that the index and the public recordings give",
+        "",
+        "| file | what | columns or keys |",
+        "| --- | --- | --- |",
+    ]
+    lines += [f"| `{e}` | {own['what']} | {own.get('holds', '')} |" for e, own in known.items() if e not in told]
+    lines += [
+        "",
+        "`results/logs/<rule>/` holds the log of each job with its traceback, and the executed notebooks.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+# Commands -----------------------------------------------------------------------------------------
+
+
+def commands_page() -> str:
+    """The page of commands: what `--help` says of each."""
+    import typer
+
+    from rotorid.cli import app
+
+    group = typer.main.get_command(app)
+    completion = "`rotorid --install-completion` completes names in your shell."
+    lines = ["# Commands", "", f"What `rotorid COMMAND --help` says. {completion}", ""]
+    for name, command in group.commands.items():
+        told = textwrap.dedent(command.help or "")
+        lines += [f"## rotorid {name}", "", told, "", "| option | what |", "| --- | --- |"]
+        for parameter in (p for p in command.params if p.name != "help"):
+            option = parameter.param_type_name == "option"
+            plain = parameter.metavar or parameter.name.upper()
+            shown = ", ".join(f"`{o}`" for o in parameter.opts) if option else f"`{plain}`"
+            told = " ".join((getattr(parameter, "help", "") or "").split()).replace("|", "\\|")
+            lines.append(f"| {shown} | {told} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+# Effects ------------------------------------------------------------------------------------------
+
+
+def signatures() -> dict[str, str]:
+    """To the path of each effect's picture its SVG, drawn from the effect's own equations."""
+    from rotorid.effects.catalogue import catalogue
+    from rotorid.plots import style
+    from rotorid.plots.effects import signature_figure
+    from rotorid.plots.signature import signature
+
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.svg"
+        for name, effect in catalogue().items():
+            shown = signature(effect)
+            if shown is not None:
+                style.save(signature_figure(shown), path)
+                found[f"effects/{name}.svg"] = path.read_text(encoding="utf-8")
+                CAPTIONS[name] = caption(shown)
+    return found
+
+
+CAPTIONS: dict[str, str] = {}
+
+
+def caption(shown) -> str:
+    """What is in the picture: the form and its values."""
+    values = ", ".join(f"{subscripts(s)} = {v:.3g} {html.escape(u)}".strip() for s, v, u in shown.values)
+    return f"Form “{html.escape(shown.form)}”: {equation(shown.equation)}{' with ' + values if values else ''}."
+
+
+def subscripts(text: str) -> str:
+    """`k_d,x` with what follows the underscore set low."""
+    return re.sub(r"_([A-Za-z0-9⊥∥,]+)(?<!,)", r"<sub>\1</sub>", html.escape(text, quote=False))
+
+
+def equation(text: str) -> str:
+    """An equation of the catalogue, typeset."""
+    raised = re.sub(r"\^(\(.+?\)|[\w.+−-]+)", r"<sup>\1</sup>", subscripts(text))
+    return f'<span class="equation">{raised}</span>'
+
+
+def with_signatures(markdown: str) -> str:
+    """The catalogue's page with equations typeset and a picture below each heading."""
+    out = []
+    for line in markdown.splitlines():
+        heading = re.match(r"### `(\w+)`", line)
+        row = re.match(r"\| (?!form |---)([^|]+) \| ([^|]+) \|(.*)$", line)
+        if row:
+            # Stars in names of columns are no emphasis.
+            line = f"| {row[1]} | {equation(row[2])} |{row[3]}".replace("*", r"\*")
+        out.append(line)
+        if heading and heading[1] in CAPTIONS:
+            name = heading[1]
+            out += ["", f"![How {name.replace('_', ' ')} shows](effects/{name}.svg)", "", f"*{CAPTIONS[name]}*"]
+    return "\n".join(out) + "\n"

@@ -1,0 +1,5 @@
+"""`python -m rotorid.acquire` is `rotorid-acquire`."""
+
+from rotorid.acquire.cli import app
+
+app()

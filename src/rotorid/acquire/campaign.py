@@ -1,0 +1,491 @@
+"""The whole campaign of the thesis, recorded by the recorders from the emulators on a virtual clock.
+
+`python -m rotorid.acquire.campaign` writes `raw/campaign/` (logs packed, metadata beside them), the index
+`raw/sessions.tsv` and, outside `raw/`, the sealed truth. The same seed gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import gzip
+import math
+import shutil
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+
+from rotorid.acquire import procedures
+from rotorid.acquire.clock import VirtualClock
+from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
+from rotorid.acquire.emulators.devices import (
+    BenchDevice,
+    Device,
+    Jr3Device,
+    Physics,
+    QuadrotorDevice,
+    RotorDevice,
+    TensileDevice,
+    WrenchDevice,
+)
+from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
+from rotorid.acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
+from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
+from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
+from rotorid.acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.procedures import STEADY_JR3, SteadyRule
+from rotorid.acquire.programmes import programme_of
+from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.transport import LoopbackTransport
+from rotorid.acquire.weights import COMBINATIONS, weight_gf
+from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.index import write_index
+from rotorid.io.session import Air, Session, Setup, session_path, write_session
+from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
+
+SEED = 2024
+REPEATS = 10
+COMBINED_AXES = ("xy", "xz", "yz", "xyz")
+COMBINED_LOADS = (3, 4, 6)  # combinations of weights
+PLATFORMS_Z = ("al", "pla", "jr3")
+PROPELLER = "5040 three-blade"
+FIRST_DAY = datetime(2024, 3, 4, 9, 0, tzinfo=timezone(timedelta(hours=-6)))
+TESTS_PER_BATTERY = 6
+RADIO_FAULTS = 2e-4  # share of frames that each kind of fault befalls on the Bluetooth line
+
+
+@dataclass
+class Campaign:
+    """Where it goes, what is true, and how far the day has come."""
+
+    raw: Path
+    truth: Truth
+    seed: int
+    date: datetime = FIRST_DAY
+    recordings: list[Session] = field(default_factory=list)
+
+    def rng(self, name: str) -> np.random.Generator:
+        """Random numbers of one session, whatever comes before it."""
+        return np.random.default_rng([self.seed, crc32(name.encode())])
+
+    def line(self, device: Device, name: str, **options) -> WireHalf:
+        """The device's bytes: its clock is off by the truth's error and has been running for a while."""
+        rng = self.rng(f"line {name} {device.instrument.name}")
+        error = getattr(self.truth.clocks, device.instrument.name)
+        start_us = int(rng.integers(1 << 32))
+        share = options.pop("share", 0.0)
+        faults = Faults(clock_start_us=start_us, share=share)
+        return WireHalf(device, rng, clock_error=error, faults=faults, **options)
+
+    def air(self) -> Air:
+        """Air of the hour: warmer in the afternoon, the pressure of 540 m."""
+        hours = (self.date - FIRST_DAY).total_seconds() / 3600
+        day = 2 * math.pi * (hours % 24) / 24
+        return Air(
+            temperature_c=round(23.5 + 2.0 * math.sin(day), 1),
+            pressure_pa=round(95_400 + 150 * math.sin(0.37 * day + 0.05 * hours), 0),
+            relative_humidity=round(0.48 - 0.06 * math.sin(day), 2),
+        )
+
+    def record(
+        self,
+        kind: str,
+        group: str,
+        world: World,
+        setups: dict[str, Setup],
+        run: Callable[..., None],
+        procedure: dict,
+        pause_s: float = 45.0,
+    ) -> None:
+        """Record one test with one recorder per line, pack the logs, note them in the index.
+
+        `setups` holds one entry per line of the world, named as the recording is.
+        """
+        clock = VirtualClock(self.date)
+        clock.follow(world.run_until)
+        folder = self.raw / "campaign" / kind
+        recorders = [
+            Recorder(
+                line.device.instrument,
+                LoopbackTransport(line, clock, name=f"emulated {line.device.instrument.name}"),
+                clock,
+                folder,
+                name,
+                setup.model_copy(update={"kind": kind, "air": self.air()}),
+                group=group,
+                procedure=procedure,
+                # on a virtual clock no computer can die
+                timings=Timings(poll_s=0.1 / len(world.lines), watchdog_s=None),
+                durable=False,
+            )
+            for line, (name, setup) in zip(world.lines, setups.items(), strict=True)
+        ]
+        _within(recorders, run)
+        for recorder in recorders:
+            pack(recorder.log_path, recorder.session)
+            self.recordings.append(recorder.session)
+        self.date += timedelta(seconds=round(clock.now_ns() / 1e9 + pause_s))
+
+
+def _within(recorders: list[Recorder], run: Callable[..., None]) -> None:
+    """Run a procedure with all recorders open."""
+    if len(recorders) == 1:
+        with recorders[0] as only:
+            run(only)
+    else:
+        with recorders[0] as first, recorders[1] as second:
+            run(first, second)
+
+
+def pack(log: Path, session: Session) -> Path:
+    """Replace a finished log by its gzipped form (same bytes inside, no name and no date in the header)."""
+    packed = log.with_name(log.name + ".gz")
+    with open(packed, "wb") as raw, gzip.GzipFile("", "wb", 9, raw, mtime=0) as out:
+        out.write(log.read_bytes())
+    log.unlink()
+    session.log = packed.name
+    write_session(session, session_path(packed))
+    return packed
+
+
+def _operator(place: Callable[[float], None], load_gf: float, reaction_samples: int) -> procedures.Prompt:
+    """Someone who does what the recorder asks for, a moment later."""
+
+    def prompt(text: str) -> Callable[[], bool]:
+        left = reaction_samples
+        placed = False
+
+        def done() -> bool:
+            nonlocal left, placed
+            left -= 1
+            if left <= 0 and not placed:
+                place(load_gf)
+                placed = True
+            return left <= -25  # half a second to take the hand away
+
+        return done
+
+    return prompt
+
+
+# ---- the tests -------------------------------------------------------------------------------------------
+
+
+def calibration(campaign: Campaign) -> None:
+    """Six cells, eight combinations of weights, three repeats, 400 samples each (fig. 2.34)."""
+    for cell in range(1, 7):
+        for number, items in enumerate(COMBINATIONS, start=1):
+            for repeat in range(1, 4):
+                name = f"cal-cell{cell}-w{number}-r{repeat}"
+                rng = campaign.rng(name)
+                physics = CellClamp(campaign.truth.cells, rng, cell)
+                world = World(physics, campaign.line(BenchDevice(physics), name))
+                physics.process(1.0)
+                load = weight_gf(items)
+
+                def prompt(text: str, physics=physics, load=load) -> Callable[[], bool]:
+                    physics.place_load("z", load)
+                    return lambda: True
+
+                setup = Setup(platform="clamp", cell=cell, load_gf=load, load_items=list(items), repeat=repeat)
+                campaign.record(
+                    "calibration",
+                    f"cal-cell{cell}",
+                    world,
+                    {name: setup},
+                    lambda recorder, prompt=prompt: procedures.calibrate_cell(recorder, prompt),
+                    {"name": "calibrate_cell", "samples": 400, "weight_at": 50},
+                )
+
+
+def static(campaign: Campaign) -> None:
+    """Weights along x and y on the aluminium bench, along z on all three platforms, ten repeats."""
+    series = [("al", "x"), ("al", "y"), *((platform, "z") for platform in PLATFORMS_Z)]
+    for platform, axis in series:
+        for number, items in enumerate(COMBINATIONS, start=1):
+            for repeat in range(1, REPEATS + 1):
+                name = f"static-{platform}-{axis}-w{number}-r{repeat:02d}"
+                rng = campaign.rng(name)
+                physics, device = _platform(campaign, platform, rng)
+                world = World(physics, campaign.line(device, name))
+                physics.process(1.0)
+                load = weight_gf(items)
+                rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
+                reaction = int(rng.integers(60, 120))
+                prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, reaction)
+                setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
+                campaign.record(
+                    "static",
+                    f"static-{platform}-{axis}",
+                    world,
+                    {name: setup},
+                    lambda recorder, prompt=prompt, rule=rule: procedures.static_test(recorder, prompt, 50, rule),
+                    {"name": "static_test", "samples": 50, **vars(rule)},
+                )
+
+
+def dynamic(campaign: Campaign) -> None:
+    """A small quadrotor flown on the bench in aluminium, in PLA and on the reference sensor, three sets."""
+    for repeat in range(1, 4):
+        for platform in PLATFORMS_Z:
+            name = f"dynamic-{platform}-set{repeat}"
+            rng = campaign.rng(name)
+            physics, device = _platform(campaign, platform, rng)
+            world = World(physics, campaign.line(device, name))
+            physics.process(1.0)
+            rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
+            force = _manoeuvre(campaign.rng(f"dynamic set {repeat}"), rng)
+
+            def prompt(text: str, physics=physics, force=force) -> Callable[[], bool]:
+                physics.drive(force)
+                return lambda: True
+
+            campaign.record(
+                "dynamic",
+                f"dynamic-set{repeat}",
+                world,
+                {name: Setup(platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand")},
+                lambda recorder, prompt=prompt, rule=rule: procedures.dynamic_test(recorder, prompt, 1500, rule),
+                {"name": "dynamic_test", "samples": 1500, **vars(rule)},
+                pause_s=300,
+            )
+
+
+def _platform(campaign: Campaign, platform: str, rng: np.random.Generator) -> tuple[Physics, Device]:
+    if platform == "jr3":
+        sensor = LoadedSensor(campaign.truth.jr3, rng)
+        return sensor, Jr3Device(sensor)
+    bench = BenchPhysics(campaign.truth.cells, campaign.truth.bench[platform], rng)
+    return bench, BenchDevice(bench, f"EMU-BENCH-{platform.upper()}")
+
+
+def _manoeuvre(set_rng: np.random.Generator, own_rng: np.random.Generator) -> Callable[[float], np.ndarray]:
+    """Thrust steps of a pilot: one plan per set, flown with his own timing each time. Force −z, N."""
+    levels = np.concatenate([[0.0, 0.85], set_rng.uniform(0.35, 1.65, 6), [0.85, 0.0]])
+    starts = np.cumsum(np.concatenate([[0.0, 3.0], set_rng.uniform(2.0, 3.5, 7), [3.0]]))
+    starts = starts + np.concatenate([[0.0], own_rng.normal(0, 0.08, len(starts) - 1)])
+    levels = levels * (1 + own_rng.normal(0, 0.01, len(levels)))
+    lag_s = 0.12
+
+    def force(time_s: float) -> np.ndarray:
+        thrust = 0.0
+        for i in range(1, len(levels)):
+            if time_s > starts[i]:
+                thrust += (levels[i] - levels[i - 1]) * (1 - math.exp(-(time_s - starts[i]) / lag_s))
+        return np.array([0.0, 0.0, -thrust])
+
+    return force
+
+
+def thrust(campaign: Campaign) -> None:
+    """Motor 1 on the thrust tester at 1 to 50 % (50 tests)."""
+    truth = campaign.truth
+    for percent in range(1, 51):
+        if percent % 10 == 1:
+            battery = Battery(truth.battery)
+        name = f"thrust-{percent:02d}"
+        rotors = Rotors(truth.rotor, battery, 1)
+        physics = TesterPhysics(rotors, truth.rotor, truth.tester, campaign.rng(name))
+        setup = Setup(
+            platform="tester",
+            axis="z",
+            motor=1,
+            throttle=percent / 100,
+            propeller=PROPELLER,
+            battery=f"4S 1500 mAh no. {(percent - 1) // 10 % 3 + 1}",
+        )
+        campaign.record(
+            "thrust",
+            "thrust",
+            World(physics, campaign.line(RotorDevice(physics), name)),
+            {name: setup},
+            lambda recorder, u=percent / 100: procedures.thrust_test(recorder, u, 1.0, 4.0),
+            {"name": "thrust_test", "throttle": percent / 100, "rest_s": 1.0, "hold_s": 4.0},
+        )
+
+
+def torque(campaign: Campaign) -> None:
+    """Motor 1 on the vehicle on the wrench sensor at 2 to 40 % (20 tests)."""
+    truth = campaign.truth
+    for percent in range(2, 41, 2):
+        if percent % 10 == 2:
+            battery = Battery(truth.battery)
+        name = f"torque-{percent:02d}"
+        rig = TorqueRig(truth, battery, campaign.rng(name))
+        common = Setup(
+            axis="z",
+            motor=1,
+            throttle=percent / 100,
+            propeller=PROPELLER,
+            battery=f"4S 1500 mAh no. {(percent // 10) % 3 + 1}",
+            mount_roll_deg=0.0,
+            mount_pitch_deg=0.0,
+            sensor_position_m=list(SENSOR_POSITION_M),
+            tared=False,
+        )
+        world = World(
+            rig,
+            campaign.line(RotorDevice(rig.tester), name),
+            campaign.line(WrenchDevice(rig.stand), name),
+        )
+        remark = "drives and counts only: its thrust cell carries nothing"
+        setups = {
+            f"{name}-rotor": common.model_copy(update={"platform": "tester", "remarks": remark}),
+            f"{name}-wrench": common.model_copy(update={"platform": "stand"}),
+        }
+        campaign.record(
+            "torque",
+            name,
+            world,
+            setups,
+            lambda tester, sensor, u=percent / 100: procedures.torque_test(tester, sensor, u, 2.0, 6.0),
+            {"name": "torque_test", "throttle": percent / 100, "rest_s": 2.0, "hold_s": 6.0},
+        )
+
+
+def dynamics(campaign: Campaign) -> None:
+    """The 48 experiments of table A.1 on the stand, two loggers with their own clocks."""
+    truth = campaign.truth
+    for number, experiment in EXPERIMENTS.items():
+        if number % TESTS_PER_BATTERY == 1:
+            battery = Battery(truth.battery)
+        name = f"exp-{number:02d}"
+        rng = campaign.rng(name)
+        rotors = Rotors(truth.rotor, battery, 4)
+        stand = StandPhysics(
+            truth.vehicle, truth.rotor, truth.wrench, rotors, experiment.roll_deg, experiment.pitch_deg, rng
+        )
+        world = World(
+            stand,
+            campaign.line(QuadrotorDevice(rotors, rng), name, burst_s=0.04, share=RADIO_FAULTS),
+            campaign.line(WrenchDevice(stand), name),
+        )
+        letter, programme = programme_of(experiment)
+        setup = Setup(
+            platform="stand",
+            experiment=number,
+            propeller=PROPELLER,
+            battery=f"4S 1500 mAh no. {(number - 1) // TESTS_PER_BATTERY % 3 + 1}",
+            mount_roll_deg=float(experiment.roll_deg),
+            mount_pitch_deg=float(experiment.pitch_deg),
+            sensor_position_m=list(SENSOR_POSITION_M),
+            tared=False,
+        )
+        campaign.record(
+            "dynamics",
+            name,
+            world,
+            {f"{name}-quadrotor": setup, f"{name}-wrench": setup},
+            lambda vehicle, sensor, c=letter, p=programme: procedures.experiment(vehicle, sensor, c, p),
+            {"name": "experiment", "number": number, "letter": letter, **_plain(programme)},
+        )
+
+
+def _plain(programme: Programme) -> dict:
+    shape = "trapezoid" if programme.shape == TRAPEZOID else "sine"
+    return programme._asdict() | {"shape": shape, "maxima": list(programme.maxima)}
+
+
+def tensile(campaign: Campaign) -> None:
+    """Printed specimens of four infill densities, three each."""
+    for infill, plastic in campaign.truth.plastic.items():
+        scatter = campaign.rng(f"specimens {infill}").permutation([-1.0, 0.0, 1.0])
+        for repeat in range(1, 4):
+            name = f"tensile-{infill:03d}-{repeat}"
+            rng = campaign.rng(name)
+            scale = 1 + campaign.truth.specimen_scatter * scatter[repeat - 1]
+            physics = TensilePhysics(plastic, scale, rng.uniform(0.02, 0.12), rng)
+            setup = Setup(
+                platform="tensile tester",
+                specimen=f"{infill}-{repeat}",
+                infill_percent=infill,
+                repeat=repeat,
+                gauge_length_mm=GAUGE_MM,
+                cross_section_mm2=SECTION_MM2,
+            )
+            campaign.record(
+                "tensile",
+                f"tensile-{infill:03d}",
+                World(physics, campaign.line(TensileDevice(physics), name)),
+                {name: setup},
+                lambda recorder: procedures.stream(recorder, None),
+                {"name": "stream", "until": "the specimen is broken", "speed_mm_min": 10},
+                pause_s=120,
+            )
+
+
+def combined(campaign: Campaign) -> None:
+    """Weights that pull along two or three axes of the aluminium bench at once, five repeats.
+
+    The thesis has none; they tell what a reconstruction is worth when loads are not along one axis at a time.
+    """
+    for axis in COMBINED_AXES:
+        for number in COMBINED_LOADS:
+            items = COMBINATIONS[number - 1]
+            for repeat in range(1, 6):
+                name = f"combined-al-{axis}-w{number}-r{repeat}"
+                rng = campaign.rng(name)
+                physics, device = _platform(campaign, "al", rng)
+                world = World(physics, campaign.line(device, name))
+                physics.process(1.0)
+                load = weight_gf(items)
+                prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, int(rng.integers(60, 120)))
+                setup = Setup(platform="al", axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
+                campaign.record(
+                    "combined",
+                    f"combined-al-{axis}",
+                    world,
+                    {name: setup},
+                    lambda recorder, prompt=prompt: procedures.static_test(recorder, prompt, 50, SteadyRule()),
+                    {"name": "static_test", "samples": 50, **vars(SteadyRule())},
+                )
+
+
+PARTS: dict[str, Callable[[Campaign], None]] = {
+    part.__name__: part for part in (calibration, static, dynamic, thrust, torque, dynamics, tensile, combined)
+}
+
+
+def run_campaign(
+    raw: Path,
+    sealed: Path,
+    seed: int = SEED,
+    parts: Iterable[str] = PARTS,
+    truth: Truth | None = None,
+    say: Callable[[str], None] = print,
+) -> list[Session]:
+    """Record parts into `raw/campaign/<part>` (written anew), the index, and the sealed truth. Returns
+    the recordings. The sealed file must lie outside `raw`; raises ValueError otherwise."""
+    if sealed.resolve().is_relative_to(raw.resolve()):
+        raise ValueError(f"{sealed}: the truth must lie outside {raw}, or it is not concealed")
+    campaign = Campaign(raw, truth or draw_truth(seed), seed)
+    for name in parts:
+        shutil.rmtree(raw / "campaign" / name, ignore_errors=True)
+        campaign.date = FIRST_DAY + timedelta(days=list(PARTS).index(name))  # a day each, whichever are made
+        PARTS[name](campaign)
+        say(f"{name}: {sum(s.setup.kind == name for s in campaign.recordings)} recordings")
+    write_index(raw)
+    write_truth(campaign.truth, sealed, seed)
+    return campaign.recordings
+
+
+def main() -> None:
+    """Command line: `python -m rotorid.acquire.campaign [--raw DIR] [--sealed FILE] [--seed N] [--part NAME]`."""
+    import argparse
+
+    parser = argparse.ArgumentParser(prog="python -m rotorid.acquire.campaign", description=__doc__)
+    parser.add_argument("--raw", type=Path, default=Path("raw"))
+    parser.add_argument("--sealed", type=Path, default=Path("tests/sealed/campaign_truth.yaml"))
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--part", action="append", choices=list(PARTS), help="only this part; repeatable")
+    given = parser.parse_args()
+    recordings = run_campaign(given.raw, given.sealed, given.seed, given.part or PARTS)
+    size = sum(file.stat().st_size for file in (given.raw / "campaign").rglob("*") if file.is_file())
+    print(f"{len(recordings)} recordings, {size / 1e6:.1f} MB in {given.raw}/campaign; truth in {given.sealed}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,609 @@
+"""`rotorid-acquire`: record the instruments, or emulate them."""
+
+from __future__ import annotations
+
+import select
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.acquire import procedures, view
+from rotorid.acquire.errors import AcquireError, Interrupted
+from rotorid.acquire.options import Shared, with_shared
+from rotorid.acquire.programmes import HOLD_S, RAMP_S, programme_of
+from rotorid.acquire.record import recorders_for, run_with
+from rotorid.acquire.recorder import Recorder
+from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.session import SessionError, Setup
+from rotorid.io.wire import INSTRUMENTS, quadrotor
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
+
+Port = Annotated[str, typer.Option("--port", "-p", help="serial port; `rotorid-acquire ports` lists them")]
+Propeller = Annotated[str | None, typer.Option(help="propeller, e.g. '5040 three-blade'")]
+BatteryName = Annotated[str | None, typer.Option("--battery", help="battery, e.g. '4S 1500 mAh no. 1'")]
+PlaceS = Annotated[
+    float | None, typer.Option("--place-s", help="give a load so many seconds instead of waiting for Enter")
+]
+
+
+@app.command()
+def ports(
+    identify: Annotated[bool, typer.Option("--identify", help="ask each port who is there")] = False,
+    also: Annotated[list[str] | None, typer.Option("--port", help="ask this one as well, e.g. an emulator's")] = None,
+    udev: Annotated[str | None, typer.Option("--udev", help="print a udev rule that names the only board so")] = None,
+) -> None:
+    """List the serial ports of this computer by names that stay the same, and who is on them."""
+    from serial.tools import list_ports
+
+    from rotorid.acquire.identify import stable_name, udev_rule, who_is_there
+
+    found = sorted(list_ports.comports())
+    if udev is not None:
+        boards = [port for port in found if port.vid is not None]
+        if len(boards) != 1:
+            _fail(f"--udev is for one board at a time; plugged in by USB are {len(boards)}")
+        (board,) = boards
+        typer.echo(udev_rule(f"{board.vid:04x}", f"{board.pid:04x}", board.serial_number, udev))
+        return
+    if not found and not also:
+        typer.echo("no serial port found. Plug the instrument in; for an emulator: rotorid-acquire emulate --help")
+    for port in found:
+        typer.echo(f"{stable_name(port.device)}\t{port.description}\t{port.hwid}")
+        if identify:
+            typer.echo(f"  {who_is_there(port.device)}")
+    for name in also or []:
+        typer.echo(f"{name}\n  {who_is_there(name)}")
+
+
+@app.command()
+@with_shared
+def bench(
+    port: Port,
+    test: Annotated[str, typer.Option(help="stream, calibrate, static or dynamic")] = "stream",
+    wait_s: Annotated[float, typer.Option(help="longest wait for the load, and for a steady reading, s")] = (
+        procedures.WAIT_S
+    ),
+    tolerance: Annotated[
+        float | None, typer.Option(help="steady: no channel moves by more, V (jr3: N); default 2e-7 (0.5)")
+    ] = None,
+    samples: Annotated[int | None, typer.Option(help="how many; default: 400, 50, 1500, or until Ctrl-C")] = None,
+    rate: Annotated[float | None, typer.Option(help="samples a second, for stream")] = None,
+    cell: Annotated[int | None, typer.Option(help="cell that is calibrated, 1–6")] = None,
+    platform: Annotated[str, typer.Option(help="al, pla, or jr3: the reference sensor")] = "al",
+    axis: Annotated[str | None, typer.Option(help="x, y or z")] = None,
+    load_gf: Annotated[float | None, typer.Option(help="the weight, gf")] = None,
+    repeat: Annotated[int | None, typer.Option(help="number of the repeat")] = None,
+    place_s: PlaceS = None,
+    *,
+    shared: Shared,
+) -> None:
+    """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
+    instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
+    if tolerance is not None:
+        rule = replace(rule, tolerance=tolerance)
+    kind = {"calibrate": "calibration", "stream": "free"}.get(test, test)
+    setup = Setup(
+        kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=shared.operator
+    )
+
+    def run(recorder: Recorder) -> None:
+        prompt = _prompt(recorder, place_s)
+        if test == "calibrate":
+            procedures.calibrate_cell(recorder, prompt, samples or 400)
+        elif test == "static":
+            procedures.static_test(recorder, prompt, samples or 50, rule, wait_s)
+        elif test == "dynamic":
+            procedures.dynamic_test(recorder, prompt, samples or 1500, rule, wait_s)
+        elif test == "stream":
+            procedures.stream(recorder, samples, 1 / rate if rate else 0.0)
+        else:
+            raise typer.BadParameter(f"--test is stream, calibrate, static or dynamic, not {test!r}")
+
+    _record({instrument: port}, {instrument: setup}, run, {"name": test}, shared)
+
+
+@app.command()
+@with_shared
+def rotor(
+    port: Port,
+    throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
+    rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 1.0,
+    hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 4.0,
+    propeller: Propeller = None,
+    battery: BatteryName = None,
+    *,
+    shared: Shared,
+) -> None:
+    """Record the thrust tester: rest, throttle, rest. Keep clear of the propeller."""
+    setup = Setup(
+        kind="thrust", throttle=throttle, propeller=propeller, battery=battery, operator=shared.operator, motor=1
+    )
+    procedure = {"name": "thrust_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s}
+    _record(
+        {"rotor": port},
+        {"rotor": setup},
+        lambda recorder: procedures.thrust_test(recorder, throttle, rest_s, hold_s),
+        procedure,
+        shared,
+    )
+
+
+@app.command()
+@with_shared
+def wrench(
+    port: Port,
+    interval: Annotated[float, typer.Option(help="sampling interval, s")] = 0.01,
+    restart_times: Annotated[int, typer.Option(help="how often a measuring run starts anew")] = 0,
+    measuring_times: Annotated[int, typer.Option(help="samples of a run, 0: until stopped")] = 0,
+    offset: Annotated[bool, typer.Option(help="take the present reading as zero first")] = False,
+    samples: Annotated[int | None, typer.Option(help="stop after so many; default: Ctrl-C stops")] = None,
+    only: Annotated[str | None, typer.Option(help="just this: power-on, power-off or offset")] = None,
+    *,
+    shared: Shared,
+) -> None:
+    """Record the six-axis sensor: power, initialise, offset, start, stop, save."""
+    operations = {"power-on": ("P", b"\1"), "power-off": ("P", b"\0"), "offset": ("O", b"")}
+    if only is not None and only not in operations:
+        raise typer.BadParameter(f"--only is power-on, power-off or offset, not {only!r}")
+
+    def run(recorder: Recorder) -> None:
+        if only is not None:
+            recorder.command(*operations[only])
+        else:
+            procedures.measure_wrench(recorder, interval, restart_times, measuring_times, offset, samples)
+
+    procedure = {
+        "name": only or "measure_wrench",
+        "interval_s": interval,
+        "restart_times": restart_times,
+        "measuring_times": measuring_times,
+        "offset": offset,
+    }
+    setup = Setup(operator=shared.operator, tared=offset)
+    _record({"wrench": port}, {"wrench": setup}, run, procedure, shared)
+
+
+@app.command("quadrotor")
+@with_shared
+def quadrotor_command(
+    port: Port,
+    dynamics: Annotated[str, typer.Option(help=f"command character: {quadrotor.DYNAMICS}")] = "h",
+    shape: Annotated[str, typer.Option(help="trapezoid or sine")] = "trapezoid",
+    maxima: Annotated[str, typer.Option(help="maxima of motors 1–4, fractions")] = "0.1,0.1,0.1,0.1",
+    ramp_s: Annotated[float, typer.Option(help="ramp up and down, s")] = RAMP_S,
+    hold_s: Annotated[float, typer.Option(help="time at the maximum, or of the sine, s")] = HOLD_S,
+    frequency: Annotated[float, typer.Option(help="of the sine, Hz")] = 0.25,
+    propeller: Propeller = None,
+    battery: BatteryName = None,
+    *,
+    shared: Shared,
+) -> None:
+    """Send the quadrotor a programme and record what its motors are told."""
+    if dynamics not in quadrotor.DYNAMICS:
+        raise typer.BadParameter(f"--dynamics is one of {', '.join(quadrotor.DYNAMICS)}, not {dynamics!r}")
+    if shape not in ("trapezoid", "sine"):
+        raise typer.BadParameter(f"--shape is trapezoid or sine, not {shape!r}")
+    try:
+        four = tuple(float(value) for value in maxima.split(","))
+        number = quadrotor.SINE if shape == "sine" else quadrotor.TRAPEZOID
+        programme = quadrotor.Programme(number, four, ramp_s, hold_s, frequency)
+        programme.pack()
+    except ValueError as error:
+        raise typer.BadParameter(f"--maxima are four fractions such as 0.1,0.1,0.1,0.1 ({error})") from error
+    setup = Setup(kind="free", propeller=propeller, battery=battery, operator=shared.operator)
+    procedure = {"name": "fly_programme", "letter": dynamics, **programme._asdict(), "maxima": list(four)}
+    _record(
+        {"quadrotor": port},
+        {"quadrotor": setup},
+        lambda recorder: procedures.fly_programme(recorder, dynamics, programme),
+        procedure,
+        shared,
+    )
+
+
+@app.command()
+@with_shared
+def experiment(
+    number: Annotated[int, typer.Argument(min=1, max=48, help="number in the thesis's table A.1")],
+    quadrotor_port: Annotated[str, typer.Option(help="serial port of the ESP32")],
+    wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor")],
+    propeller: Propeller = None,
+    battery: BatteryName = None,
+    *,
+    shared: Shared,
+) -> None:
+    """Record experiment N of table A.1: quadrotor and wrench together, each with its own clock."""
+    row = EXPERIMENTS[number]
+    letter, programme = programme_of(row)
+    typer.echo(
+        f"experiment {number}: {row.dynamics}, {row.signal}, mount at roll {row.roll_deg}°, pitch {row.pitch_deg}°",
+        err=True,
+    )
+    setup = Setup(
+        kind="dynamics",
+        platform="stand",
+        experiment=number,
+        mount_roll_deg=row.roll_deg,
+        mount_pitch_deg=row.pitch_deg,
+        sensor_position_m=[0.0, 0.0, 0.045],
+        tared=False,
+        propeller=propeller,
+        battery=battery,
+        operator=shared.operator,
+    )
+    _record(
+        {"quadrotor": quadrotor_port, "wrench": wrench_port},
+        {"quadrotor": setup, "wrench": setup},
+        lambda vehicle, sensor: procedures.experiment(vehicle, sensor, letter, programme),
+        {"name": "experiment", "number": number, "letter": letter, "duration_s": programme.duration_s},
+        replace(shared, name=shared.name or f"exp-{number:02d}-{datetime.now():%Y%m%d-%H%M%S}"),
+    )
+
+
+@app.command()
+@with_shared
+def torque(
+    throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
+    rotor_port: Annotated[str, typer.Option(help="serial port of the thrust tester, which drives motor 1")],
+    wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor below the vehicle")],
+    rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 2.0,
+    hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 6.0,
+    propeller: Propeller = None,
+    battery: BatteryName = None,
+    *,
+    shared: Shared,
+) -> None:
+    """Record the torque of motor 1 by thrust tester and six-axis sensor. Keep clear of the propeller."""
+    setup = Setup(
+        kind="torque",
+        axis="z",
+        motor=1,
+        throttle=throttle,
+        mount_roll_deg=0.0,
+        mount_pitch_deg=0.0,
+        tared=False,
+        propeller=propeller,
+        battery=battery,
+        operator=shared.operator,
+    )
+    _record(
+        {"rotor": rotor_port, "wrench": wrench_port},
+        {"rotor": setup, "wrench": setup},
+        lambda tester, sensor: procedures.torque_test(tester, sensor, throttle, rest_s, hold_s),
+        {"name": "torque_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s},
+        shared,
+    )
+
+
+@app.command()
+@with_shared
+def tensile(
+    port: Port,
+    infill_percent: Annotated[int, typer.Option(help="infill density of the specimen")],
+    repeat: Annotated[int, typer.Option(help="number of the specimen")] = 1,
+    gauge_length_mm: Annotated[float, typer.Option(help="distance between the grips")] = 40.0,
+    cross_section_mm2: Annotated[float, typer.Option(help="narrowest cross-section")] = 19.2,
+    *,
+    shared: Shared,
+) -> None:
+    """Record the tensile tester until the specimen is broken."""
+    setup = Setup(
+        kind="tensile",
+        infill_percent=infill_percent,
+        repeat=repeat,
+        specimen=f"{infill_percent}-{repeat}",
+        gauge_length_mm=gauge_length_mm,
+        cross_section_mm2=cross_section_mm2,
+        operator=shared.operator,
+    )
+    _record(
+        {"tensile": port},
+        {"tensile": setup},
+        lambda recorder: procedures.stream(recorder, None, moves=True),
+        {"name": "stream"},
+        shared,
+    )
+
+
+@app.command()
+def check(
+    log: Annotated[Path, typer.Argument(help="a .rlog or .rlog.gz")],
+    csv: Annotated[Path | None, typer.Option(help="also write the table to this file")] = None,
+) -> None:
+    """Read a log as the pipeline does and say what is in it. A recording that was cut off is completed: its
+    metadata then say how far it goes."""
+    from rotorid.acquire.repair import repair
+    from rotorid.io.logs import LogError, read_log
+    from rotorid.io.rawlog import NotALog
+
+    try:
+        if _check_lines(log, csv):
+            return
+        parsed = read_log(log)
+        repaired = repair(log, parsed)
+    except (LogError, NotALog, SessionError, OSError) as error:
+        _fail(str(error))
+    table = parsed.table
+    typer.echo(f"{log}: {parsed.instrument.title} ({parsed.start.firmware}), {len(table)} samples", nl=False)
+    typer.echo(f", {table.time_s.iloc[-1]:.2f} s of device time" if len(table) else "")
+    typer.echo(f"missing {parsed.missing} in {len(parsed.gaps)} gaps, repeated {parsed.repeated}, damaged ", nl=False)
+    typer.echo(f"{parsed.checksum_errors + parsed.broken_frames}, resets {parsed.resets}")
+    if parsed.malformed or parsed.unknown_kinds:
+        typer.echo(f"frames that make no sense {parsed.malformed}, of an unknown kind {parsed.unknown_kinds}")
+    if parsed.cut_at is not None:
+        typer.echo(f"cut off at byte {parsed.cut_at}; everything before that is there")
+    for fault in parsed.faults:
+        typer.echo(f"NOT AS RECORDED: {fault}")
+    if repaired:
+        typer.echo("its metadata were never finished; completed now from the log")
+    if parsed.session is not None:
+        typer.echo(f"ended: {parsed.session.ended} – {parsed.session.message}")
+    if csv is not None:
+        table.to_csv(csv, index=False)
+        typer.echo(f"table: {csv}")
+    if parsed.faults:
+        raise typer.Exit(1)
+
+
+@app.command()
+def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = Path("raw")) -> None:
+    """Write `sessions.tsv` from the metadata of all recordings below a folder."""
+    from rotorid.io.index import write_index
+
+    try:
+        rows = write_index(raw)
+    except (SessionError, OSError) as error:
+        _fail(str(error))
+    typer.echo(f"{raw / 'sessions.tsv'}: {len(rows)} recordings")
+
+
+@app.command()
+def emulate(
+    what: Annotated[str, typer.Argument(help="bench, rotor, wrench, quadrotor, stand, torque, jr3 or tensile")],
+    link: Annotated[
+        list[Path],
+        typer.Option(help="name for the port; stand (quadrotor, wrench) and torque (rotor, wrench) need two"),
+    ],
+    material: Annotated[str, typer.Option(help="of the bench: al or pla")] = "al",
+    load: Annotated[str | None, typer.Option(help="put a weight on: AXIS:GF@SECONDS, e.g. z:500.48@6")] = None,
+    number: Annotated[int, typer.Option("--experiment", help="stand: mount angle of this experiment")] = 1,
+    infill_percent: Annotated[int, typer.Option(help="of the tensile specimen")] = 100,
+    speed: Annotated[float, typer.Option(help="device seconds per second")] = 1.0,
+    fault_share: Annotated[float, typer.Option(help="share of frames that each kind of fault befalls")] = 0.0,
+    seed: Annotated[int, typer.Option(help="of the world's hidden imperfections")] = 1,
+    truth: Annotated[Path | None, typer.Option(help="a truth file of one's own instead")] = None,
+) -> None:
+    """Be an instrument: a pseudo-terminal that speaks like the real one. Ctrl-C ends it."""
+    from rotorid.acquire.emulators.build import build, parse_load
+    from rotorid.acquire.emulators.ports import EmulatedPorts
+    from rotorid.acquire.emulators.truth import draw_truth, read_truth
+
+    try:
+        chosen = read_truth(truth) if truth else draw_truth(seed)
+        world = build(what, chosen, seed, material, number, infill_percent, fault_share)
+        if load is not None:
+            world.plan(*parse_load(load))
+    except (ValueError, OSError) as error:
+        _fail(str(error))
+    if len(link) != len(world.lines):
+        _fail(f"{what} needs {len(world.lines)} --link, got {len(link)}")
+    with EmulatedPorts(world, link, speed=speed) as emulated:
+        for name, line in zip(emulated.names, world.lines, strict=True):
+            typer.echo(f"{line.device.instrument.title} on {name}; Ctrl-C ends it")
+        try:
+            emulated.wait()
+        except KeyboardInterrupt:
+            pass
+
+
+@app.command()
+@with_shared
+def lines(
+    description: Annotated[Path, typer.Argument(help="a file that says how its lines are read (docs/acquisition.md)")],
+    port: Port,
+    samples: Annotated[int | None, typer.Option(help="stop after so many lines; default: Ctrl-C stops")] = None,
+    silence_s: Annotated[float, typer.Option(help="give up after so long without a byte, s")] = 60.0,
+    *,
+    shared: Shared,
+) -> None:
+    """Record an instrument that sends plain lines of text (CSV, key=value, fixed places) and knows no frames."""
+    from rotorid.acquire.clock import SystemClock
+    from rotorid.acquire.lines import record_lines
+    from rotorid.acquire.transport import SerialTransport
+    from rotorid.io.lines import DescriptionError, read_description
+
+    console = view.stderr_console()
+    stop = threading.Event()
+    try:
+        read = read_description(description)
+        name = shared.name or f"{read.name}-{datetime.now():%Y%m%d-%H%M%S}"
+        setup = Setup(operator=shared.operator, air=shared.weather)
+        transport = SerialTransport(port, read.baud_rate)
+
+        def work() -> None:
+            record_lines(
+                *(read, transport, SystemClock(), shared.out, name, setup),
+                samples=samples,
+                stop_asked=stop,
+                silence_s=silence_s,
+            )
+
+        view.watch([], work, stop, [], console)
+    except Interrupted as error:
+        console.print(str(error))
+        raise typer.Exit(130) from error
+    except (DescriptionError, AcquireError) as error:
+        _fail(str(error))
+    typer.echo(f"{shared.out / name}.rlog: recorded; `rotorid-acquire check` reads it")
+
+
+@app.command()
+def campaign(
+    plan: Annotated[Path, typer.Argument(help="a plan file (docs/acquisition.md)")],
+    show: Annotated[bool, typer.Option("--show", help="only say what is done and what is left")] = False,
+    repeat: Annotated[str | None, typer.Option(help="record this one once more, by its name")] = None,
+    emulate_it: Annotated[bool, typer.Option("--emulate", help="with emulators in the place of the ports")] = False,
+    speed: Annotated[float, typer.Option(help="of the emulators, device seconds per second")] = 20.0,
+    place_s: Annotated[float | None, typer.Option(help="give a load so many seconds; nobody is asked")] = None,
+) -> None:
+    """Record a campaign by its plan: checks first, then step after step; goes on where it was left."""
+    from functools import partial
+    from tempfile import TemporaryDirectory
+
+    from rotorid.acquire import run_plan
+    from rotorid.acquire.plan import PlanError, is_done, read_plan, steps_of
+
+    console = view.stderr_console()
+    stop = threading.Event()
+    try:
+        planned = read_plan(plan)
+        steps = steps_of(planned)
+    except PlanError as error:
+        _fail(str(error))
+    if show:
+        for step in steps:
+            typer.echo(f"{'done' if is_done(planned, step) else 'left'}\t{step.number}\t{step.name}\t{step.ask}")
+        return
+    if repeat is not None and repeat not in [step.name for step in steps]:
+        near = get_close_matches(repeat, [step.name for step in steps], 1)
+        _fail(f"{plan}: no step is called {repeat!r}" + (f"; did you mean {near[0]}?" if near else ""))
+    wait_s = place_s if place_s is not None else (4.0 if emulate_it else None)
+
+    def ask(text: str) -> str:
+        if wait_s is not None:
+            console.print(text, style="bold")
+            return ""
+        console.print(f"{text}  [Enter: go on, s: skip, q: stop here]", style="bold")
+        return sys.stdin.readline().strip().lower()
+
+    def watch(recorders: list[Recorder], work: Callable[[], None]) -> None:
+        for recorder in recorders:
+            recorder.stop_asked = stop
+        view.watch(recorders, work, stop, [], console)
+
+    desk = run_plan.Desk(
+        say=lambda text: console.print(text),
+        ask=ask,
+        prompts=lambda step: lambda recorder: _prompt(recorder, wait_s),
+        watch=watch,
+    )
+    try:
+        with TemporaryDirectory(prefix="rotorid-") as folder:
+            ports_of = partial(run_plan.real_ports, planned)
+            if emulate_it:
+                ports_of = partial(
+                    run_plan.emulated_ports, planned, folder=Path(folder), speed=speed, place_s=wait_s * 0.6
+                )
+            left = run_plan.run(planned, ports_of, desk, repeat)
+    except Interrupted as error:
+        console.print(str(error))
+        raise typer.Exit(130) from error
+    except (AcquireError, PlanError, SessionError, OSError) as error:
+        _fail(f"{error}\nNothing that is recorded is lost; the same command goes on from here.")
+    typer.echo(f"{planned.out}: {len(steps) - left} of {len(steps)} recordings are there; {planned.out}/sessions.tsv")
+
+
+# ---- shared ----------------------------------------------------------------------------------------------
+
+
+def _record(
+    ports: dict[str, str],
+    setups: dict[str, Setup],
+    run: Callable[..., None],
+    procedure: dict,
+    shared: Shared,
+) -> None:
+    """Open one recorder per instrument, run, show, and leave with a code: 0, 1 or (interrupted) 130."""
+    console = view.stderr_console()
+    stop = threading.Event()
+    columns = [column for instrument in ports for column in INSTRUMENTS[instrument].columns]
+    wrong = [column for column in shared.plot or [] if column not in columns]
+    if wrong:
+        raise typer.BadParameter(f"--plot is one of {', '.join(columns)}, not {wrong[0]!r}")
+    try:
+        recorders = recorders_for(
+            ports,
+            shared.out,
+            shared.name,
+            {name: setup.model_copy(update={"air": shared.weather}) for name, setup in setups.items()},
+            procedure=procedure,
+            limits=shared.limits(columns),
+            say=lambda text: console.print(text, style="bold"),
+            stop_asked=stop,
+            source=shared.source,
+        )
+    except AcquireError as error:
+        _fail(str(error))
+    plots = [
+        view.Plot(recorder, column)
+        for recorder in recorders
+        for column in shared.plot or []
+        if column in recorder.instrument.columns
+    ]
+    code = 0
+    try:
+        view.watch(recorders, lambda: run_with(recorders, run), stop, plots, console)
+    except Interrupted as error:
+        console.print(str(error))
+        code = 130
+    except AcquireError as error:
+        console.print(str(error), style="bold red")
+        code = 1
+    for recorder in recorders:
+        if recorder.begun:
+            counts = recorder.session.counts
+            typer.echo(f"{recorder.log_path}: {counts.samples} samples, {counts.missing} missing")
+            for warning in recorder.session.warnings:
+                console.print(f"note: {warning}", style="yellow")
+    raise typer.Exit(code)
+
+
+def _prompt(recorder: Recorder, place_s: float | None) -> procedures.Prompt:
+    """Ask for the load, then wait for Enter, or for so many seconds of samples."""
+
+    def prompt(text: str) -> Callable[[], bool]:
+        if place_s is not None:
+            recorder.say(f"{text}: {place_s:g} s")
+            return procedures.countdown(round(place_s * 1e6 / recorder.instrument.interval_us))
+        recorder.say(f"{text}, then press Enter")
+
+        def pressed() -> bool:
+            ready, _, _ = select.select([sys.stdin], [], [], 0)
+            if ready and not sys.stdin.readline():
+                recorder.note(
+                    "input_over", "standard input is at its end: nobody can press Enter, so this is taken as done"
+                )
+            return bool(ready)
+
+        return pressed
+
+    return prompt
+
+
+def _check_lines(log: Path, csv: Path | None) -> bool:
+    """Say what is in a log of plain lines; False where it is one of frames."""
+    from rotorid.io.lines import read_line_log
+    from rotorid.io.session import read_session, session_path
+
+    if not session_path(log).exists() or "description" not in read_session(session_path(log)).procedure:
+        return False
+    found = read_line_log(log)
+    typer.echo(f"{log}: {len(found.table)} lines read, {found.unreadable} could not be", nl=False)
+    typer.echo(f", {found.damaged_bytes} bytes damaged" if found.damaged_bytes else "")
+    if csv is not None:
+        found.table.to_csv(csv, index=False)
+        typer.echo(f"table: {csv}")
+    return True
+
+
+def _fail(text: str) -> None:
+    typer.echo(text, err=True)
+    raise typer.Exit(1)

@@ -1,0 +1,88 @@
+"""The load-cell bench: a force on the vehicle bends six cells by the inverse of the bench's geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rotorid.acquire.emulators.load_cell import LoadCells
+from rotorid.acquire.emulators.loads import direction_of, put_down
+from rotorid.acquire.emulators.oscillator import Oscillator
+from rotorid.acquire.emulators.truth import BenchTruth, CellsTruth
+from rotorid.acquire.geometry import cell_response
+
+
+class BenchPhysics:
+    """Bench with a structure that rings, gives way and turns. Loads act along +x, +y or, like thrust, −z."""
+
+    def __init__(self, cells: CellsTruth, bench: BenchTruth, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self._bench = bench
+        self._cells = LoadCells(cells, rng)
+        self._compliance = np.array(bench.compliance_1_n)
+        self._structure = Oscillator(3, bench.resonance_hz, bench.damping)
+        self._to_cells = cell_response() * np.array([1.0, 1.0, -1.0])  # for forces along +x, +y, +z
+        self._load_n = np.zeros(3)
+        self._drive: Callable[[float], np.ndarray] | None = None
+        self._time_s = 0.0
+
+    def place_load(self, axis: str, load_gf: float) -> None:
+        """Put a weight on (or, with 0, take all off); the direction is never quite the same twice. `axis` names
+        one axis, or several along which the weight pulls alike."""
+        load_n = put_down(load_gf, self._rng)
+        if axis != "z":
+            load_n *= 1 - self._bench.pulley_loss * self._rng.random()
+        direction = direction_of(axis)
+        spread = max(self._bench.misalignment_rad["xyz".index(letter)] for letter in axis)
+        slant = spread * self._rng.standard_normal(3)
+        direction = direction + np.cross(slant, direction)
+        self._load_n = load_n * direction / np.linalg.norm(direction)
+
+    def drive(self, force: Callable[[float], np.ndarray]) -> None:
+        """A force on the body in N, shape (3,), as a function of the time from now on in s (rotors)."""
+        begin = self._time_s
+        self._drive = lambda time_s: force(time_s - begin)
+
+    def process(self, dt_s: float) -> None:
+        """Advance by `dt_s`."""
+        self._time_s += dt_s
+        load = self._load_n if self._drive is None else self._load_n + self._drive(self._time_s)
+        felt = self._structure.process(dt_s, load)
+        self._cells.process(dt_s, self._to_cells @ self._bent(felt))
+
+    def volts(self) -> np.ndarray:
+        """Voltages of the six bridges, V."""
+        return self._cells.volts()
+
+    def _bent(self, force_n: np.ndarray) -> np.ndarray:
+        """The force as the cells feel it once the structure has given way: larger, and turned."""
+        size = float(np.sqrt(force_n @ force_n))
+        turned = force_n + self._bench.turn_rad_n * size * np.cross(np.array([0.6, 0.8, 0.0]), force_n)
+        return turned * (1 + self._compliance @ np.abs(force_n))
+
+
+class CellClamp:
+    """One cell clamped like a cantilever for its calibration; the other five hang unloaded."""
+
+    def __init__(self, cells: CellsTruth, rng: np.random.Generator, cell: int) -> None:
+        self._rng = rng
+        self._cells = LoadCells(cells, rng)
+        self._structure = Oscillator(1, 6.0, 0.25)
+        self._force_n = np.zeros(6)
+        self._load_n = np.zeros(1)
+        self._cell = cell - 1
+
+    def place_load(self, axis: str, load_gf: float) -> None:
+        """Put a weight on the cell's plate; the axis is the cell's own."""
+        load_n = put_down(load_gf, self._rng)
+        self._load_n = np.array([load_n])
+
+    def process(self, dt_s: float) -> None:
+        """Advance by `dt_s`."""
+        self._force_n[self._cell] = self._structure.process(dt_s, self._load_n)[0]
+        self._cells.process(dt_s, self._force_n)
+
+    def volts(self) -> np.ndarray:
+        """Voltages of the six bridges, V."""
+        return self._cells.volts()

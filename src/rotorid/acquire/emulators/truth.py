@@ -1,0 +1,250 @@
+"""What is true in the emulated world: configurable, drawn from a seed, and written to a sealed file.
+
+Rotors, mass and geometry are the thesis's (tables 2.3, 2.5, 4.1), load cells have table 2.8's calibration;
+everything else is drawn here and concealed from the pipeline, for its mismatch stage to find.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict
+
+from rotorid.acquire.geometry import INTERCEPT, SLOPE
+
+
+class _Truth(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CellsTruth(_Truth):
+    """Six load cells; every list has six entries."""
+
+    volts_per_gf: list[float] = [float(1e-5 / slope) for slope in SLOPE]
+    seat_v: list[float] = [float(-a0 / a1 * 1e-5) for a0, a1 in zip(INTERCEPT, SLOPE, strict=True)]
+    seat_gf: float = 5.0  # load at which the bearing plate sits and `seat_v` is fully there
+    zero_v: list[float] = [0.0] * 6
+    drift_v_s: list[float] = [0.0] * 6
+    wander_v_sqrt_s: float = 0.0  # random walk of the zero
+    creep_share: list[float] = [0.0] * 6
+    creep_s: list[float] = [100.0] * 6
+    backlash_n: list[float] = [0.0] * 6  # half width of the hysteresis
+    rated_n: float = 9.81
+    overload_loss: float = 0.0  # share of the force beyond the rated one that no longer bends the cell
+    noise_v: float = 0.0
+
+
+class BenchTruth(_Truth):
+    """The structure around the cells, for one material."""
+
+    compliance_1_n: list[float] = [0.0] * 3  # relative growth of the reading per newton, loads along x, y, z
+    turn_rad_n: float = 0.0  # by how much the load's direction turns per newton
+    resonance_hz: float = 40.0
+    damping: float = 0.05
+    misalignment_rad: list[float] = [0.0, 0.0, 0.0]  # spread of the load's direction, loads along x, y, z
+    pulley_loss: float = 0.0  # loads along x and y hang over a pulley that takes up to this share of them
+
+
+class BatteryTruth(_Truth):
+    """A 4S lithium-polymer battery."""
+
+    cells: int = 4
+    capacity_as: float = 1500 * 3.6
+    full_v: float = 4.2
+    empty_v: float = 3.3
+    resistance_ohm: float = 0.030
+
+
+class RotorTruth(_Truth):
+    """Motor, ESC and propeller."""
+
+    thrust_coefficient_n_s2: float = 1.3877e-6
+    torque_coefficient_n_m_s2: float = 1.8558e-8
+    inertia_kg_m2: float = 8.5e-6
+    speed_at_half_rad_s: float = 1829.2  # at throttle 0.5 and the reference voltage (appendix A.1: 1/k_x)
+    throttle_exponent: float = 0.669  # so that throttle 0.4 gives 1575 rad/s (appendix A.1)
+    dead_throttle: float = 0.0
+    reference_voltage_v: float = 15.8
+    voltage_exponent: float = 0.0
+    rise_s: float = 0.03
+    fall_s: float = 0.03
+    current_a_s3: float = 2.2e-9  # current = this × speed³ + idle
+    idle_a: float = 0.3
+
+
+class TesterTruth(_Truth):
+    """The thrust tester's own errors."""
+
+    tare_n: float = 0.0  # spread of the zero from run to run
+    thrust_noise_n: float = 0.008
+    speed_noise_rpm: float = 6.0
+
+
+class VehicleTruth(_Truth):
+    """The quadrotor. Lists over rotors in the thesis's numbering."""
+
+    mass_kg: float = 0.652
+    arm_m: float = 0.0884
+    com_offset_m: list[float] = [0.0, 0.0, 0.0]
+    thrust_factors: list[float] = [1.0] * 4
+    torque_factors: list[float] = [1.0] * 4
+
+
+class SensorTruth(_Truth):
+    """A six-axis sensor; wrench order: force x y z, moment x y z."""
+
+    crosstalk: list[list[float]] = np.eye(6).tolist()
+    noise: list[float] = [0.0] * 6
+    vibration: list[float] = [0.0] * 6  # further noise at 1000 rad/s, growing with the speed squared
+    drift_per_s: list[float] = [0.0] * 6
+    position_error_m: list[float] = [0.0, 0.0, 0.0]
+    tilt_rad: list[float] = [0.0, 0.0]  # on the stand the sensor is not quite level: roll, pitch
+    resonance_hz: float = 30.0
+    damping: float = 0.05
+
+
+class PlasticTruth(_Truth):
+    """Printed PLA of one infill density (table 2.5)."""
+
+    modulus_pa: float
+    ultimate_pa: float
+    yield_pa: float
+
+
+class ClockTruth(_Truth):
+    """Relative error of each device's clock."""
+
+    bench: float = 0.0
+    rotor: float = 0.0
+    wrench: float = 0.0
+    jr3: float = 0.0
+    quadrotor: float = 0.0
+    tensile: float = 0.0
+
+
+class Truth(_Truth):
+    """Everything."""
+
+    cells: CellsTruth = CellsTruth()
+    bench: dict[str, BenchTruth] = {"al": BenchTruth(), "pla": BenchTruth()}
+    battery: BatteryTruth = BatteryTruth()
+    rotor: RotorTruth = RotorTruth()
+    tester: TesterTruth = TesterTruth()
+    vehicle: VehicleTruth = VehicleTruth()
+    wrench: SensorTruth = SensorTruth()
+    jr3: SensorTruth = SensorTruth()
+    plastic: dict[int, PlasticTruth] = {
+        25: PlasticTruth(modulus_pa=1.6099e9, ultimate_pa=36.811e6, yield_pa=12.75e6),
+        50: PlasticTruth(modulus_pa=1.6907e9, ultimate_pa=38.591e6, yield_pa=13.2e6),
+        75: PlasticTruth(modulus_pa=1.8487e9, ultimate_pa=41.233e6, yield_pa=15.16e6),
+        100: PlasticTruth(modulus_pa=1.9482e9, ultimate_pa=41.388e6, yield_pa=16.02e6),
+    }
+    specimen_scatter: float = 0.0
+    clocks: ClockTruth = ClockTruth()
+
+
+def draw_truth(seed: int) -> Truth:
+    """A world with all of its concealed imperfections, reproducible from the seed."""
+    rng = np.random.default_rng([seed, 0])
+
+    def spread(low: float, high: float, count: int) -> list[float]:
+        return [float(f"{value:.4g}") for value in rng.uniform(low, high, count)]
+
+    def signed(low: float, high: float, count: int) -> list[float]:
+        return [float(f"{value:.4g}") for value in rng.uniform(low, high, count) * _signs(rng, count)]
+
+    vertical, *lateral = spread(0.0028, 0.0034, 1) + spread(0.06, 0.09, 2)  # the long tube bends sideways
+    turn = spread(0.0010, 0.0014, 1)[0]
+    stiffer = 1.9482 / 68.9  # table 2.4: the moduli of PLA and aluminium
+    return Truth(
+        cells=CellsTruth(
+            zero_v=signed(2e-5, 2e-4, 6),
+            drift_v_s=signed(3e-10, 1e-9, 6),
+            wander_v_sqrt_s=2e-9,
+            creep_share=spread(3e-4, 9e-4, 6),
+            creep_s=spread(60, 240, 6),
+            backlash_n=spread(5e-5, 2e-4, 6),
+            overload_loss=spread(0.05, 0.12, 1)[0],
+            noise_v=6e-8,
+        ),
+        bench={
+            "al": BenchTruth(
+                compliance_1_n=[round(c * stiffer, 7) for c in (*lateral, vertical)],
+                turn_rad_n=round(turn * stiffer, 8),
+                resonance_hz=spread(30, 38, 1)[0],
+                damping=0.04,
+                misalignment_rad=[0.010, 0.014, 0.0008],
+                pulley_loss=0.008,
+            ),
+            "pla": BenchTruth(
+                compliance_1_n=[*lateral, vertical],
+                turn_rad_n=turn,
+                resonance_hz=spread(9, 12, 1)[0],
+                damping=0.06,
+                misalignment_rad=[0.010, 0.014, 0.0008],
+                pulley_loss=0.008,
+            ),
+        },
+        rotor=RotorTruth(
+            dead_throttle=spread(0.002, 0.004, 1)[0],
+            voltage_exponent=spread(0.75, 0.95, 1)[0],
+            rise_s=spread(0.03, 0.05, 1)[0],
+            fall_s=spread(0.05, 0.08, 1)[0],
+        ),
+        tester=TesterTruth(tare_n=0.006),
+        vehicle=VehicleTruth(
+            com_offset_m=signed(0.002, 0.005, 3),
+            thrust_factors=[1.0, *(1 + v for v in signed(0.01, 0.04, 3))],
+            torque_factors=[1.0, *(1 + v for v in signed(0.01, 0.04, 3))],
+        ),
+        wrench=SensorTruth(
+            crosstalk=_crosstalk(rng),
+            noise=[0.06, 0.06, 0.08, 0.0007, 0.0007, 0.0006],
+            vibration=[0.05, 0.05, 0.08, 0.0015, 0.0015, 0.0008],
+            drift_per_s=signed(2e-4, 8e-4, 3) + signed(5e-7, 1.5e-6, 3),
+            position_error_m=signed(0.001, 0.003, 3),
+            tilt_rad=signed(0.005, 0.015, 2),
+            resonance_hz=spread(24, 32, 1)[0],
+            damping=0.05,
+        ),
+        jr3=SensorTruth(
+            noise=[0.15, 0.15, 0.25, 0.01, 0.01, 0.01],
+            drift_per_s=signed(5e-4, 2e-3, 3) + [0.0, 0.0, 0.0],
+            resonance_hz=60.0,
+        ),
+        specimen_scatter=0.012,
+        clocks=ClockTruth(**dict(zip(ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))),
+    )
+
+
+def _signs(rng: np.random.Generator, count: int) -> np.ndarray:
+    return rng.choice([-1.0, 1.0], count)
+
+
+def _crosstalk(rng: np.random.Generator) -> list[list[float]]:
+    """Identity plus up to 1.5 % between forces and between moments, and, across, up to 0.3 N per N m and
+    8e-4 N m per N.
+
+    The moment about z is left clean of the others, since table 4.1's torque coefficient is measured by it.
+    """
+    matrix = np.eye(6)
+    off = ~np.eye(6, dtype=bool)
+    scale = np.block([[np.full((3, 3), 0.015), np.full((3, 3), 0.3)], [np.full((3, 3), 8e-4), np.full((3, 3), 0.015)]])
+    matrix[off] += (rng.uniform(-1, 1, (6, 6)) * scale)[off]
+    matrix[5, :5] = 0.0
+    return matrix.round(6).tolist()
+
+
+def write_truth(truth: Truth, path: Path, seed: int | None = None) -> None:
+    """The sealed file: only the scoring of the proof may open it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    head = "# SEALED: what is true in the emulated campaign. Only scoring may read this file.\n"
+    body = {"seed": seed, "truth": truth.model_dump(mode="json")}
+    path.write_text(head + yaml.safe_dump(body, sort_keys=False, width=110), encoding="utf-8")
+
+
+def read_truth(path: Path) -> Truth:
+    """A truth of one's own for the emulators; what is left out keeps its ideal value."""
+    return Truth.model_validate(yaml.safe_load(path.read_text(encoding="utf-8"))["truth"])

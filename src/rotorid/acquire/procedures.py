@@ -1,0 +1,306 @@
+"""What a recorder does with an instrument, step by step. Each procedure takes open recorders.
+
+Time in here is the device's: a procedure counts samples, so it is the same at any speed of the host.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rotorid.acquire.errors import GaveUp
+from rotorid.acquire.recorder import Recorder, Row
+from rotorid.acquire.steady import LowPass, Steadiness
+from rotorid.io.wire import quadrotor, rotor, wrench
+
+SETTLING_SAMPLES = 10  # fig. 2.35: voltage spikes dissipate
+TARE_SAMPLES = 25
+
+Prompt = Callable[[str], Callable[[], bool]]
+"""Asks a person for something and returns a function that says whether it is done, asked once per sample."""
+
+
+@dataclass(frozen=True)
+class SteadyRule:
+    """When a reading counts as steady: low-pass cutoff, samples, and span in the channel's unit."""
+
+    cutoff_hz: float = 1.5
+    window: int = 25
+    tolerance: float = 2e-7
+
+
+WAIT_S = 600.0  # device time that a weight, or a steady reading, is waited for
+STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)  # in N: the reference sensor is noisy
+
+
+def countdown(samples: int) -> Callable[[], bool]:
+    """Done after so many samples *handed over*, not received: a busy host receives seconds of them at once, and
+    would count a weight as put down while the procedure still looks at samples from before."""
+    left = samples
+
+    def done() -> bool:
+        nonlocal left
+        left -= 1
+        return left <= 0
+
+    return done
+
+
+def stream(recorder: Recorder, samples: int | None, interval_s: float = 0.0, moves: bool = False) -> None:
+    """Record `samples` samples, or until interrupted. An instrument that `moves` something as long as it streams
+    has its watchdog on, and a restart makes the run void."""
+    if moves:
+        recorder.guard()
+        recorder.ends_by_itself = True
+    recorder.start(interval_s, resumable=not moves)
+    recorder.phase = "recording"
+    for _ in recorder.rows(samples):
+        pass
+    recorder.stop()
+
+
+def calibrate_cell(recorder: Recorder, prompt: Prompt, samples: int = 400, weight_at: int = 50) -> None:
+    """Thesis fig. 2.34: so many samples, the weight put on shortly after sample 50."""
+    recorder.start()
+    recorder.phase = "no load"
+    for number, row in enumerate(recorder.rows(samples)):
+        if number == weight_at:
+            prompt("put the weight on now")
+            recorder.mark("load", row)
+            recorder.phase = "loaded"
+    recorder.stop()
+
+
+def static_test(
+    recorder: Recorder,
+    prompt: Prompt,
+    samples: int = 50,
+    rule: SteadyRule = SteadyRule(),  # noqa: B008
+    wait_s: float = WAIT_S,
+) -> None:
+    """Thesis fig. 2.35: settle, wait until steady, tare, load, wait until steady, read. Raises GaveUp where the load
+    or a steady reading takes longer than `wait_s` of device time."""
+    recorder.start()
+    _tare(recorder, rule, wait_s)
+    recorder.phase = "put the load on"
+    done = prompt("put the load on")
+    for count, row in enumerate(recorder.rows()):  # noqa: B007 - the last row is marked
+        if done():
+            break
+        if count * recorder.instrument.interval_us > wait_s * 1e6:
+            raise GaveUp(f"no load within {wait_s:g} s (--wait-s); the device is stopped, the log has what came before")
+    recorder.mark("load", row)
+    _wait_until_steady(recorder, rule, "load_steady", wait_s)
+    recorder.phase = "reading"
+    _read(recorder, samples)
+    recorder.stop()
+
+
+def dynamic_test(
+    recorder: Recorder,
+    prompt: Prompt,
+    samples: int,
+    rule: SteadyRule = SteadyRule(),  # noqa: B008
+    wait_s: float = WAIT_S,
+) -> None:
+    """Settle, wait until steady, tare, then record the vehicle's manoeuvre. Raises GaveUp as `static_test` does."""
+    recorder.start()
+    _tare(recorder, rule, wait_s)
+    recorder.phase = "reading"
+    prompt("fly the manoeuvre now")
+    _read(recorder, samples)
+    recorder.stop()
+
+
+def thrust_test(recorder: Recorder, throttle: float, rest_s: float, hold_s: float) -> None:
+    """Rest, throttle on, rest. A device that restarts makes the run void."""
+    recorder.guard()
+    recorder.start(resumable=False)
+    rate_hz = 1e6 / recorder.instrument.interval_us
+    _rest(recorder, rest_s, rate_hz)
+    _throttle(recorder, throttle, hold_s)
+    recorder.phase = f"throttle {throttle:.0%}"
+    _mark_ends(recorder, round(hold_s * rate_hz), "on", "off")
+    _throttle(recorder, 0.0, 0.0)
+    _rest(recorder, rest_s, rate_hz)
+    recorder.stop()
+
+
+def measure_wrench(
+    recorder: Recorder,
+    interval_s: float,
+    restart_times: int = 0,
+    measuring_times: int = 0,
+    offset: bool = False,
+    samples: int | None = None,
+) -> None:
+    """Power on, initialise, offset if wanted, start, read, stop, power off."""
+    recorder.phase = "initialising"
+    arguments = wrench.pack_initialise(interval_s, restart_times, measuring_times)
+    recorder.command(wrench.POWER, b"\1")
+    recorder.command(wrench.INITIALISE, arguments)
+    if offset:
+        recorder.command(wrench.OFFSET)
+        recorder.start(interval_s, resumable=False)  # the zero is lost with the power
+    else:
+        start_wrench(recorder, interval_s, arguments)
+    recorder.ends_by_itself = measuring_times > 0
+    recorder.phase = "measuring"
+    for _ in recorder.rows(samples):
+        pass
+    recorder.stop()
+    recorder.command(wrench.POWER, b"\0")
+
+
+def start_wrench(recorder: Recorder, interval_s: float, initialise: bytes | None = None) -> None:
+    """Power on, initialise and start, and all of it again should the sensor restart."""
+    arguments = initialise or wrench.pack_initialise(interval_s, 0, 0)
+
+    def begin() -> None:
+        recorder.command(wrench.POWER, b"\1")
+        recorder.command(wrench.INITIALISE, arguments)
+        recorder.start(interval_s)
+
+    recorder.resume = begin
+    begin()
+
+
+def fly_programme(recorder: Recorder, letter: str, programme: quadrotor.Programme) -> None:
+    """Command character and programme; the vehicle streams until the programme is over."""
+    start_programme(recorder, letter, programme)
+    for _ in recorder.rows():
+        pass
+
+
+def start_programme(recorder: Recorder, letter: str, programme: quadrotor.Programme) -> None:
+    """Send the programme and expect the stream. A vehicle that restarts makes the run void."""
+    recorder.guard()
+    recorder.command(letter, programme.pack())
+    recorder.begin_stream()
+    recorder.resume = None
+    recorder.ends_by_itself = True
+    recorder.phase = quadrotor.DYNAMICS[letter]
+    recorder.wanted = round((programme.duration_s + 0.5) * 1e6 / recorder.instrument.interval_us)
+
+
+def experiment(
+    vehicle: Recorder,
+    sensor: Recorder,
+    letter: str,
+    programme: quadrotor.Programme,
+    rest_s: float = 2.0,
+    interval_s: float = 0.01,
+) -> None:
+    """Quadrotor and wrench together, each with its own clock: rest, programme, rest."""
+    vehicle.guard()
+    start_wrench(sensor, interval_s)
+    _together(sensor, rest_s / interval_s, vehicle)
+    start_programme(vehicle, letter, programme)
+    sensor.phase = vehicle.phase
+    while not vehicle.over:
+        vehicle.pump()
+        sensor.pump()
+        vehicle.drop_rows()
+        sensor.drop_rows()
+    _together(sensor, rest_s / interval_s)
+    sensor.stop()
+    sensor.command(wrench.POWER, b"\0")
+
+
+def torque_test(
+    tester: Recorder,
+    sensor: Recorder,
+    throttle: float,
+    rest_s: float,
+    hold_s: float,
+    interval_s: float = 0.01,
+) -> None:
+    """Motor 1 of the vehicle on the wrench sensor, driven and counted by the thrust tester."""
+    tester.guard()
+    start_wrench(sensor, interval_s)
+    tester.start(resumable=False)
+    _together(sensor, rest_s / interval_s, tester)
+    _throttle(tester, throttle, hold_s)
+    tester.phase = f"throttle {throttle:.0%}"
+    _together(sensor, hold_s / interval_s, tester)
+    _throttle(tester, 0.0, 0.0)
+    _together(sensor, rest_s / interval_s, tester)
+    tester.stop()
+    sensor.stop()
+    sensor.command(wrench.POWER, b"\0")
+
+
+# ---- steps ---------------------------------------------------------------------------------------------
+
+
+def _tare(recorder: Recorder, rule: SteadyRule, wait_s: float) -> None:
+    recorder.phase = "settling"
+    for row in recorder.rows(SETTLING_SAMPLES):
+        last = row
+    recorder.mark("settled", last)
+    _wait_until_steady(recorder, rule, "steady", wait_s)
+    recorder.phase = "taring"
+    sums = [0.0] * len(recorder.instrument.channels)
+    count = 0
+    for row in recorder.rows(TARE_SAMPLES):
+        if count == 0:
+            recorder.mark("tare_start", row)
+        sums = [total + value for total, value in zip(sums, row.values, strict=True)]
+        count += 1
+    recorder.mark("tare_stop", row)
+    means = (total / count for total in sums)
+    recorder.session.tare = dict(zip(recorder.instrument.columns, means, strict=True))
+
+
+def _wait_until_steady(recorder: Recorder, rule: SteadyRule, mark: str, wait_s: float) -> None:
+    recorder.phase = "waiting until steady"
+    low_pass = LowPass(rule.cutoff_hz, recorder.instrument.interval_us * 1e-6)
+    steadiness = Steadiness(rule.window, (rule.tolerance,) * len(recorder.instrument.channels))
+    for count, row in enumerate(recorder.rows()):
+        if steadiness.update(low_pass.update(row.values)):
+            recorder.mark(mark, row)
+            return
+        if count * recorder.instrument.interval_us > wait_s * 1e6:
+            spans = steadiness.spans()
+            worst = max(range(len(spans)), key=spans.__getitem__)
+            raise GaveUp(
+                f"not steady within {wait_s:g} s (--wait-s): {recorder.instrument.columns[worst]} still moves by "
+                f"{spans[worst]:.3g} over {rule.window} samples, {rule.tolerance:.3g} is allowed (--tolerance)"
+            )
+
+
+def _read(recorder: Recorder, samples: int) -> None:
+    _mark_ends(recorder, samples, "read_start", "read_stop")
+
+
+def _mark_ends(recorder: Recorder, samples: int, first: str, last: str) -> None:
+    begun = False
+    row: Row | None = None
+    for row in recorder.rows(samples):
+        if not begun:
+            recorder.mark(first, row)
+            begun = True
+    if row is not None:
+        recorder.mark(last, row)
+
+
+def _rest(recorder: Recorder, rest_s: float, rate_hz: float) -> None:
+    recorder.phase = "at rest"
+    for _ in recorder.rows(round(rest_s * rate_hz)):
+        pass
+
+
+def _throttle(recorder: Recorder, throttle: float, hold_s: float) -> None:
+    # the tester's own limit lies a little later, for the case that we are gone by then
+    recorder.command(rotor.THROTTLE, rotor.pack_throttle(throttle, hold_s + 0.5 if hold_s else 0.0))
+
+
+def _together(leader: Recorder, samples: float, *others: Recorder) -> None:
+    """Pump all of them until the leader has so many samples more."""
+    goal = leader.progress + round(samples)
+    while leader.progress < goal:
+        leader.pump()
+        for other in others:
+            other.pump()
+            other.drop_rows()
+        leader.drop_rows()

@@ -1,0 +1,156 @@
+"""Where bytes come from: a serial port, an emulator in the same process, or an old log.
+
+The seam below the recorder: a transport knows bytes and ports, nothing of frames.
+"""
+
+from __future__ import annotations
+
+import errno
+import select
+from pathlib import Path
+from typing import Protocol
+
+import serial
+
+from rotorid.acquire.clock import VirtualClock
+from rotorid.acquire.errors import PortBusy, PortLost, PortMissing
+from rotorid.io.rawlog import RECEIVED, read_raw
+
+
+class Transport(Protocol):
+    """Bytes both ways. `read` waits at most `timeout_s` and returns what there is, perhaps nothing."""
+
+    name: str
+    baud_rate: int | None
+
+    def open(self) -> None: ...
+
+    def read(self, timeout_s: float) -> bytes: ...
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class SerialTransport:
+    """A serial port, held exclusively.
+
+    `gather_s`: once bytes come, wait so long for more before reading them all, so that a fast stream
+    costs fifty wake-ups a second and not one per frame. The port's own buffer (4096 bytes) must hold
+    what comes in that time: 20 ms are enough up to 2 Mbit/s.
+    """
+
+    def __init__(self, port: str, baud_rate: int, gather_s: float = 0.02) -> None:
+        self.name = port
+        self.baud_rate = baud_rate
+        self.gather_s = gather_s
+        self._serial: serial.Serial | None = None
+
+    def open(self) -> None:
+        """Raises PortMissing or PortBusy."""
+        try:
+            self._serial = serial.Serial(self.name, self.baud_rate, timeout=0, write_timeout=1, exclusive=True)
+        except (serial.SerialException, OSError) as error:
+            raise _port_error(self.name, error) from error
+
+    def read(self, timeout_s: float) -> bytes:
+        """Raises PortLost."""
+        port = self._port()
+        try:
+            ready, _, _ = select.select([port.fd], [], [], timeout_s)
+            if not ready:
+                return b""
+            data = port.read(4096)
+            if self.gather_s and len(data) < 4096:
+                select.select([], [], [], self.gather_s)
+                data += port.read(max(port.in_waiting, 1))
+            if not data:
+                raise OSError(errno.EIO, "end of file on the port")
+            return data
+        except (serial.SerialException, OSError, TypeError, ValueError) as error:
+            raise PortLost(f"{self.name} went away while it was read ({error})") from error
+
+    def write(self, data: bytes) -> None:
+        """Raises PortLost."""
+        port = self._port()
+        try:
+            port.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise PortLost(f"{self.name} went away while it was written to ({error})") from error
+
+    def close(self) -> None:
+        if self._serial is not None:
+            try:
+                self._serial.close()
+            except OSError:  # the device behind it is gone: there is nothing left to close
+                pass
+            self._serial = None
+
+    def _port(self) -> serial.Serial:
+        if self._serial is None:
+            raise PortLost(f"{self.name} is not open")
+        return self._serial
+
+
+def _port_error(name: str, error: Exception) -> PortMissing | PortBusy:
+    number = getattr(error, "errno", None)
+    text = str(error)
+    if number == errno.ENOENT or "No such file" in text or "FileNotFoundError" in text:
+        return PortMissing(
+            f"{name}: there is no such port. Plug the instrument in, and look at `rotorid-acquire ports`."
+        )
+    if number in (errno.EACCES, errno.EPERM):
+        return PortBusy(
+            f"{name}: you may not open this port. On Linux: `sudo usermod -aG dialout $USER`, log in again."
+        )
+    if number in (errno.EBUSY, errno.EAGAIN) or "lock" in text:
+        return PortBusy(f"{name}: another program holds this port. Close it there (a serial monitor?), try again.")
+    return PortMissing(f"{name}: cannot be opened ({text}). Unplug the instrument, plug it in, try again.")
+
+
+class LoopbackTransport:
+    """An emulator in the same process, on a virtual clock: waiting for bytes makes the time pass."""
+
+    baud_rate = None
+
+    def __init__(self, device, clock: VirtualClock, name: str = "loopback") -> None:
+        self.name = name
+        self._device = device
+        self._clock = clock
+
+    def open(self) -> None:
+        pass
+
+    def read(self, timeout_s: float) -> bytes:
+        self._clock.wait(timeout_s)
+        return self._device.take()
+
+    def write(self, data: bytes) -> None:
+        self._device.receive(data)
+
+    def close(self) -> None:
+        pass
+
+
+class ReplayTransport:
+    """What a log received, once more, chunk by chunk; commands go nowhere."""
+
+    baud_rate = None
+
+    def __init__(self, log: str | Path) -> None:
+        self.name = str(log)
+        self._chunks = [chunk.data for chunk in read_raw(log).chunks if chunk.tag == RECEIVED]
+
+    def open(self) -> None:
+        pass
+
+    def read(self, timeout_s: float) -> bytes:
+        if not self._chunks:
+            raise PortLost(f"{self.name}: the log is at its end")
+        return self._chunks.pop(0)
+
+    def write(self, data: bytes) -> None:
+        pass
+
+    def close(self) -> None:
+        pass

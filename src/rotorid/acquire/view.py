@@ -1,0 +1,171 @@
+"""What a person sees while recording: values, rate, gaps, elapsed, remaining; a plot on request."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from rotorid.acquire.geometry import body_forces, cell_forces
+from rotorid.acquire.recorder import Recorder, Status
+
+REFRESH_HZ = 5
+PLOT_SAMPLES = 600
+_DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # braille, rows by columns
+
+
+def braille(values: list[float], width: int = 60, height: int = 8) -> list[str]:
+    """A curve as lines of braille characters, oldest value left; `width` and `height` in characters."""
+    if not values:
+        return []
+    low, high = min(values), max(values)
+    span = (high - low) or 1.0
+    columns, rows = 2 * width, 4 * height
+    cells = [[0] * width for _ in range(height)]
+    for x in range(columns):
+        value = values[x * len(values) // columns]
+        y = round((high - value) / span * (rows - 1))
+        cells[y // 4][x // 2] |= _DOTS[y % 4][x % 2]
+    lines = ["".join(chr(0x2800 + dots) for dots in row) for row in cells]
+    lines[0] += f" {high:.5g}"
+    lines[-1] += f" {low:.5g}"
+    return lines
+
+
+class Plot:
+    """The last samples of one channel, kept as they come."""
+
+    def __init__(self, recorder: Recorder, column: str) -> None:
+        self.column = column
+        self._number = recorder.instrument.columns.index(column)
+        self._values: deque[float] = deque(maxlen=PLOT_SAMPLES)
+        before = recorder.on_row  # several curves of one recorder: each sees every sample
+
+        def see(row) -> None:
+            if before is not None:
+                before(row)
+            self._values.append(row.values[self._number])
+
+        recorder.on_row = see
+
+    def render(self) -> Text:
+        values = list(self._values)
+        noise = f"   noise of the last {len(values)}: {np.std(values):.3g}" if len(values) > 1 else ""
+        return Text(f"{self.column}{noise}\n" + "\n".join(braille(values)))
+
+
+def panel(recorder: Recorder) -> Table:
+    """One instrument's table."""
+    status = recorder.status()
+    table = Table(title=f"{recorder.instrument.title} · {status.phase}", title_justify="left", box=None)
+    for heading in ("samples", "rate [1/s]", "missing", "damaged", "elapsed [s]", "remaining [s]"):
+        table.add_column(heading, justify="right")
+    for column in recorder.instrument.columns:
+        table.add_column(column, justify="right", style="cyan")
+    table.add_row(
+        f"{status.samples}" + (f"/{status.wanted}" if status.wanted else ""),
+        f"{status.rate_hz:.1f}" if status.rate_hz else "–",
+        str(status.missing) + (f" ({_share(status):.2%})" if status.missing else ""),
+        str(status.bad_frames),
+        f"{status.elapsed_s:.1f}",
+        f"{status.remaining_s:.0f}" if status.remaining_s is not None else "–",
+        *(f"{value:.5g}" for value in status.values or [float("nan")] * len(recorder.instrument.columns)),
+    )
+    return table
+
+
+def _share(status: Status) -> float:
+    return status.missing / max(status.samples + status.missing, 1)
+
+
+def bench_forces(recorder: Recorder) -> Text | None:
+    """Forces on the vehicle in N by table 2.8's calibration, once the bench is tared (thesis fig. 2.38)."""
+    tare, values = recorder.session.tare, recorder.status().values
+    if recorder.instrument.name != "bench" or not tare or not values:
+        return None
+    volts = np.array(values) - np.array([tare[column] for column in recorder.instrument.columns])
+    forces = body_forces(cell_forces(volts))
+    text = "   ".join(f"{name} {value:8.3f}" for name, value in zip("xyz", forces, strict=True))
+    return Text(f"force on the vehicle [N]   {text}", style="green")
+
+
+def watch(
+    recorders: list[Recorder],
+    run: Callable[[], None],
+    stop: threading.Event,
+    plots: list[Plot],
+    console: Console,
+) -> None:
+    """Run a recording and show it. Ctrl-C asks it to stop; a second one no longer asks.
+
+    In a terminal the recording has a thread of its own, so that drawing never delays it; elsewhere there
+    is nothing to draw. What the recording raises is raised here.
+    """
+
+    def interrupt(number, frame) -> None:
+        if number == signal.SIGHUP:
+            _leave_the_terminal()
+        elif stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    ends = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # under nohup a recording outlives its terminal
+        ends.append(signal.SIGHUP)
+    before = {number: signal.signal(number, interrupt) for number in ends}
+    try:
+        if not console.is_terminal:
+            run()
+            return
+        failure: list[BaseException] = []
+
+        def work() -> None:
+            try:
+                run()
+            except BaseException as error:
+                failure.append(error)
+
+        thread = threading.Thread(target=work, name="recording")
+        thread.start()
+
+        def picture() -> Group:
+            forces = [text for recorder in recorders if (text := bench_forces(recorder)) is not None]
+            return Group(*map(panel, recorders), *forces, *(plot.render() for plot in plots))
+
+        try:
+            with Live(picture(), console=console, auto_refresh=False) as live:
+                while thread.is_alive():
+                    thread.join(1 / REFRESH_HZ)
+                    live.update(picture(), refresh=True)
+        except BaseException:  # nobody looks any more: the device must not go on for that
+            stop.set()
+            thread.join()
+            raise
+        if failure:
+            raise failure[0]
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _leave_the_terminal() -> None:
+    """The terminal is gone: what is still to be said must not fail for that."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        if os.isatty(descriptor):
+            os.dup2(nowhere, descriptor)
+    os.close(nowhere)
+
+
+def stderr_console() -> Console:
+    """Progress goes to standard error, so that standard output can be piped."""
+    return Console(file=sys.stderr, highlight=False)

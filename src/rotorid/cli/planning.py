@@ -1,0 +1,153 @@
+"""`rotorid plan` and `rotorid together`: the next flight, and what it settled."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.console import one_sentence, progress
+from rotorid.errors import InputError
+
+
+def plan(
+    verdict: Annotated[Path, typer.Argument(metavar="VERDICT", help="A verdict's folder, or its verdict.json.")],
+    recordings: Annotated[
+        Path | None, typer.Option("--set", help="The recording set; by default the one beside the verdict.")
+    ] = None,
+    limits: Annotated[Path | None, typer.Option(help="YAML file of what the flight may ask for.")] = None,
+    want: Annotated[
+        list[str] | None, typer.Option(help="An interval to reach, as torque_coefficient_n_m_s2=1%.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the plan; default VERDICT/plan.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+) -> None:
+    """Find the flight that settles what a verdict left open, and write it for the vehicle.
+
+    Writes `plan.json`, `plan.png`, `trajectory.csv` (north-east-down), `px4_offboard.csv` and `crazyflie.csv`. Fly it,
+    record it as a set of its own, and judge both by `rotorid together`. The verdict's page shows the plan.
+
+    Example: `rotorid plan flights-verdict --limits room.yaml`
+    """
+    with one_sentence():
+        from rotorid.experiment.limits import read_limits
+
+        allowed, wishes = read_limits(limits), wished(want or [])
+        folder, content = read_verdict(verdict)
+        source = recordings or set_of(folder, content)
+        from rotorid.experiment.plan import plan as make_plan
+        from rotorid.experiment.questions import known
+        from rotorid.experiment.write import text, write
+        from rotorid.recordings import read_set
+        from rotorid.recordings.sufficient import sufficient
+
+        suggested = [e["id"] for e in content["effects"] if e["status"] == "suggested"]
+        with progress(None, quiet) as step, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            step(f"fitting {source.name} once more")
+            found = known(sufficient(read_set(source)), suggested)
+            made = make_plan(found, allowed, wishes, step)
+            files = write(made, out or folder / "plan")
+            onto_page(folder / "report.html", made, files[-1] if made.pieces else None)
+        for line in text(made):
+            typer.echo(line)
+        typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
+
+
+def onto_page(page: Path, made, picture: Path | None) -> None:
+    """Put the plan on the verdict's page, where there is one."""
+    from rotorid.experiment.page import with_plan
+    from rotorid.writing import all_or_none
+
+    if not page.is_file():
+        return
+    content = with_plan(page.read_text(encoding="utf-8"), made, picture.read_bytes() if picture else None)
+    with all_or_none(page) as (part,):
+        part.write_text(content, encoding="utf-8")
+
+
+def wished(texts: list[str]) -> dict[str, float]:
+    """Wishes as `name=1%` or `name=0.01`."""
+    out = {}
+    for text in texts:
+        name, _, size = text.partition("=")
+        try:
+            value = float(size.rstrip("% ")) / (100.0 if size.strip().endswith("%") else 1.0)
+        except ValueError:
+            value = 0.0
+        if not name or not 0 < value < 1:
+            raise InputError(f"--want {text}: expected a value of vehicle.yaml and a share, as mass_kg=1%")
+        out[name] = value
+    return out
+
+
+def read_verdict(path: Path) -> tuple[Path, dict]:
+    """Folder and content of a verdict."""
+    file = path / "verdict.json" if path.is_dir() else path
+    if not file.is_file():
+        raise InputError(f"{file}: no such file; expected the verdict.json of `rotorid verdict`")
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError):
+        raise InputError(f"{file}: this is no JSON; expected the verdict.json of `rotorid verdict`") from None
+    if not isinstance(content, dict) or not {"set", "kind", "effects"} <= set(content):
+        raise InputError(f"{file}: no verdict (set, kind and effects are missing)")
+    return file.parent, content
+
+
+def set_of(folder: Path, content: dict) -> Path:
+    """The recording set that a verdict is of, where it usually lies."""
+    name, here = content["set"], folder.resolve()
+    places = [here / name, here.parent / name, Path(name), Path("raw/recordings") / name]
+    for place in places:
+        if (place / "vehicle.yaml").is_file():
+            return place
+    raise InputError(f"{folder}: the recording set {name} of this verdict is not beside it; name it with --set")
+
+
+def together(
+    first: Annotated[Path, typer.Argument(help="The recording set that left something open.")],
+    second: Annotated[Path, typer.Argument(help="The set flown to settle it.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for the results; default FIRST+SECOND-verdict.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+) -> None:
+    """Judge a set together with one flown later, and say what the second settled.
+
+    Both must be of one vehicle as believed. Writes the files of `rotorid verdict` for both sets together, and
+    `answers.json`.
+
+    Example: `rotorid together flights next_flight`
+    """
+    with one_sentence():
+        from rotorid.experiment.together import answers, joined_sets, open_classes
+        from rotorid.mismatch.deliver import analysis_of, write_files
+        from rotorid.recordings import read_set
+        from rotorid.writing import all_or_none
+
+        sets = [read_set(p) for p in (first, second)]
+        whole, notes = joined_sets(*sets)
+        target = out or Path(f"{whole.name}-verdict")
+        with progress(None, quiet) as step, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            step(f"{sets[0].name} alone")
+            before = open_classes(analysis_of(sets[0]))
+            step("both together")
+            analysis = analysis_of(whole)
+            analysis = type(analysis)(**{**vars(analysis), "notes": (*analysis.notes, *notes)})
+            files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
+            said = write_files(analysis, *files, lambda text: None if text.endswith(".") else step(text))
+            found = answers(before, analysis.findings)
+            with all_or_none(target / "answers.json") as (part,):
+                rows = [{"ids": list(a.ids), "answer": a.answer, "sentence": a.sentence} for a in found]
+                part.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        typer.echo(said.sentence)
+        for line in (*notes, *(a.sentence for a in found)):
+            typer.echo(f"  - {line}")
+        if not before:
+            typer.echo("  - The first set left nothing open.")
+        typer.echo(f"{target / 'report.html'}")

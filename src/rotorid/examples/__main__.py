@@ -1,0 +1,31 @@
+"""Make the files of the example anew, into the package's own folder."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rotorid import templates
+from rotorid.control.swings import swings
+from rotorid.examples import CONCEALED, EVERY, FLIGHTS, SECONDS, SEED
+from rotorid.recordings import write_vehicle
+
+HEADING = """\
+# Two flights of {seconds:g} s of the thesis's quadrotor, simulated by rotorid with seed {seed}. What the vehicle
+# really does is not all in this file: `rotorid verdict` is to find it.
+"""
+
+
+def main(folder: Path) -> None:
+    """Fly and write `vehicle.yaml` and a Parquet file a flight; the same bytes in every run."""
+    vehicle = templates.read("thesis").model_copy(update={"effects": CONCEALED})
+    flown = swings(vehicle, "example", SECONDS, FLIGHTS, SEED, every=EVERY)
+    write_vehicle(flown.vehicle, folder / "vehicle.yaml")
+    path = folder / "vehicle.yaml"
+    path.write_text(HEADING.format(seconds=SECONDS, seed=SEED) + path.read_text(encoding="utf-8"), encoding="utf-8")
+    for run in flown.runs:
+        table = run.table.astype(np.float32).assign(time_s=run.time_s.round(6))
+        table.to_parquet(folder / f"{run.name}.parquet", index=False, compression="zstd")
+
+
+if __name__ == "__main__":
+    main(Path(__file__).parent)

@@ -1,0 +1,100 @@
+"""What a flight may ask of a vehicle and its room, as its user states it (`limits.yaml`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from rotorid.errors import InputError
+
+Range = tuple[float, float]
+
+
+class Limits(BaseModel):
+    """Limits of a flight; x and y are from the place of the start, heights above the ground, all in SI but degrees."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    x_m: Range = (-3.0, 3.0)
+    """North of the start, lowest and highest."""
+    y_m: Range = (-3.0, 3.0)
+    """East of the start, lowest and highest."""
+    height_m: Range = (0.8, 3.0)
+    """Above the ground, lowest and highest."""
+    wall_margin_m: float = Field(0.5, ge=0)
+    """Kept from every side of that volume but the lowest height."""
+    speed_m_s: float = Field(3.0, gt=0, le=60)
+    climb_m_s: float = Field(1.5, gt=0, le=30)
+    tilt_deg: float = Field(25.0, gt=0, le=70)
+    yaw_rate_deg_s: float = Field(120.0, gt=0, le=2000)
+    duration_s: float = Field(60.0, ge=10, le=1200)
+    """In the air, all told; what the battery allows."""
+    attitude_bandwidth_rad_s: float = Field(9.0, gt=0.5, le=100)
+    """Natural frequency of the vehicle's attitude loop: faster changes are not followed."""
+    target_sigma: float = Field(6.0, gt=0, le=100)
+    """Separation, in standard errors, at which a question counts as settled."""
+
+    @field_validator("x_m", "y_m", "height_m")
+    @classmethod
+    def _in_order(cls, value: Range) -> Range:
+        if not value[0] < value[1]:
+            raise ValueError(f"found [{value[0]:g}, {value[1]:g}], expected the lower number first")
+        return value
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Limits:
+        if not self.x_m[0] <= 0 <= self.x_m[1] or not self.y_m[0] <= 0 <= self.y_m[1]:
+            raise ValueError("x_m and y_m are from the place of the start and must hold 0")
+        if self.height_m[0] < 0:
+            raise ValueError(f"height_m starts at {self.height_m[0]:g} m, below the ground")
+        if min(self.room_m) <= 0:
+            raise ValueError(f"wall_margin_m {self.wall_margin_m:g} leaves no room to fly in")
+        return self
+
+    @property
+    def room_m(self) -> tuple[float, float, float]:
+        """Largest excursion from the middle of the volume along x, y and height."""
+        m = self.wall_margin_m
+        sizes = [(self.x_m[1] - self.x_m[0]) / 2 - m, (self.y_m[1] - self.y_m[0]) / 2 - m]
+        return (*sizes, (self.height_m[1] - m - self.height_m[0]) / 2)
+
+    @property
+    def middle_m(self) -> tuple[float, float, float]:
+        """Middle of the volume: north, east of the start, and height."""
+        top = self.height_m[1] - self.wall_margin_m
+        return (sum(self.x_m) / 2, sum(self.y_m) / 2, (self.height_m[0] + top) / 2)
+
+
+def read_limits(path: Path | None) -> Limits:
+    """Limits from a file; the usual ones without any.
+
+    Raises
+    ------
+    InputError
+        The file is not there, is no YAML, or states something that cannot be; one sentence.
+    """
+    if path is None:
+        return Limits()
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; expected a YAML file with limits such as speed_m_s: 3")
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        raise InputError(f"{path}{where}: this is no YAML; expected lines such as speed_m_s: 3") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: expected lines such as speed_m_s: 3, found {type(content).__name__}")
+    try:
+        return Limits.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            known = ", ".join(Limits.model_fields)
+            raise InputError(f"{path}: {name} is no limit; known are {known}") from None
+        said = first["msg"].removeprefix("Value error, ")
+        said = said[0].lower() + said[1:]
+        raise InputError(f"{path}: {name + ': ' if name else ''}{said}") from None

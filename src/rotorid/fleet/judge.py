@@ -1,0 +1,116 @@
+"""Verdicts on many recording sets in one process: Python starts once, a set that fails costs only itself.
+
+Each set is judged in a process of its own, branched off after everything is imported (which takes milliseconds), so
+that neither a fault nor the memory of one reaches the next. A verdict is remembered by the content of its set and the
+code that judged it: a batch that was broken off, or is cut anew because sets were added, judges nothing twice.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import os
+import shutil
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rotorid.errors import InputError
+from rotorid.mismatch.deliver import deliver
+from rotorid.recordings import read_set
+
+FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
+"""What a verdict consists of."""
+FAILED = "failed.json"
+"""What stands in its place where there is none: `reason`, and `fault` where it is none of the set's."""
+
+
+def judge_sets(
+    folders: Sequence[Path], code: str, out: Path, memory: Path, progress: Callable[[str], None] = lambda text: None
+) -> None:
+    """Judge sets: `out/<set>/` each, with the files of its verdict or `failed.json`.
+
+    Parameters
+    ----------
+    folders
+        Folders of the sets; their names must differ.
+    code
+        Hash of the code that judges.
+    out
+        Folder of the results.
+    memory
+        Folder that remembers verdicts by content and code.
+    progress
+        Told one line a set.
+
+    Raises
+    ------
+    OSError
+        The disk is full, or the like: no fault of a set. What was judged before stays remembered.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    for folder in folders:
+        start = time.monotonic()
+        known = memory / code / content_of(folder)
+        if not known.is_dir():
+            _judge_apart(folder, known)
+        shutil.copytree(known, out / folder.name, dirs_exist_ok=True)
+        failed = " (failed)" if (known / FAILED).is_file() else ""
+        progress(f"{folder.name}: {time.monotonic() - start:.1f} s{failed}")
+
+
+def content_of(folder: Path) -> str:
+    """Sixteen hexadecimal digits that stand for a set: its name and every file in it."""
+    whole = hashlib.sha256(folder.name.encode())
+    for path in sorted(p for p in folder.iterdir() if p.is_file()):
+        with open(path, "rb") as file:
+            whole.update(f"\n{path.name} {hashlib.file_digest(file, 'sha256').hexdigest()}".encode())
+    return whole.hexdigest()[:16]
+
+
+def _judge_apart(folder: Path, known: Path) -> None:
+    """Judge a set in a process of its own; its results appear as the folder `known`, whole or not at all."""
+    part = known.with_name(f".{known.name}.{os.getpid()}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    try:
+        context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+        process = context.Process(target=_judge_one, args=(folder, part))
+        process.start()
+        process.join()
+        if process.exitcode == DISK:
+            raise OSError(f"{folder.name}: {(part / FAILED).read_text(encoding='utf-8')}")
+        if process.exitcode != 0:
+            _write_failure(part, f"its process ended by signal or exit code {process.exitcode}", fault=True)
+        if not known.is_dir():
+            os.replace(part, known)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+DISK = 74
+"""Exit code of a process that could not write (EX_IOERR of sysexits.h)."""
+
+
+def _judge_one(folder: Path, target: Path) -> None:
+    """The files of a set's verdict, or why there are none, into `target`."""
+    try:
+        deliver(read_set(folder), *(target / name for name in FILES[:3]), progress=lambda text: None)
+    except InputError as error:
+        _write_failure(target, str(error), fault=False)
+    except OSError as error:
+        (target / FAILED).write_text(str(error), encoding="utf-8")
+        sys.exit(DISK)
+    except Exception as error:  # any fault of the stage costs this set alone
+        traceback.print_exc()
+        _write_failure(target, f"{type(error).__name__}: {error}", fault=True)
+
+
+def _write_failure(target: Path, reason: str, fault: bool) -> None:
+    for name in FILES:
+        (target / name).unlink(missing_ok=True)
+    text = json.dumps({"reason": reason, "fault": fault}, indent=1, ensure_ascii=False) + "\n"
+    (target / FAILED).write_text(text, encoding="utf-8")

@@ -1,0 +1,208 @@
+"""ArduPilot DataFlash logs (`.bin`) through pymavlink.
+
+ArduPilot's frames are the contract's: body forward-right-down, world north-east-down. Read are `IMU` (or `ACC` and
+`GYR`), `XKQ`/`NKQ` or `ATT` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors' channels
+by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX`, `ESC` for rotor speeds, `BAT`, and a range
+finder that looks down. Attitude, velocity and position are the estimator's.
+
+Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid.errors import InputError
+from rotorid.importers import in_the_air
+from rotorid.importers.clean import report_gaps
+from rotorid.importers.frames import continuous, quaternion_from_euler_frd
+from rotorid.importers.optional import needs
+from rotorid.importers.report import Fault
+from rotorid.recordings import columns as c
+
+KINDS = (
+    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "RCOU", "ESC", "BAT", "BARO", "RFND", "EV", "PARM", "MSG",
+)  # fmt: skip
+MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)}
+"""`SERVOn_FUNCTION` to the number of the motor, from 0."""
+ORDER_OF_FRAME = {1: "ardupilot", 12: "betaflight"}
+"""`FRAME_TYPE` of a quadrotor to the key of `known.ORDERS`: X, and X with Betaflight's order."""
+LANDED, FLYING = 18, 28
+"""Events LAND_COMPLETE and NOT_LANDED."""
+GOOD, DOWN = 4, 25
+"""Status of a range finder that reads, and the orientation of one that looks down."""
+PULSE_US = (1000.0, 2000.0)
+RPM = 2 * np.pi / 60
+
+Log = Mapping[str, pd.DataFrame]
+
+
+def read_messages(path: Path) -> dict[str, pd.DataFrame]:
+    """Tables of the messages that are needed by kind, with `time_s`; InputError where the file is no DataFlash log."""
+    reader = needs("pymavlink.DFReader", "ardupilot", path)
+    rows: dict[str, list[dict]] = {}
+    try:
+        # pymavlink prints what it stumbles over.
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            log = reader.DFReader_binary(str(path), zero_time_base=True)
+            while (message := log.recv_match(type=list(KINDS))) is not None:
+                rows.setdefault(message.get_type(), []).append(message.to_dict())
+    except Exception as error:  # pymavlink lets whatever a broken file raises through
+        raise InputError(f"{path}: not a DataFlash log that can be read ({error})") from None
+    if not rows:
+        raise InputError(f"{path}: holds no message that is needed (IMU, ATT, RCOU)")
+    tables = {}
+    for kind, found in rows.items():
+        table = pd.DataFrame(found)
+        if "TimeUS" in table:
+            table[c.TIME] = table["TimeUS"].astype(float) * 1e-6
+        tables[kind] = table
+    return tables
+
+
+def parameters(log: Log) -> dict[str, float]:
+    """The vehicle's parameters as the log states them last."""
+    table = log.get("PARM")
+    return {} if table is None else dict(zip(table["Name"], table["Value"].astype(float), strict=True))
+
+
+def order_of(values: Mapping[str, float]) -> tuple[str, list[Fault]]:
+    """Key of the rotors' order by frame class and type, empty where it is not known."""
+    kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", 1))
+    if kind == 1 and form in ORDER_OF_FRAME:
+        return ORDER_OF_FRAME[form], []
+    found = f"FRAME_CLASS {kind}, FRAME_TYPE {form}: the order of its rotors is not known here"
+    return "", [Fault("order", "vehicle.yaml", found, "taken from the template: check it", 0)]
+
+
+def _of_first(table: pd.DataFrame | None, key: str = "I") -> pd.DataFrame | None:
+    """The rows of the first instance of a sensor or estimator."""
+    if table is None:
+        return None
+    for name in (key, "I", "C", "Inst", "Instance"):
+        if name in table:
+            return table[table[name] == table[name].min()]
+    return table
+
+
+def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndarray]:
+    """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
+    imu = _of_first(log.get("IMU"))
+    accelerometer, gyroscope = (imu, imu) if imu is not None else (_of_first(log.get("ACC")), _of_first(log.get("GYR")))
+    clock = next(
+        (t for t in (gyroscope, accelerometer, _of_first(log.get("ATT"))) if t is not None and len(t) > 1), None
+    )
+    if clock is None:
+        raise InputError(f"{where}: no message IMU, GYR or ATT to take the clock from")
+    faults: list[Fault] = []
+    grid = clock[c.TIME].to_numpy(float)
+    keep = in_the_air.increasing(grid)
+    if not keep.all():
+        found = f"{int((~keep).sum())} messages do not move the clock on"
+        faults.append(Fault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
+    grid = grid[keep]
+    parts: list[tuple] = []
+
+    def put(names, table: pd.DataFrame | None, fields) -> bool:
+        if table is None or not set(fields) <= set(table) or not len(table):
+            return False
+        parts.append((tuple(names), table[c.TIME].to_numpy(float), table[list(fields)].to_numpy(float)))
+        return True
+
+    put(c.ANGULAR_VELOCITY, gyroscope, ("GyrX", "GyrY", "GyrZ"))
+    put(c.SPECIFIC_FORCE, accelerometer, ("AccX", "AccY", "AccZ"))
+    quaternion = next((t for k in ("XKQ", "NKQ") if (t := _of_first(log.get(k), "C")) is not None), None)
+    attitude = _of_first(log.get("ATT"))
+    if quaternion is not None and {"Q1", "Q2", "Q3", "Q4"} <= set(quaternion):
+        turns = continuous(quaternion[["Q1", "Q2", "Q3", "Q4"]].to_numpy(float))
+        parts.append((c.QUATERNION, quaternion[c.TIME].to_numpy(float), turns))
+    elif attitude is not None and {"Roll", "Pitch", "Yaw"} <= set(attitude):
+        angles = np.radians(attitude[["Roll", "Pitch", "Yaw"]].to_numpy(float))
+        parts.append((c.QUATERNION, attitude[c.TIME].to_numpy(float), quaternion_from_euler_frd(*angles.T)))
+    estimate = next((t for k in ("XKF1", "NKF1") if (t := _of_first(log.get(k), "C")) is not None), None)
+    put(c.VELOCITY, estimate, ("VN", "VE", "VD"))
+    put(c.POSITION, estimate, ("PN", "PE", "PD"))
+    battery = _of_first(log.get("BAT"))
+    put((c.BATTERY_VOLTAGE,), battery, ("Volt",))
+    put((c.BATTERY_CURRENT,), battery, ("Curr",))
+    below = log.get("RFND")
+    if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
+        put((c.HEIGHT,), below[(below["Stat"] == GOOD) & (below["Orient"] == DOWN)], ("Dist",))
+    throttles, channels, more = _throttles(log, parameters(log))
+    faults += more
+    drive = None
+    if throttles is not None:
+        parts.append((c.rotor_columns("throttle", len(channels)), *throttles))
+        speeds = _speeds(log.get("ESC"), channels, grid, faults)
+        parts += speeds
+        drive = in_the_air.on_grid(grid, *throttles)
+    table = in_the_air.table_on(grid, parts)
+    return table, [*faults, *report_gaps(table)], _flying(log, grid, drive)
+
+
+def _throttles(log: Log, values: Mapping[str, float]):
+    """Times and throttles (n, k), the motors' channels (from 1), and faults."""
+    outputs = _of_first(log.get("RCOU"))
+    if outputs is None:
+        return None, (), [Fault("no_command", "", "RCOU is not logged", "no throttle columns", 0)]
+    by_motor = {}
+    for number in range(1, 17):
+        motor = MOTORS.get(int(values.get(f"SERVO{number}_FUNCTION", -1)))
+        if motor is not None and f"C{number}" in outputs:
+            by_motor.setdefault(motor, number)
+    faults = []
+    if not by_motor:
+        by_motor = {i: i + 1 for i in range(4) if f"C{i + 1}" in outputs}
+        found = "no SERVOn_FUNCTION is a motor"
+        faults.append(Fault("order", "throttle", found, "channels 1 to 4 taken for motors 1 to 4", 0))
+    channels = tuple(by_motor[m] for m in sorted(by_motor))
+    low, high = (float(values.get(k, 0) or 0) for k in ("MOT_PWM_MIN", "MOT_PWM_MAX"))
+    if not 0 < low < high:
+        low, high = PULSE_US
+        found = "MOT_PWM_MIN and MOT_PWM_MAX are not stated"
+        faults.append(Fault("unit", "throttle", found, f"taken as {low:g} and {high:g} µs", len(outputs)))
+    pulses = outputs[[f"C{n}" for n in channels]].to_numpy(float)
+    throttle = np.where(pulses > 0, np.clip((pulses - low) / (high - low), 0, 1), np.nan)
+    return (outputs[c.TIME].to_numpy(float), throttle), channels, faults
+
+
+def _speeds(esc: pd.DataFrame | None, channels: tuple[int, ...], grid: np.ndarray, faults: list[Fault]) -> list[tuple]:
+    """Rotor speeds of `ESC` messages, whose instance is the output's number from 0."""
+    if esc is None or not {"Instance", "RPM"} <= set(esc):
+        return []
+    found = []
+    for rotor, channel in enumerate(channels, 1):
+        own = esc[esc["Instance"] == channel - 1]
+        if not len(own) or not own["RPM"].max() > 0:
+            seen = f"ESC holds no speed of output {channel}"
+            faults.append(Fault("speed_missing", f"rotor_speed_{rotor}_rad_s", seen, "column left out", 0))
+            continue
+        found.append(((f"rotor_speed_{rotor}_rad_s",), own[c.TIME].to_numpy(float), own[["RPM"]].to_numpy(float) * RPM))
+    return found
+
+
+def _flying(log: Log, grid: np.ndarray, drive: np.ndarray | None) -> np.ndarray:
+    """Rows in the air: by the land detector's events, else by the throttles."""
+    events = log.get("EV")
+    if events is not None:
+        events = events[events["Id"].isin((LANDED, FLYING))]
+        if (events["Id"] == FLYING).any():
+            times, ups = events[c.TIME].to_numpy(float), (events["Id"] == FLYING).to_numpy()
+            index = np.searchsorted(times, grid, side="right") - 1
+            return np.where(index >= 0, ups[np.maximum(index, 0)], False)
+    return np.ones(len(grid), bool) if drive is None else in_the_air.driven(drive)
+
+
+def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:
+    """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
+    log = read_messages(path)
+    table, faults, flying = convert(log, path)
+    order, more = order_of(parameters(log))
+    runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path)
+    return runs, [*faults, *more, *cuts], order

@@ -1,0 +1,141 @@
+"""Logs of one vehicle as a recording set: runs in contract columns and the text of a `vehicle.yaml`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Names
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+
+from rotorid import templates
+from rotorid.errors import InputError
+from rotorid.importers.logfile import TEMPLATES, read_log
+from rotorid.importers.mapping import Mapping
+from rotorid.importers.obtain import sha256
+from rotorid.importers.propose import propose
+from rotorid.importers.report import Fault, ImportReport
+from rotorid.recordings import read_vehicle
+
+
+@dataclass(frozen=True)
+class SetOfLogs:
+    """What logs of one vehicle hold, before it is written anywhere."""
+
+    name: str
+    runs: Names[str, pd.DataFrame]
+    """To the name of a run its table in contract columns."""
+    vehicle_text: str
+    """The `vehicle.yaml`, comments and all."""
+    remarks: tuple[str, ...] = ()
+    """One sentence for each value that is proposed, not known."""
+    faults: tuple[Fault, ...] = ()
+    """What was found in the logs."""
+    axes: str = ""
+    files: Names[str, str] = field(default_factory=dict)
+    """To the name of a log its SHA-256."""
+    kept_vehicle: bool = False
+    """Whether the vehicle's text is that of a file which stays as it is."""
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The faults in words, each once."""
+        return tuple(fault.sentence for fault in self.faults)
+
+    def write(self, folder: Path, as_csv: bool = False) -> None:
+        """Write `vehicle.yaml` (unless it was there and is kept), a file a run, and `import_report.json`."""
+        folder.mkdir(parents=True, exist_ok=True)
+        if not self.kept_vehicle:
+            (folder / "vehicle.yaml").write_text(self.vehicle_text, encoding="utf-8")
+        for name, table in self.runs.items():
+            if as_csv:
+                table.to_csv(folder / f"{name}.csv", index=False)
+            else:
+                table.to_parquet(folder / f"{name}.parquet", index=False)
+        ImportReport(
+            folder.name,
+            True,
+            source=", ".join(self.files),
+            licence="",
+            citation="",
+            files=dict(self.files),
+            axes=self.axes,
+            faults=self.faults,
+            notes=self.remarks,
+        ).write(folder)
+
+
+def set_of_logs(
+    logs: Sequence[Path],
+    name: str,
+    mass_kg: float | None = None,
+    like: str | None = None,
+    vehicle_file: Path | None = None,
+    mapping: Mapping | None = None,
+    there: Path | None = None,
+) -> SetOfLogs:
+    """The flights in `logs`, all of one vehicle, and what is known or proposed of it.
+
+    Parameters
+    ----------
+    logs
+        Files that `rotorid.importers.logfile` knows, all of one kind (flights, or runs of a stand).
+    name
+        What the set is called.
+    mass_kg, like
+        Mass as flown and the template vehicle for what the logs do not say.
+    vehicle_file
+        A `vehicle.yaml` to take as it is, in place of a proposal.
+    mapping
+        What the columns of a CSV or Parquet file are.
+    there
+        A `vehicle.yaml` that may be there already: it is taken where neither `mass_kg` nor `like` is given.
+
+    Raises
+    ------
+    InputError
+        A log cannot be read or holds no flight; the logs do not belong together; nothing tells what vehicle it is;
+        `there` exists and would change.
+    """
+    found = [read_log(path, mapping) for path in logs]
+    kinds = {f.kind for f in found}
+    if len(kinds) > 1:
+        raise InputError(f"the logs are of different kinds ({', '.join(sorted(kinds))}); import each kind by itself")
+    runs: dict[str, pd.DataFrame] = {}
+    for path, imported in zip(logs, found, strict=True):
+        for run, table in imported.runs.items():
+            if run in runs:
+                raise InputError(f"{path}: another log has a run called {run}, too; rename one of the files")
+            runs[run] = table
+    remarks: tuple[str, ...] = ()
+    kept = False
+    if vehicle_file is not None:
+        read_vehicle(vehicle_file)
+        text = vehicle_file.read_text(encoding="utf-8")
+    elif there is not None and there.is_file() and mass_kg is None and like is None:
+        read_vehicle(there)
+        text, kept = there.read_text(encoding="utf-8"), True
+    else:
+        if kinds != {"flight"}:
+            raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
+        template = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
+        if template is None:
+            raise InputError(
+                f"{logs[0]}: nothing tells what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
+                f"{', '.join(templates.names())} and --mass-kg"
+            )
+        proposal = propose(name, list(runs.values()), found[0].known, templates.read(template), template, mass_kg)
+        text, remarks = proposal.text, proposal.remarks
+        if there is not None and there.is_file() and there.read_text(encoding="utf-8") != text:
+            raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
+    return SetOfLogs(
+        name,
+        runs,
+        text,
+        remarks,
+        tuple(dict.fromkeys(f for i in found for f in i.faults)),
+        found[0].axes,
+        {path.name: sha256(path) for path in logs},
+        kept,
+    )

@@ -1,0 +1,231 @@
+"""Rules of the decision: what the comparison of two models cannot know by itself.
+
+A rule has a name, says in one sentence what it decides, and holds its limits, each with the reason for its value. The
+code calls it with whether its condition holds; the answer is that, or no where the rule is switched off. What fired is
+counted for `snakemake ablation`, which judges concealed sets without each rule in turn.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from rotorid.errors import InputError
+
+
+class Limit(NamedTuple):
+    """A number that a rule compares with, and why it has this value."""
+
+    value: float
+    why: str
+
+
+@dataclass
+class Asked:
+    """Which rules are switched off during an analysis, and how often each rule fired."""
+
+    off: frozenset[str] = frozenset()
+    fired: Counter[str] = field(default_factory=Counter)
+
+
+_ASKED: ContextVar[Asked | None] = ContextVar("asked", default=None)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule of the decision."""
+
+    name: str
+    decides: str
+    """What it decides, one sentence."""
+    limits: Mapping[str, Limit] = field(default_factory=dict)
+
+    @property
+    def on(self) -> bool:
+        """Whether the rule is not switched off."""
+        asked = _ASKED.get()
+        return asked is None or self.name not in asked.off
+
+    def __getitem__(self, limit: str) -> float:
+        return self.limits[limit].value
+
+    def __call__(self, holds: bool) -> bool:
+        """Whether the rule decides here: its condition holds and it is not switched off."""
+        asked = _ASKED.get()
+        if asked is None:
+            return bool(holds)
+        if holds:
+            asked.fired[self.name] += 1
+        return bool(holds) and self.name not in asked.off
+
+
+RULES: dict[str, Rule] = {}
+
+
+def rule(name: str, decides: str, **limits: tuple[float, str]) -> Rule:
+    """A new rule, known under its name."""
+    made = Rule(name, decides, {key: Limit(*pair) for key, pair in limits.items()})
+    RULES[name] = made
+    return made
+
+
+@contextmanager
+def asking(off: Iterable[str] = ()) -> Iterator[Asked]:
+    """Count what fires inside, with some rules switched off.
+
+    Raises InputError for a name that no rule has.
+    """
+    names = frozenset(off)
+    if unknown := sorted(names - set(RULES)):
+        raise InputError(f"rules.off: no rule is named {', '.join(unknown)}; the rules are {', '.join(RULES)}")
+    asked = Asked(names)
+    token = _ASKED.set(asked)
+    try:
+        yield asked
+    finally:
+        _ASKED.reset(token)
+
+
+# What a term must be to stay in a model
+
+SIZE = rule(
+    "size",
+    "An effect whose strongest tenth of the seconds is small beside the channel's noise does not matter.",
+    least=(0.15, "an effect of a seventh of the noise changes the error by one percent"),
+)
+OVERSHADOWED = rule(
+    "overshadowed",
+    "A contribution counts only in channels where no other effect is far larger: no form is known better than that.",
+    share=(0.04, "forms of the catalogue and blade-element rotors differ by 2 to 4 %"),
+    share_of_burst=(0.15, "what a strong effect's form leaves over comes in bursts, too"),
+    times_for_burst=(3.0, "of hundreds of windows the loudest is three times as loud as usual by chance"),
+)
+BOUNDS = rule(
+    "bounds", "Coefficients lie within the bounds of their form, or outside by less than 1.5 of their errors."
+)
+MUST_SHOW = rule(
+    "must_show", "A form's parameters without which it is another form are two standard errors from nothing."
+)
+NEGLIGIBLE = rule("negligible", "Some parameter is larger than what the effect's file calls negligible.")
+OWN_PART = rule(
+    "own_part",
+    "A contribution is neither taken over by the other terms all but a form's error, nor mostly its regressors' noise.",
+)
+STRAIN = rule(
+    "strain",
+    "A term does not push a believed value that the model without it leaves near its belief.",
+    deviations=(4.0, "standard deviations of trust: beyond, the user's number would have to be a mistake"),
+)
+JACKKNIFE = rule("jackknife", "A term stays significant where every block of the recording has its say.")
+TRANSFER = rule(
+    "transfer",
+    "A term keeps what it promises on environments that it was not fitted on.",
+    share=(0.6, "effects at work kept 0.88 to 1.18 of it, names that fill a gap 0.3 to 0.55"),
+    won=(0.7, "beside the share of environments expected of its strength: effects at work gained in 0.88 to 1.00"),
+    promise=(25.0, "whitened squares: less may fail by chance"),
+)
+TWO_SENSORS = rule("two_sensors", "An error of a sensor shows in the comparison with the sensor beside it, too.")
+STEADY = rule(
+    "steady",
+    "A coefficient is the same in every run.",
+    p_value=(1e-6, "some fifty terms in some ten runs are looked at"),
+    spread=(0.4, "share of itself: forms that are nearly right vary by less between manoeuvres"),
+)
+CANCELS_UNNAMED = rule("cancels_unnamed", "A named term does no harm where the terms without a name are left out.")
+CANCELS = rule(
+    "cancels",
+    "A term is not cancelled by another in its strongest channel.",
+    share=(0.1, "what is left of either: noise in another channel, magnified, is bought with a pair that cancels"),
+)
+
+# Moves of the search
+
+SIMPLER = rule("simpler", "A model with one id less and other forms of the rest is taken where it explains as much.")
+EXCHANGE = rule("exchange", "An id gives way to another that explains more in its place.")
+PAIR = rule("pair", "Two terms that mask each other enter together.")
+VALUES_FIRST = rule(
+    "values_first", "Believed values alone are taken where with more room they explain as much as effects."
+)
+COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters where no plainer one is left to.")
+
+# Classes
+
+ALIKE = rule("alike", "A simpler term beside which another explains no more than a form's error may stand in for it.")
+SHARED_CLASS = rule("shared_class", "A simpler form of an id and a confuser that acts elsewhere may stand in for it.")
+PAYLOAD_OR_OFFSET = rule("payload_or_offset", "An offset of the centre of mass on a heavier vehicle may be a payload.")
+THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a thrust curve may be a throttle curve.")
+
+# Believed values
+
+VALUE_AGREES = rule("value_agrees", "A wrong value shows with either side of the balance as the regressor.")
+VALUE_TRANSFER = rule("value_transfer", "A wrong value keeps what it promises where it was not fitted.")
+SPARE_VALUE = rule(
+    "spare_value", "Of two values that share one ratio the one that the other can do without is not wrong."
+)
+VALUE_IN_QUESTION = rule(
+    "value_in_question", "A value that a member of an open class would change is not called wrong."
+)
+SETTLED = rule("settled", "Values not called wrong move within their trust where that pays on runs that were left out.")
+
+# Flights
+
+UNSURE = rule("unsure", "An effect of which every parameter may be nothing is not in the model.")
+OWN_SCALES = rule("own_scales", "Where thrust differs between runs each run has its own scale.")
+CARRIED = rule("carried", "A load of two plateaus is a payload on board for so long.")
+CURVE_OR_ROTORS = rule(
+    "curve_or_rotors", "Differences between rotors are preferred to a throttle curve that explains as much."
+)
+CLOSED_LOOP_BIAS = rule(
+    "closed_loop_bias", "A delay no later than a loop that answers the gyroscope's noise makes it look is none."
+)
+COLOURED_NOISE = rule(
+    "coloured_noise", "Noise of speeds and gyroscope in the band analysed may be more than its white part."
+)
+RECTIFIED = rule(
+    "rectified", "An error of the accelerometer beside a vibration is what the sensor makes of the vibration."
+)
+
+# Stands and benches
+
+SECOND_CHANCE = rule("second_chance", "A term that was refuted beside a false one is asked once more.")
+NOISE_IN_A_PLAY = rule(
+    "noise_in_a_play",
+    "A play of which a part may be noise of measured speeds says nothing.",
+    share=(0.1, "a play is not linear in that noise, so it cannot be taken off"),
+)
+EARLY_FILTER = rule("early_filter", "A reading is not smoothed and early at once: that is noise of the speeds.")
+TWO_ROUNDS = rule("two_rounds", "Forms of many parameters join in a second round: they would swallow several causes.")
+REMAINDER = rule("remainder", "An effect is still needed where a strong one may do anything with its own inputs.")
+APPROXIMATE = rule("approximate", "An effect is still needed where a stronger one's gain may vary smoothly.")
+NEEDLESS_VALUE = rule("needless_value", "A wrong value is still needed where an effect's form is free or richer.")
+CURVED_GAIN = rule("curved_gain", "A gain beside a curved characteristic is wrong at small loads and over all of them.")
+ELSEWHERE = rule(
+    "elsewhere",
+    "Another effect that does far worse on runs that were left out is no alternative.",
+    squares=(12.0, "whitened squares: an id's price and half"),
+)
+PLAINER_FORM = rule("plainer_form", "A form of which every number may be nothing gives way to one of fewer parameters.")
+ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading are curves of one load.")
+
+# Words
+
+WORSE = rule("worse_on_report_runs", "A channel that is worse with an effect on the report runs leaves it suggested.")
+NOT_BETTER = rule(
+    "not_better_on_report_runs", "Without a channel that is surely better on the report runs it is suggested."
+)
+BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than what the model leaves over is suggested.")
+SLIGHT = rule("slight", "An effect that carries next to nothing of the error and is plain in no channel is suggested.")
+MAY_BE_NOTHING = rule("may_be_nothing", "An effect of which every number may be nothing is suggested.")
+
+
+def markdown() -> str:
+    """The rules as a table, for docs/mismatch.md."""
+    lines = ["| rule | decides | limits |", "| --- | --- | --- |"]
+    for one in RULES.values():
+        limits = "; ".join(f"`{name}` {limit.value:g}: {limit.why}" for name, limit in one.limits.items())
+        lines.append(f"| `{one.name}` | {one.decides} | {limits} |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,69 @@
+"""Figure of a fleet: in how many sets each effect shows, and how the most frequent numbers change from set to set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid.plots import style
+
+MOST_EFFECTS = 15
+MOST_PARAMETERS = 4
+WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
+
+
+def draw_fleet(counts: pd.DataFrame, parameters: pd.DataFrame, sets: pd.DataFrame, path: Path) -> None:
+    """Bars of `counts` (`rotorid.fleet.summary.by_effect`), and below them the numbers most often established.
+
+    Each number stands at its set's place in the order of day and name, with its interval (95 %).
+    """
+    shown = counts.head(MOST_EFFECTS).iloc[::-1]
+    numbers = most_frequent(parameters)
+    rows = 1 + len(numbers)
+    heights = [0.4 + 0.19 * max(len(shown), 1), *[1.5] * len(numbers)]
+    fig, axes = style.figure(sum(heights) + 0.4 * rows, rows, 1, height_ratios=heights, squeeze=False)
+    bars(axes[0, 0], shown, sets)
+    order = {name: place for place, name in enumerate(sets.sort_values(["day", "set"])["set"], 1)}
+    for axis, name in zip(axes[1:, 0], numbers, strict=True):
+        over_time(axis, parameters[parameters["parameter"] == name], order, len(sets))
+    style.save(fig, path)
+
+
+def most_frequent(parameters: pd.DataFrame) -> list[str]:
+    """Names of the numbers that most sets state and that an established effect or a wrong value has."""
+    sure = parameters[parameters["status"].isin(["established", "wrong value"])]
+    counts = sure["parameter"].value_counts()
+    # Names in order of the alphabet where as many sets state them, so that two runs draw the same.
+    ordered = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
+    return [name for name, _ in ordered[:MOST_PARAMETERS]]
+
+
+def bars(axis, shown: pd.DataFrame, sets: pd.DataFrame) -> None:
+    """How many sets show each effect, by the verdict's word."""
+    left = np.zeros(len(shown))
+    for word, colour in WORDS.items():
+        values = shown[word].to_numpy(float)
+        axis.barh(shown["effect"], values, left=left, color=colour, label=word)
+        left += values
+    judged = int((sets["verdict"] != "failed").sum())
+    axis.set_xlabel(f"sets, of {judged} judged")
+    if len(shown):
+        axis.legend(loc="lower right")
+    else:
+        axis.text(0.5, 0.5, "no effect in any set", ha="center", transform=axis.transAxes)
+        axis.set_yticks([])
+
+
+def over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> None:
+    """One number with its interval in each set that states it."""
+    place = own["set"].map(order).to_numpy()
+    value, low, high = (own[c].to_numpy(float) for c in ("value", "low_95", "high_95"))
+    axis.errorbar(
+        place, value, [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)], fmt=".", color=style.BLUE, lw=0.8
+    )
+    unit = own["unit"].iloc[0]
+    axis.set_ylabel(own["parameter"].iloc[0] + (f"\n({unit})" if unit and unit != "1" else ""))
+    axis.set_xlim(0.0, count + 1.0)
+    axis.set_xlabel("set, in order of day and name")

@@ -1,0 +1,123 @@
+"""Flights that a plan asks for, recorded by the simulator that made the set; and sets in which pairs look alike.
+
+A plan is a table of the project's axes (`time_s`, `position_*_m`, `yaw_rad`). Nothing here imports `rotorid`; whoever
+plans never sees the answer, which holds how large what is hidden is.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from .cases import COMMAND, SPEED, Case, _draw, _dressed, _runs, all_cases
+from .richsim import manoeuvres, scene
+from .richsim.hidden import Hidden
+from .richsim.programmes import programme
+from .richsim.vehicles import AIRFRAMES
+from .write import Recording, write_set
+
+WARM_UP_S = 6.0
+LOOK_ALIKE = (
+    # truth, form, what it is taken for, flights in which the two look alike, columns
+    ("com_offset", "", "unequal_rotors", ("calm",), SPEED),
+    ("unequal_rotors", "", "com_offset", ("calm",), SPEED),
+    ("rotor_drag", "centre", "steady_wind", ("one_way",), SPEED),
+    ("frame_drag", "", "rotor_drag", ("gentle",), SPEED),
+    ("rotor_drag", "", "frame_drag", ("gentle",), SPEED),
+    ("thrust_tilt", "", "com_offset", ("calm",), SPEED),
+    ("translational_lift", "", "axial_inflow", ("gentle",), SPEED),
+    ("axial_inflow", "", "frame_drag", ("heave",), SPEED),
+    ("flapping_moment", "", "rotor_interference", ("one_way",), SPEED),
+    ("rotor_gyroscopic", "", "inertia_products", ("gentle",), SPEED),
+    ("inertia_products", "", "rotor_gyroscopic", ("gentle",), SPEED),
+    ("rotational_damping", "", "axial_inflow", ("gentle",), SPEED),
+    ("imu_lever_arm", "", "com_offset", ("gentle",), SPEED),
+    ("gyro_error", "bias", "inertia_products", ("gentle",), SPEED),
+    ("accelerometer_error", "turn", "thrust_tilt", ("calm",), SPEED),
+    ("payload", "", "com_offset", ("calm",), SPEED),
+    ("steady_wind", "", "thrust_tilt", ("calm",), SPEED),
+    ("motor_lag", "", "delay", ("heave",), COMMAND),
+    ("delay", "actuation", "motor_lag", ("heave",), COMMAND),
+    ("unequal_rotors", "one", "com_offset", ("calm",), COMMAND),
+)
+"""Pairs of the catalogue's confusers, flown so that little tells them apart."""
+
+
+def look_alikes() -> list[Case]:
+    """One case of every pair of LOOK_ALIKE: two short flights, the cause one and a half times the noise."""
+    out = []
+    for k, (effect, form, other, purposes, groups) in enumerate(LOOK_ALIKE):
+        name = f"look_alike/{effect}-{other}/{k:02d}"
+        rng = _draw(name, 0)
+        fixed = effect in ("motor_lag", "delay", "steady_wind")
+        plan = _dressed(
+            rng,
+            rate_hz=250.0,
+            vehicle=("thesis", "racer")[k % 2],
+            groups=groups,
+            runs=_runs(purposes * 2, rng),
+            hidden=(Hidden(effect, size=None if fixed else 1.5, form=form),),
+            late_fraction=0.0,
+            trim_s=5.0 if "one_way" in purposes else 0.0,
+        )
+        out.append(Case(name, 30000 + k, "richsim", plan, (effect,)))
+    return out
+
+
+def ambiguous() -> list[Case]:
+    """The listed cases recorded so that a pair cannot be told apart."""
+    return [c for c in all_cases() if c.name.startswith("confusable/") and "/without/" in c.name]
+
+
+def reference_of(trajectory: pd.DataFrame, step_s: float, rotors: int) -> manoeuvres.Reference:
+    """A planned trajectory on the simulator's grid, after a hover that lets the controller settle."""
+    until = float(trajectory["time_s"].iloc[-1])
+    time_s = np.arange(-WARM_UP_S, until + step_s / 2, step_s)
+
+    def column(name):
+        return np.interp(time_s, trajectory["time_s"], trajectory[name])
+
+    position = np.stack([column(f"position_{a}_m") for a in "xyz"], axis=1)
+    velocity = np.gradient(position, step_s, axis=0)
+    return manoeuvres.Reference(
+        time_s=time_s,
+        position_m=position,
+        velocity_m_s=velocity,
+        acceleration_m_s2=np.gradient(velocity, step_s, axis=0),
+        yaw_rad=column("yaw_rad"),
+        attitude_rad=np.zeros((len(time_s), 3)),
+        speed_fraction=np.zeros((len(time_s), rotors)),
+    )
+
+
+def grid(case: Case) -> tuple[float, int]:
+    """Step of the simulator, s, and number of rotors."""
+    airframe = AIRFRAMES[case.settings.vehicle]
+    return airframe.step_s, airframe.n
+
+
+def standard(case: Case, duration_s: float) -> manoeuvres.Reference:
+    """What a pilot flies who has no plan: eights, climbs, turns, oscillations and doublets in one flight."""
+    airframe = AIRFRAMES[case.settings.vehicle]
+    rng = np.random.default_rng([case.seed, 77])
+    segments, altitude = programme("rich", duration_s, airframe, rng, False)
+    return manoeuvres.build(segments, altitude, airframe.step_s, airframe.n, rng)
+
+
+def record(case: Case, answer: dict, references: dict[str, manoeuvres.Reference]) -> Recording:
+    """The flights of these references as the case's vehicle, with what is hidden in it, would have recorded them."""
+    plan = replace(case.settings, runs=(), trim_s=0.0)
+    airframe = AIRFRAMES[plan.vehicle]
+    extra = scene._needs(plan.hidden)
+    sizes = {e["id"]: e["amount"] for e in answer["effects"]}
+    hidden = (*plan.hidden, *extra)
+    world, _ = scene._world(airframe, hidden, [sizes[h.id] for h in hidden], case.seed)
+    vehicle, _ = scene._believed(plan, airframe, world)
+    runs = {}
+    for number, (name, reference) in enumerate(references.items()):
+        flight = scene._fly(plan, airframe, world, reference, 0, case.seed)
+        _, runs[name] = scene._record(plan, airframe, world, flight, 100 + number, case.seed)
+    return Recording(vehicle, runs, (), plan.form)
+
+
+__all__ = ["ambiguous", "grid", "look_alikes", "record", "reference_of", "standard", "write_set"]

@@ -1,0 +1,49 @@
+"""Limits of a flight: what is stated wrongly is said in one sentence."""
+
+from pathlib import Path
+
+import pytest
+
+from rotorid.errors import InputError
+from rotorid.experiment.limits import Limits, read_limits
+
+
+def test_without_a_file_the_usual_ones_hold() -> None:
+    assert read_limits(None) == Limits()
+
+
+def test_a_file_is_read_and_what_it_leaves_out_is_as_usual(tmp_path: Path) -> None:
+    file = tmp_path / "limits.yaml"
+    file.write_text("speed_m_s: 5\nheight_m: [1, 8]\nwall_margin_m: 1\n", encoding="utf-8")
+    limits = read_limits(file)
+    assert (limits.speed_m_s, limits.tilt_deg) == (5.0, Limits().tilt_deg)
+    assert limits.room_m == (2.0, 2.0, 3.0)
+    assert limits.middle_m == (0.0, 0.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("speed: 3\n", "speed is no limit"),
+        ("speed_m_s: -1\n", "speed_m_s"),
+        ("speed_m_s: fast\n", "speed_m_s"),
+        ("x_m: [2, -2]\n", "lower number first"),
+        ("x_m: [1, 4]\n", "must hold 0"),
+        ("height_m: [-1, 3]\n", "below the ground"),
+        ("wall_margin_m: 5\n", "no room"),
+        ("duration_s: 1\n", "duration_s"),
+        ("- speed\n", "expected lines such as"),
+        ("speed_m_s: [1\n", "no YAML"),
+    ],
+)
+def test_a_wrong_limit_ends_in_one_sentence(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "limits.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=said) as caught:
+        read_limits(file)
+    assert "\n" not in str(caught.value) and str(file) in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_limits(tmp_path / "room.yaml")

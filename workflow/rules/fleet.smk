@@ -1,0 +1,86 @@
+"""Every recording set of a folder and what they show together: `snakemake --cores 2 fleet --config recordings=DIR`.
+
+Sets are judged in batches, a job each, so that starting Python is not the cost; a set that fails costs only itself.
+What was judged by the code of now is never judged again, however sets come and go. On a cluster add
+`--workflow-profile workflow/profiles/slurm`.
+"""
+
+FLEET_MEMORY = "cache/fleet"
+
+
+def fleet_sets():
+    """Names of the sets of the folder, sorted."""
+    return sorted(path.parent.name for path in Path(CONFIG.recordings).glob("*/vehicle.yaml"))
+
+
+def fleet_batches():
+    """Names of the sets by batch."""
+    names, size = fleet_sets(), CONFIG.fleet.batch
+    return {f"{start // size:04d}": names[start : start + size] for start in range(0, len(names), size)}
+
+
+def folders_of_batch(wildcards):
+    """Folders of a batch's sets."""
+    found = fleet_batches()
+    if wildcards.batch not in found:
+        raise WorkflowError(f"{CONFIG.recordings}: no sets for batch {wildcards.batch} of the fleet")
+    return [f"{CONFIG.recordings}/{name}" for name in found[wildcards.batch]]
+
+
+def files_of_batch(wildcards):
+    """Every file of a batch's sets, each watched by content."""
+    return [
+        str(path)
+        for folder in folders_of_batch(wildcards)
+        for path in sorted(Path(folder).glob("*"))
+        if path.is_file()
+    ]
+
+
+def verdicts_of_fleet(wildcards):
+    """Folders of verdicts, one a batch."""
+    if not fleet_sets():
+        raise WorkflowError(f"{CONFIG.recordings}: no recording sets (folders with vehicle.yaml) in it")
+    return [f"results/fleet/verdicts/{batch}" for batch in fleet_batches()]
+
+
+rule judge_fleet:
+    """Verdicts on a batch of recording sets."""
+    message:
+        "Fleet: judging, batch {wildcards.batch}"
+    input:
+        files=files_of_batch,
+    output:
+        verdicts=directory("results/fleet/verdicts/{batch}"),
+    params:
+        folders=folders_of_batch,
+        memory=FLEET_MEMORY,
+        code=code_of("judge_fleet"),
+    log:
+        "results/logs/judge_fleet/{batch}.log",
+    wildcard_constraints:
+        batch="[0-9]+",
+    script:
+        "../scripts/judge_fleet.py"
+
+
+rule fleet:
+    """What the sets of a folder show together: tables, figure and page."""
+    message:
+        "Fleet: summary"
+    input:
+        batches=verdicts_of_fleet,
+    output:
+        sets="results/fleet/sets.csv",
+        effects="results/fleet/effects.csv",
+        parameters="results/fleet/parameters.csv",
+        figure="results/fleet/fleet.svg",
+        page="results/fleet/fleet.html",
+    params:
+        recordings=CONFIG.recordings,
+        code=code_of("summarise_fleet"),
+    log:
+        "results/logs/fleet.log",
+    localrule: True
+    script:
+        "../scripts/summarise_fleet.py"

@@ -1,0 +1,131 @@
+"""Prove the next flight on concealed sets: plan, record, judge both together.
+
+- Records sets in which pairs look alike, by code that shares nothing with the library.
+- Plans a flight for what each leaves open; the plan never sees an answer.
+- Has the same simulator record the planned flight, and a standard one of the same length, and judges each with the set.
+- Writes the row of every set as it comes, so that an interrupted proof goes on where it stopped.
+"""
+
+import sys
+import tempfile
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from rotorid import log
+from rotorid.errors import InputError
+from rotorid.experiment.limits import Limits, read_limits
+from rotorid.experiment.plan import plan
+from rotorid.experiment.questions import Known, known
+from rotorid.experiment.together import joined_sets
+from rotorid.experiment.write import sampled
+from rotorid.mismatch.analyse import analyse
+from rotorid.proof import next_flight as proof
+from rotorid.recordings import RecordingSet, read_set
+
+
+def as_read(recording, write_set, name: str) -> RecordingSet:
+    """A recording as a user's files would hand it over."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_set(recording, Path(folder) / name)
+        return read_set(Path(folder) / name)
+
+
+def judged(first: RecordingSet, second: RecordingSet, ids, truth):
+    """Outcome, sentence, and both sets as one."""
+    whole, _ = joined_sets(first, second)
+    return (*proof.outcome_of(ids, analyse(whole).findings, truth), whole)
+
+
+def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -> proof.Row:
+    """What becomes of one set."""
+    truth = {answer["effects"][0]["id"]}
+    named = next(iter(truth))
+    found: Known = known(first)
+    classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
+    if not classes:
+        return proof.Row(case=case.name, truth=named, open="", said="nothing was left open")
+    ids = classes[0]
+    made = plan(found, limits)
+    if not made.pieces:
+        said = made.unanswerable[0][1] if made.unanswerable else "no manoeuvre separates them"
+        return proof.Row(case=case.name, truth=named, open=" ".join(ids), outcome="no plan", said=said)
+    expected = proof.predicted(made, ids, truth)
+    references = {
+        "planned": simulator.reference_of(sampled(made), *simulator.grid(case)),
+        "standard": simulator.standard(case, made.duration_s),
+    }
+    outcome, measured, said = {}, {}, {}
+    for name, reference in references.items():
+        second = as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
+        outcome[name], said[name], whole = judged(first, second, ids, truth)
+        measured[name] = proof.measured(known(whole), expected)
+    row = proof.Row(
+        case=case.name,
+        truth=named,
+        open=" ".join(ids),
+        planned_s=made.duration_s,
+        measured_sigma=measured["planned"],
+        standard_sigma=measured["standard"],
+        promised=made.settles,
+        outcome=outcome["planned"],
+        standard_outcome=outcome["standard"],
+        said=said["planned"],
+    )
+    if expected is None:
+        return row
+    low, high = expected.interval_95
+    return replace(row, predicted_sigma=expected.sigma, predicted_low=low, predicted_high=high)
+
+
+def main(
+    table: str, summary: str, so_far: str, limits: str, root: str, code: str = "", most: int | None = None
+) -> None:
+    """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
+
+    `root` holds `tests`; rows of another `code` are made anew; `most` cases are taken at most.
+    """
+    sys.path.insert(0, root)
+    warnings.simplefilter("ignore")
+    from tests.concealed import planned as simulator
+    from tests.concealed.richsim import scene
+
+    allowed = read_limits(Path(limits))
+    kept = Path(so_far)
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
+    rows = [r for r in rows if str(r["judged_by"]) == code]
+    # Where speeds are commands alone a set takes minutes: those come last.
+    every = [*simulator.look_alikes(), *simulator.ambiguous()]
+    cases = sorted(every, key=lambda case: "speed" not in case.settings.groups)[:most]
+    done = {r["case"] for r in rows}
+    for case in cases:
+        if case.name in done:
+            continue
+        recording, answer, _ = scene.make(case.settings, case.seed)
+        first = as_read(recording, simulator.write_set, "first")
+        try:
+            row = replace(row_of(case, answer, first, simulator, allowed), judged_by=code)
+            rows += proof.table([row]).to_dict("records")
+        except InputError as error:
+            print(f"{case.name}: {error}", file=sys.stderr)
+            continue
+        pd.DataFrame(rows).to_csv(kept, index=False)
+        print(rows[-1], file=sys.stderr, flush=True)
+    found = pd.DataFrame(rows)
+    found.to_csv(table, index=False)
+    proof.summary(found).to_csv(summary, index=False)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            table=snakemake.output.table,
+            summary=snakemake.output.summary,
+            so_far=snakemake.params.so_far,
+            limits=snakemake.input.limits,
+            root=str(Path.cwd()),
+            code=str(snakemake.params.code),
+        )
