@@ -44,11 +44,6 @@ INSTRUMENTS = (
     "bench/rig/clean/development/000",
     "stand/rig/clean/development/000",
 )
-    "bench/clean/000",
-    "stand/clean/000",
-    "bench/rig/clean/development/000",
-    "stand/rig/clean/development/000",
-)
 
 
 def without(recordings: RecordingSet, group: str) -> RecordingSet | None:
