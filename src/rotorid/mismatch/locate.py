@@ -409,7 +409,7 @@ def _louder(traces, white, limit) -> list[Interval]:
     for length in _lengths(min(traces, key=lambda t: len(t.after))):
         means = [_window_sums(w**2, length) / length for w in white]
         pooled = np.concatenate(means)
-        usual = float(np.median(pooled))
+        usual = max(float(np.median(pooled)), 1e-300)  # of a rotor at rest next to nothing is left
         spread = max(float(np.quantile(pooled, 0.75) - np.quantile(pooled, 0.25)) / 1.349, 1e-12)
         degrees = max(min(2 * (usual / spread) ** 2, float(length)), 1.0)
         for k, mean in enumerate(means):
