@@ -347,6 +347,77 @@ def test_a_line_at_its_own_frequency_is_no_vibration_of_the_rotors(sound):
     assert find_mistakes(with_table(sound, shake))[1] == ()
 
 
+@pytest.fixture(scope="module")
+def short() -> RecordingSet:
+    """Four runs of nine seconds, each too short to be told by its own blocks of spectra."""
+    return recorded(61, 62, 63, 64, flight={"duration_s": 9.0})
+
+
+def without_attitude(table):
+    return table[[n for n in table if not n.startswith(("quaternion_", "position_", "velocity_"))]]
+
+
+def test_short_runs_without_a_mistake(short):
+    assert find_mistakes(short)[1] == ()
+    assert find_mistakes(with_table(short, without_attitude))[1] == ()
+
+
+def test_reversed_spins_in_short_runs(short):
+    other = {"ccw": "cw", "cw": "ccw"}
+    rotors = tuple(r.model_copy(update={"spin": other[r.spin]}) for r in short.vehicle.rotors)
+    vehicle = short.vehicle.model_copy(update={"rotors": rotors})
+    fixed, findings, _ = find_mistakes(RecordingSet("bad", vehicle, short.runs))
+    one(findings, "spin_direction")
+    assert fixed.vehicle == short.vehicle
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (1, 2), (0, 2)])
+def test_two_rotors_exchanged_in_short_runs(short, pair):
+    """Neighbours on one side leave one axis as it was: the other alone has to tell."""
+
+    def spoil(table):
+        names = [COLUMNS["rotors"][k] for k in pair]
+        table[names] = table[names[::-1]].to_numpy()
+        return table
+
+    fixed, findings, _ = find_mistakes(with_table(short, spoil))
+    one(findings, "rotor_order")
+    for n in COLUMNS["rotors"]:
+        assert np.array_equal(column(fixed, n), column(short, n))
+
+
+@pytest.mark.parametrize("sensor", ["gyroscope", "rotors"])
+def test_a_drifting_clock_in_short_runs(sensor):
+    bad = recorded(61, 62, 63, 64, flight={"duration_s": 9.0}, growth={sensor: 0.002})
+    finding = next(f for f in find_mistakes(bad)[1] if f.id == "clock_skew")
+    estimate = finding.parameters[0]
+    assert min(abs(estimate.low), abs(estimate.high)) <= 0.002 <= max(abs(estimate.low), abs(estimate.high))
+
+
+def test_an_exchanged_gyroscope_without_attitude_may_be_two_exchanged_rotors(short):
+    def spoil(table):
+        names = list(COLUMNS["gyroscope"][:2])
+        table[names] = table[names[::-1]].to_numpy()
+        return without_attitude(table)
+
+    fixed, findings, _ = find_mistakes(with_table(short, spoil))
+    assert ids(findings) == ["axis_sign"] and findings[0].status == "ambiguous"
+    assert findings[0].alternatives == ("axis_sign", "rotor_order")
+    for n in COLUMNS["gyroscope"]:
+        assert np.array_equal(column(fixed, n), column(short, n))
+
+
+@pytest.mark.filterwarnings("error")
+def test_rotors_of_which_nothing_is_read_for_a_while(sound):
+    def spoil(table):
+        table.loc[table["time_s"] < 3.0, list(COLUMNS["rotors"])] = np.nan
+        table["rotor_speed_2_rad_s"] = np.nan
+        return table
+
+    for run in with_table(sound, spoil).runs:
+        assert dropout.standing_rotors(run, sound.vehicle, COLUMNS["rotors"]) == {}
+
+
 def test_two_mistakes_at_once(sound):
     def spoil(table):
         table[list(COLUMNS["rotors"])] *= 60 / (2 * np.pi)
