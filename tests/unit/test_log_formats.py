@@ -120,7 +120,8 @@ def test_betaflight(tmp_path: Path) -> None:
     found = read_log(path)
     assert (found.format, found.known.autopilot) == ("betaflight", "betaflight")
     (run,) = found.runs.values()
-    check_against(run, truth, (*BODY, *THROTTLES, c.BATTERY_VOLTAGE), 2.5e-3)  # half a step of 1/2048 g
+    check_against(run, truth, (*BODY, *THROTTLES), 2.5e-3)  # half a step of 1/2048 g
+    check_against(run, truth, (c.ANGULAR_VELOCITY[0], c.BATTERY_VOLTAGE), 1e-3, half_step=0.5 * 0.01)
     # Speeds are counted in hundreds of electrical turns a minute, of seven pole pairs.
     check_against(run, truth, (c.ANGULAR_VELOCITY[0], *SPEEDS), 1e-3, half_step=0.5 * 100 / 7 * 2 * np.pi / 60)
     # Rest, take-off and landing are cut out.

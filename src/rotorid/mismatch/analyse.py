@@ -63,9 +63,9 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
     analysis = analysed(recordings, mistakes, remarks, cutoff_hz)
-    if analysis is None:
+    left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
+    if analysis is None and left:
         # What is held out lost a sensor throughout: something else must show what the model is worth.
-        left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
         names = ", ".join(r.name for r in recordings.runs if r not in left)
         remarks = (*remarks, f"Nothing of {names} could be compared; other recordings were held out instead.")
         analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, cutoff_hz)
