@@ -139,10 +139,10 @@ def _rms(errors: Sequence[WindowErrors], name: str, part, sign: int) -> float | 
 
 def errors_of(segments: Sequence[Segment], model: Model) -> list[WindowErrors]:
     """Errors of every stretch's windows."""
-    return [window_errors(*driven, model) for driven in zip(segments, *_driven(segments, model), strict=True)]
+    return [window_errors(*driven, model) for driven in zip(segments, *driven_by(segments, model), strict=True)]
 
 
-def _driven(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], list[States]]:
+def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], list[States]]:
     """Inputs and recorded states of every segment, rotor speeds by the model's chain where only commanded."""
     commands = [float(np.nanmax(s.command)) for s in segments if s.command is not None]
     limits = model.vehicle.rotor_speed_limits_rad_s
@@ -217,7 +217,7 @@ def noise_floor(segments: Sequence[Segment], model: Model, noise: dict[str, floa
     """Error of each channel that sensor noise alone makes, in the channel's unit."""
     rng = np.random.default_rng(0)
     squares: dict[str, list[np.ndarray]] = {}
-    for segment, inputs, states in zip(segments, *_driven(segments, model), strict=True):
+    for segment, inputs, states in zip(segments, *driven_by(segments, model), strict=True):
         shaken_inputs = replace(inputs, rotor_speed=_shaken(inputs.rotor_speed, noise.get("rotors"), rng))
         shaken = States(
             _shaken(states.angular_velocity, noise.get("gyroscope"), rng),

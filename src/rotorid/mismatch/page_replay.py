@@ -80,7 +80,7 @@ def _windows(segments: Sequence[Segment], at: int, model: Model) -> tuple[np.nda
     """
     for tried in (model, replace(model, forms=(), chain=(), chain_values=())):
         try:
-            inputs, states = forward._driven(segments, tried)
+            inputs, states = forward.driven_by(segments, tried)
             return states[at].quaternion, forward.predict(segments[at], tried, inputs[at], states[at])
         except InputError:
             continue
