@@ -209,6 +209,11 @@ ELSEWHERE = rule(
     squares=(12.0, "whitened squares: an id's price and half"),
 )
 PLAINER_FORM = rule("plainer_form", "A form of which every number may be nothing gives way to one of fewer parameters.")
+DEARER = rule(
+    "dearer",
+    "Another effect that explains as much only by more parameters is no alternative.",
+    squares=(12.0, "whitened squares less the price of parameters: odds of 400 to 1"),
+)
 ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading are curves of one load.")
 
 # Words

@@ -220,10 +220,10 @@ class ReadingSearch(Search):
         return None
 
     def alternatives(self, key, active):
-        """Of what could stand in for a term by all runs together, what runs that were left out do not refute.
+        """Of what could stand in for a term by all runs together, what is worth about as much where it was not fitted.
 
         A stand's runs differ in their tilt: one of them may tell a weight's moment from a tare. What has numbers of its
-        own for every run says nothing of one that was left out.
+        own for every run says nothing of one that was left out, and what explains as much by more numbers is no rival.
         """
         rest = [k for k in active if k != key]
         runs = len(np.unique(self.regression.run[self.regression.training]))
@@ -232,7 +232,9 @@ class ReadingSearch(Search):
             own, terms = [*self.always, *rest, key], [t.key for t in self.terms.values() if t.effect == effect]
             others = ([*self.always, *rest, t] for t in terms)
             worse = min(self.regression.compare(own, o, whole_runs=runs >= LEAST_RUNS).total for o in others)
-            return rules.ELSEWHERE(worse > rules.ELSEWHERE["squares"])
+            dearer = self.worth([*rest, key]) - max(self.worth([*rest, t]) for t in terms)
+            far = rules.ELSEWHERE(worse > rules.ELSEWHERE["squares"])
+            return far or rules.DEARER(dearer > rules.DEARER["squares"])
 
         return [effect for effect in super().alternatives(key, active) if not refuted(effect)]
 
