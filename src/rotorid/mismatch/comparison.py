@@ -30,6 +30,9 @@ VOTES_FROM = 0.05
 LEAST_EXPECTED = 0.6
 """Share of the promise that a true effect must be expected to keep on blocks left out, for these to judge: what one run
 alone excites cannot be learnt from the others."""
+SEEN_ELSEWHERE = 1.0
+"""What the fitted blocks must hold of the same change, beside what is asked of the blocks left out: no form is so true
+that what slow flights say of it could be held against a fast one."""
 ANSWERED = 0.5
 """Share of all that is promised on environments that may judge, from which leaving out whole runs is an answer."""
 
@@ -42,6 +45,8 @@ class Comparison:
     """(environments,) squares that A leaves less than B."""
     promised: np.ndarray
     """(environments,) squares that A's extra part explains there if its coefficients are right."""
+    seen: np.ndarray
+    """(environments,) squares that the same part explains in all that was fitted when this one was left out."""
     doubt: np.ndarray
     """(environments,) squares by which the coefficients that A has more are expected to be off there, as little as the
     blocks that they were fitted on tell of them."""
@@ -52,10 +57,11 @@ class Comparison:
     def judges(self) -> np.ndarray:
         """Mask of the environments whose fold the coefficients fitted without it predict well enough.
 
-        With coefficients that are off by e squares A promises e more than there is and gains e less.
+        They must know the same change from as much of it, and with coefficients that are off by e squares A promises e
+        more than there is and gains e less.
         """
         asked, off = (np.array([x[self.fold == f].sum() for f in self.fold]) for x in (self.promised, self.doubt))
-        return asked - 2 * off >= LEAST_EXPECTED * asked
+        return (self.seen >= SEEN_ELSEWHERE * asked) & (asked - 2 * off >= LEAST_EXPECTED * asked)
 
     @property
     def answers(self) -> bool:

@@ -393,12 +393,20 @@ class Regression:
         shift[:, shared] -= b[:, at]
         gram = self.gram[np.ix_(index, cols, cols)]
         promised = np.einsum("bk,bkl,bl->b", shift, gram, shift)
+        # What the fitted blocks of each fold hold of the same change of coefficients.
+        every = gram.sum(axis=0)
+        seen = np.empty(len(index))
+        for out in np.unique(fold[index]):
+            own = fold[index] == out
+            one = shift[own][0]
+            seen[own] = one @ (every - gram[own].sum(axis=0)) @ one
         doubt = self._doubt(index, cols, fold, more_of[2]) - self._doubt(index, others, fold, fewer_of[2])
         count = int(environment.max()) + 1
         size = np.bincount(environment, minlength=count)
         return Comparison(
             np.bincount(environment, left[1] - left[0], count),
             np.bincount(environment, promised, count),
+            np.bincount(environment, seen, count) / size,
             np.bincount(environment, doubt, count),
             np.bincount(environment, fold[index], count) / size,
         )
