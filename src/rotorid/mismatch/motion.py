@@ -218,7 +218,7 @@ def build_segments(
         return None if np.isfinite(out).all(axis=1).sum() < 4 else out
 
     count = vehicle.rotor_count
-    speed = take(c.rotor_columns("rotor_speed", count), "rotors")
+    speed = take(c.rotor_columns("rotor_speed", count), "rotors", smooth=False)
     command = take(c.rotor_columns("rotor_command", count), "commands", smooth=False)
     if command is None:
         throttle = take(c.rotor_columns("throttle", count), "commands", smooth=False)
