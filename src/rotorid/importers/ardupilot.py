@@ -10,8 +10,6 @@ Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; paramete
 
 from __future__ import annotations
 
-import contextlib
-import io
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -25,6 +23,7 @@ from rotorid.importers.frames import continuous, quaternion_from_euler_frd
 from rotorid.importers.optional import needs
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.wording import printable
 
 KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "RCOU", "ESC", "BAT", "BARO", "RFND", "EV", "PARM", "MSG",
@@ -48,13 +47,13 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     reader = needs("pymavlink.DFReader", "ardupilot", path)
     rows: dict[str, list[dict]] = {}
     try:
-        # pymavlink prints what it stumbles over.
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            log = reader.DFReader_binary(str(path), zero_time_base=True)
-            while (message := log.recv_match(type=list(KINDS))) is not None:
-                rows.setdefault(message.get_type(), []).append(message.to_dict())
+        log = reader.DFReader_binary(str(path), zero_time_base=True)
+        while (message := log.recv_match(type=list(KINDS))) is not None:
+            rows.setdefault(message.get_type(), []).append(message.to_dict())
+    except MemoryError:
+        raise
     except Exception as error:  # pymavlink lets whatever a broken file raises through
-        raise InputError(f"{path}: not a DataFlash log that can be read ({error})") from None
+        raise InputError(f"{path}: not a DataFlash log that can be read ({printable(error)[:150]})") from None
     if not rows:
         raise InputError(f"{path}: a DataFlash log with no message that is needed (IMU, ATT, RCOU)")
     tables = {}
@@ -62,6 +61,8 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
         table = pd.DataFrame(found)
         if "TimeUS" in table:
             table[c.TIME] = table["TimeUS"].astype(float) * 1e-6
+        elif kind not in ("PARM", "MSG"):
+            continue  # damaged: a message without its clock has no place
         tables[kind] = table
     return tables
 
@@ -69,7 +70,9 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
 def parameters(log: Log) -> dict[str, float]:
     """The vehicle's parameters as the log states them last."""
     table = log.get("PARM")
-    return {} if table is None else dict(zip(table["Name"], table["Value"].astype(float), strict=True))
+    if table is None or not {"Name", "Value"} <= set(table):
+        return {}
+    return dict(zip(table["Name"], pd.to_numeric(table["Value"], errors="coerce"), strict=True))
 
 
 def order_of(values: Mapping[str, float]) -> tuple[str, list[Fault]]:

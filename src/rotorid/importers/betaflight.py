@@ -26,6 +26,7 @@ from rotorid.importers.frames import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.importers.optional import needs
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.wording import printable
 
 GRAVITY_M_S2 = 9.80665
 DEFAULT_POLES = 14
@@ -45,8 +46,10 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
         first = orangebox.Parser.load(str(path), 1)
         count = first.reader.log_count
         logs = [first, *(orangebox.Parser.load(str(path), number) for number in range(2, count + 1))]
+    except MemoryError:
+        raise
     except Exception as error:  # orangebox has errors of its own and lets others through
-        raise InputError(f"{path}: not a blackbox log that can be read ({error})") from None
+        raise InputError(f"{path}: not a blackbox log that can be read ({printable(error)[:150]})") from None
     runs: dict[str, pd.DataFrame] = {}
     faults: list[Fault] = []
     reason = InputError(f"{path}: holds no log")
@@ -72,7 +75,12 @@ def _flights(log, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[
             f"{path}: a blackbox log of {firmware or 'an unknown firmware'}; only Betaflight's axes and units are "
             "known, turn it into CSV (blackbox_decode), then `rotorid import FILE.csv`"
         )
-    rows = [frame.data for frame in log.frames()]
+    try:
+        rows = [frame.data for frame in log.frames()]
+    except MemoryError:
+        raise
+    except Exception as error:  # a damaged frame may be anything to orangebox
+        raise InputError(f"{path}: not a blackbox log that can be read ({printable(error)[:150]})") from None
     if len(rows) < 2:
         raise InputError(f"{path}: holds {len(rows)} samples")
     raw = pd.DataFrame(rows, columns=log.field_names[: len(rows[0])]).apply(pd.to_numeric, errors="coerce")

@@ -76,4 +76,4 @@ def cut(table: pd.DataFrame, start_s: float, stop_s: float) -> pd.DataFrame:
     """Rows from start to stop, the clock set to zero at the first of them."""
     time = table[TIME]
     part = table[(time >= start_s) & (time <= stop_s)].reset_index(drop=True)
-    return part.assign(**{TIME: part[TIME] - part[TIME].iloc[0]})
+    return part.assign(**{TIME: part[TIME] - part[TIME].min()})

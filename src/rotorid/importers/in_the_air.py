@@ -91,9 +91,13 @@ def flights(
         run = name if len(found) == 1 else f"{name}_{number}"
         first, last = start + AFTER_TAKE_OFF_S, stop - BEFORE_LANDING_S
         inside = (time_s >= first) & (time_s <= last)
+        if inside.sum() < 2:
+            continue
         cut = table[inside].reset_index(drop=True)
         cut[c.TIME] -= cut[c.TIME].iloc[0]
         runs[run] = cut.dropna(axis=1, how="all")
         seen = f"in the air from {start:.2f} to {stop:.2f} s of {time_s[-1]:.0f} s"
         cuts.append(Fault("cut", c.TIME, seen, f"{first:.2f} to {last:.2f} s kept", int((~inside).sum()), run))
+    if not runs:
+        raise InputError(f"{where}: next to no samples of its {len(found)} flights are there")
     return runs, cuts

@@ -13,13 +13,17 @@ from rotorid.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ul
 from rotorid.importers.clean import true_stretches
 from rotorid.importers.known import Known, px4_vehicle
 from rotorid.importers.mapping import Mapping, read_by_mapping
+from rotorid.importers.readers import limited, silent
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.text_files import check_file
+from rotorid.wording import printable
 
 SHORTEST_FLIGHT_S = 4.0
 AFTER_TAKE_OFF_S = 1.0
 BEFORE_LANDING_S = 0.5
 
+GZIP = b"\x1f\x8b"
 BY_FIRST_BYTES = (
     (b"H Product:Blackbox", "betaflight"),
     (b"\xa3\x95", "ardupilot"),
@@ -48,21 +52,21 @@ def format_of(path: Path) -> str:
 
     InputError for what is none of them.
     """
-    try:
-        with open(path, "rb") as file:
-            head = file.read(4096)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except IsADirectoryError:
+    if path.is_dir():
         if (path / "metadata.yaml").is_file():
             return "ros"
-        raise InputError(f"{path}: expected a log, found a folder") from None
+        raise InputError(f"{path}: expected a log, found a folder")
+    check_file(path)
+    with open(path, "rb") as file:
+        head = file.read(4096)
     if not head:
         raise InputError(f"{path}: the file is empty")
     if head.startswith(b"ULog\x01\x12\x35"):
         return "px4"
     if head[0] == 0xBC:
         return "crazyflie"
+    if head.startswith(GZIP):
+        return "csv"
     if head.startswith(b"PAR1"):
         return "parquet"
     for start, name in BY_FIRST_BYTES:
@@ -83,6 +87,15 @@ def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
     """Every flight in a log; InputError in one sentence where the file holds none."""
     path = Path(path)
     kind = format_of(path)
+    try:
+        with limited(path), silent():
+            return _read(path, kind, mapping)
+    except InputError as error:
+        said = printable(error)  # it may quote what stands in the file
+        raise InputError(said if said.startswith(str(path)) else f"{path}: {said}") from None
+
+
+def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
     if kind == "px4":
         return _px4(path)
     if kind == "crazyflie":
@@ -132,11 +145,15 @@ def _px4(path: Path) -> Imported:
         name = path.stem if len(flights) == 1 else f"{path.stem}_{number}"
         first, last = start + AFTER_TAKE_OFF_S, stop - BEFORE_LANDING_S
         inside = (time_s >= first) & (time_s <= last)
+        if inside.sum() < 2:
+            continue
         table = converted.table[inside].reset_index(drop=True)
         table[c.TIME] -= table[c.TIME].iloc[0]
         runs[name] = table.dropna(axis=1, how="all")
         found = f"in the air from {start:.2f} to {stop:.2f} s of {time_s[-1]:.0f} s"
         cuts.append(Fault("cut", c.TIME, found, f"{first:.2f} to {last:.2f} s kept", int((~inside).sum()), name))
+    if not runs:
+        raise InputError(f"{path}: next to no samples of its {len(flights)} flights are there")
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
     return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known)
 

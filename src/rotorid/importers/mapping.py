@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
+from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
@@ -33,8 +34,9 @@ from rotorid.importers.clean import drop_repeated_times, report_gaps
 from rotorid.importers.frames import continuous
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
-from rotorid.recordings.explain import explain
-from rotorid.recordings.files import read_yaml
+from rotorid.recordings.tables import LARGEST_FILE, NO_PARQUET, parquet_is_here, unpacked
+from rotorid.text_files import check_text, read_bytes, read_yaml
+from rotorid.wording import explain, printable
 
 G = 9.80665
 UNITS: dict[str, dict[str, float]] = {
@@ -134,10 +136,16 @@ def read_columns(path: Path) -> pd.DataFrame:
     path = Path(path)
     try:
         if path.name.endswith(".parquet"):
+            if not parquet_is_here():
+                raise InputError(f"{path}: {NO_PARQUET}")
             return pd.read_parquet(path)
-        table = pd.read_csv(path, skipinitialspace=True, encoding="utf-8-sig", sep=None, engine="python")
+        data = unpacked(path) if path.name.endswith(".gz") else read_bytes(path, LARGEST_FILE)
+        check_text(data, path)
+        table = pd.read_csv(BytesIO(data), skipinitialspace=True, encoding="utf-8-sig", sep=None, engine="python")
+    except (InputError, MemoryError):
+        raise
     except Exception as error:
-        raise InputError(f"{path}: cannot be read as a table ({str(error).splitlines()[0]})") from None
+        raise InputError(f"{path}: cannot be read as a table ({printable(error)[:150]})") from None
     table.columns = [str(n).strip() for n in table.columns]
     if len(table.columns) < 2 or len(table) < 2:
         raise InputError(
@@ -237,17 +245,24 @@ def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray
 
 # Guessing -----------------------------------------------------------------------------------------
 
+WISHED = r"(?:cmd|command(?:ed)?|ref(?:erence)?|desired|setpoint|target)"
+TURNING = r"(?:rpm|mot(?:or)?_?speeds?|rotor_?speeds?)"
 AXES3 = (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
 PATTERNS: dict[str, tuple[str, ...]] = {
     "specific_force": (r"acc(el(eration|erometer)?)?(smooth|_m_s2|_ms2)?", r"a", r"imu_acc.*", r"specific_force.*"),
     "angular_velocity": (r"gyro(adc|scope|_rad)?", r"omega", r"w", r"angular_velocity.*", r"rates?", r"body_rates?"),
     "position": (r"pos(ition)?", r"p", r""),
     "velocity": (r"vel(ocity)?", r"v"),
+    "rotor_command": (
+        rf"{WISHED}_?{TURNING}",
+        rf"{TURNING}_?{WISHED}",
+        r"rotor_?commands?",
+    ),
     "rotor_speed": (r"rpm", r"erpm", r"motor_?rpm", r"rotor_?speeds?", r"mot(or)?_?speeds?"),
     "throttle": (r"motors?", r"throttles?", r"pwm", r"m", r"mot", r"outputs?", r"thr", r"control"),
 }
 SCALARS: dict[str, tuple[str, ...]] = {
-    "time": (r"t", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
+    "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
     "battery_voltage": (r"v_?bat(t|tery)?.*", r"battery_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
     "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
     "height": (r"height.*", r"agl.*", r"range.*"),
@@ -285,15 +300,19 @@ def guess(table: pd.DataFrame) -> tuple[Mapping, list[str]]:
         degrees = any(np.nanmax(np.abs(pd.to_numeric(table[n], errors="coerce"))) > 7 for n in euler)
         add("attitude", euler, form="euler", unit="deg" if degrees else "rad")
     for channel in ("angular_velocity", "specific_force", "velocity", "position"):
-        found = next((f for axes in AXES3 if (f := _family(names, taken, PATTERNS[channel], axes))), None)
+        # Bare x, y, z are a position; whatever ends in 1, 2, 3 is not.
+        stems = {axes: tuple(p for p in PATTERNS[channel] if p or axes[0] == "x") for axes in AXES3}
+        found = next((f for axes in AXES3 if (f := _family(names, taken, stems[axes], axes))), None)
         if found:
             values = table[found].apply(pd.to_numeric, errors="coerce").to_numpy(float)
             add(channel, found, unit=_vector_unit(channel, found, values, doubts))
-    for channel in ("rotor_speed", "throttle"):
+    for channel in ("rotor_command", "rotor_speed", "throttle"):
         found = _rotors(names, taken, PATTERNS[channel])
         if found:
             values = table[found].apply(pd.to_numeric, errors="coerce").to_numpy(float)
             add(channel, found, **_rotor_unit(channel, values, doubts))
+    if "time" not in channels:
+        doubts.insert(0, "time: no column recognised, and without one nothing can be imported; add it under channels")
     body, world = _frames(table, channels, doubts)
     rest = [n for n in names if n not in taken and pd.api.types.is_numeric_dtype(table[n])]
     return Mapping(body=body, world=world, channels=channels, keep=tuple(rest)), doubts
@@ -373,9 +392,9 @@ def _vector_unit(channel: str, names, values: np.ndarray, doubts: list[str]) -> 
 
 def _rotor_unit(channel: str, values: np.ndarray, doubts: list[str]) -> dict:
     top = float(np.nanquantile(values, 0.99)) if np.isfinite(values).any() else 0.0
-    if channel == "rotor_speed":
+    if channel in ("rotor_speed", "rotor_command"):
         unit = "rpm" if top > 3500 else "rad/s"
-        doubts.append(f"rotor_speed: up to {top:.4g}, taken as {unit}")
+        doubts.append(f"{channel}: up to {top:.4g}, taken as {unit}")
         return {"unit": unit}
     if top <= 1.05:
         return {"unit": "1"}

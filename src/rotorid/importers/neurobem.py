@@ -21,6 +21,7 @@ from rotorid.importers.clean import drop_repeated_times, report_gaps
 from rotorid.importers.frames import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.wording import printable
 
 LAYOUT = (
     ("time", 1), ("angular_acceleration", 3), ("angular_velocity", 3), ("quaternion_xyzw", 4),
@@ -39,8 +40,10 @@ def read_matrix(path: Path) -> np.ndarray:
         raise InputError(f"{path}: file is missing")
     try:
         content = loadmat(path)
+    except MemoryError:
+        raise
     except Exception as error:
-        raise InputError(f"{path}: not a MATLAB file that can be read ({error})") from None
+        raise InputError(f"{path}: not a MATLAB file that can be read ({printable(error)[:150]})") from None
     matrices = [v for k, v in content.items() if not k.startswith("__") and getattr(v, "ndim", 0) == 2]
     if len(matrices) != 1 or matrices[0].shape[1] < USED:
         shapes = [m.shape for m in matrices]

@@ -24,6 +24,7 @@ from rotorid.importers.clean import drop_repeated_times, report_gaps
 from rotorid.importers.frames import continuous
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.wording import printable
 
 RPM = 2 * np.pi / 60
 FIRST_MOTOR = 101
@@ -45,11 +46,12 @@ Topics = Mapping[str, Sequence[Mapping[str, np.ndarray]]]
 
 @dataclass(frozen=True)
 class Px4Log:
-    """What is read of a log: instances of each topic in order, parameters at the start, seconds lost."""
+    """What is read of a log: instances of each topic in order, parameters at the start, seconds lost, damage."""
 
     topics: Topics
     parameters: Mapping[str, float] = field(default_factory=dict)
     lost_s: tuple[float, ...] = ()
+    damaged: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,12 +72,17 @@ def open_log(path: Path) -> Px4Log:
         raise InputError(f"{path}: file is missing")
     try:
         log = ULog(str(path))
+    except MemoryError:
+        raise
     except Exception as error:
-        raise InputError(f"{path}: not a ULog file that can be read ({error})") from None
+        raise InputError(f"{path}: not a ULog file that can be read ({printable(error)[:150]})") from None
     topics: dict[str, list[Mapping[str, np.ndarray]]] = {}
     for dataset in sorted(log.data_list, key=lambda d: d.multi_id):
-        topics.setdefault(dataset.name, []).append(dataset.data)
-    return Px4Log(topics, dict(log.initial_parameters), tuple(d.duration / 1000 for d in log.dropouts))
+        if "timestamp" in dataset.data:  # a damaged format may have lost it
+            topics.setdefault(dataset.name, []).append(dataset.data)
+    return Px4Log(
+        topics, dict(log.initial_parameters), tuple(d.duration / 1000 for d in log.dropouts), log.file_corruption
+    )
 
 
 def rotor_count(log: Px4Log) -> int:
@@ -399,6 +406,8 @@ def convert(log: Px4Log, rotors: int) -> Converted:
     if len(jumps):
         found = f"PX4's estimator jumped {len(jumps)} times"
         faults.append(Fault("estimator_reset", "", found, "a run ends at each jump in the air", len(jumps)))
+    if log.damaged:
+        faults.append(Fault("damaged", "", "the file is damaged", "what could be read is kept", 0))
     if log.lost_s:
         found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
         faults.append(Fault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))

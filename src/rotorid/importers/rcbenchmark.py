@@ -52,7 +52,10 @@ def decode_text(data: bytes) -> tuple[str, list[Fault]]:
 
 def read_table(text: str, where: str) -> pd.DataFrame:
     """Numeric columns `time, esc, thrust, voltage, current, rpm` (and `optical` where there) of an export."""
-    rows = [row for row in csv.reader(text.split("\n")) if any(cell.strip() for cell in row)]
+    try:
+        rows = [row for row in csv.reader(text.split("\n")) if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{where}: cannot be read as a table ({error})") from None
     if len(rows) < 2:
         raise InputError(f"{where}: expected a heading and rows of numbers")
     places = {}

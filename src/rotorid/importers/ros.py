@@ -32,6 +32,7 @@ from rotorid.importers.frames import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.importers.optional import needs
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.wording import printable
 
 RPM = 2 * np.pi / 60
 PULSE_US = (1000.0, 2000.0)
@@ -100,8 +101,10 @@ def read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
                     time_s = stamp.sec + stamp.nanosec * 1e-9
                 for quantity, values in READERS[connection.msgtype](message).items():
                     found.setdefault((quantity, connection.topic), []).append((time_s, values))
+    except MemoryError:
+        raise
     except Exception as error:  # rosbags lets whatever a broken file raises through
-        raise InputError(f"{path}: not a bag or MCAP file that can be read ({error})") from None
+        raise InputError(f"{path}: not a bag or MCAP file that can be read ({printable(error)[:150]})") from None
     if not found:
         listed = ", ".join(f"{t} ({k})" for t, k in sorted(unknown.items())[:8]) or "none"
         raise InputError(f"{path}: no topic of a type that is known; found {listed}")

@@ -17,6 +17,7 @@ from rotorid.importers.obtain import sha256
 from rotorid.importers.propose import propose
 from rotorid.importers.report import Fault, ImportReport
 from rotorid.recordings import read_vehicle
+from rotorid.recordings.tables import parquet_is_here, write_table
 
 
 @dataclass(frozen=True)
@@ -44,15 +45,16 @@ class SetOfLogs:
         return tuple(fault.sentence for fault in self.faults)
 
     def write(self, folder: Path, as_csv: bool = False) -> None:
-        """Write `vehicle.yaml` (unless it was there and is kept), a file a run, and `import_report.json`."""
+        """Write `vehicle.yaml` (unless it was there and is kept), a file a run, and `import_report.json`.
+
+        Runs are Parquet files; plain CSV where wished, and .csv.gz where pyarrow is not installed.
+        """
+        suffix = ".csv" if as_csv else ".parquet" if parquet_is_here() else ".csv.gz"
         folder.mkdir(parents=True, exist_ok=True)
         if not self.kept_vehicle:
             (folder / "vehicle.yaml").write_text(self.vehicle_text, encoding="utf-8")
         for name, table in self.runs.items():
-            if as_csv:
-                table.to_csv(folder / f"{name}.csv", index=False)
-            else:
-                table.to_parquet(folder / f"{name}.parquet", index=False)
+            write_table(table, folder / f"{name}{suffix}")
         ImportReport(
             folder.name,
             True,

@@ -8,8 +8,8 @@ from pathlib import Path, PurePosixPath
 
 from rotorid.errors import InputError
 from rotorid.io.session import Session, SessionError, read_session, replace_text
-from rotorid.recordings.names import hint, listed
-from rotorid.recordings.text_files import read_text
+from rotorid.names import hint, listed
+from rotorid.text_files import read_text
 
 LARGEST = 100_000_000
 """Bytes of the index; 811 recordings have 0.2 MB."""

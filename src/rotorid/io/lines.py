@@ -20,13 +20,14 @@ from pathlib import Path
 from typing import Literal
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from rotorid.errors import InputError
-from rotorid.io.models import Number, read_model
-from rotorid.io.rawlog import RECEIVED, read_raw
+from rotorid.io.logs import faults_of, same_recording
+from rotorid.io.models import KnownKeys, Number, read_model
+from rotorid.io.rawlog import RECEIVED, Damage, read_raw
 from rotorid.io.session import SessionError, read_session, session_path
-from rotorid.recordings.explain import explain
+from rotorid.wording import explain
 
 MAX_LINE = 4096
 
@@ -35,11 +36,7 @@ class DescriptionError(InputError):
     """The description is not what it should be; the sentence names file and place."""
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class Column(_Model):
+class Column(KnownKeys):
     """Where a column's number stands in a line."""
 
     field: int | str | None = None
@@ -48,7 +45,7 @@ class Column(_Model):
     scale: Number = 1.0
 
 
-class Description(_Model):
+class Description(KnownKeys):
     """How an instrument's lines are read."""
 
     name: str
@@ -117,11 +114,20 @@ class LineDecoder:
         self.unreadable = 0
         self.unread = ""
         self._pending = b""
+        self._broken = False
+
+    def break_off(self) -> None:
+        """Bytes are missing here: what was begun is no line, nor is what comes up to the next end of one."""
+        self._pending, self._broken = b"", True
 
     def feed(self, data: bytes) -> list[tuple[float, ...]]:
         """Values of the lines that these bytes complete."""
         *whole, self._pending = (self._pending + data).replace(b"\r", b"\n").split(b"\n")
         self._pending = self._pending[-MAX_LINE:]
+        if self._broken and whole:
+            self._broken = False
+            del whole[0]
+            self.unreadable += 1
         found = []
         for line in whole:
             text = line.decode(errors="replace").strip("\0")
@@ -138,30 +144,39 @@ class LineDecoder:
 
 @dataclass(frozen=True)
 class LineLog:
-    """`table`: `host_time_s` (when the line's end was read, from the beginning of the log), `index` and the columns."""
+    """`table`: `host_time_s` (when the line's end was read, from the beginning of the log), `index` and the columns.
+    `faults`: a sentence each, in what the file is not what the recorder wrote."""
 
     table: pd.DataFrame
     unreadable: int
     cut_at: int | None
     damaged_bytes: int
+    faults: tuple[str, ...] = ()
 
 
 def read_line_log(path: Path, description: Description | None = None) -> LineLog:
-    """Read a log of plain lines by its own description or by another. Raises SessionError, NotALog."""
+    """Read a log of plain lines by its own description or by another, around damage.
+
+    Raises SessionError, NotALog, and LogError where log and metadata are of two recordings.
+    """
+    beside = session_path(path)
+    session = read_session(beside) if description is None or beside.exists() else None
     if description is None:
-        stored = read_session(session_path(path)).procedure.get("description")
+        stored = session.procedure.get("description")
         if stored is None:
-            raise SessionError(f"{session_path(path)}: holds no description of lines; is this a log of frames?")
+            raise SessionError(f"{beside}: holds no description of lines; is this a log of frames?")
         try:
             description = Description.model_validate(stored)
         except ValidationError as error:
-            where = f"{session_path(path)}: procedure.description."
-            raise SessionError(where + explain(error, Description)) from None
+            raise SessionError(f"{beside}: procedure.description." + explain(error, Description)) from None
     raw, decoder, rows = read_raw(path), LineDecoder(description), []
-    for chunk in raw.chunks:
-        if chunk.tag == RECEIVED:
-            host_s = (chunk.host_ns - raw.chunks[0].host_ns) / 1e9
-            rows += [(host_s, *values) for values in decoder.feed(chunk.data)]
+    same_recording(path, raw, session)
+    for piece in raw.pieces():
+        if isinstance(piece, Damage):  # a line has no checksum of its own: nothing of a damaged chunk is taken
+            decoder.break_off()
+        elif piece.tag == RECEIVED:
+            host_s = (piece.host_ns - raw.chunks[0].host_ns) / 1e9
+            rows += [(host_s, *values) for values in decoder.feed(piece.data)]
     table = pd.DataFrame(rows, columns=["host_time_s", *description.columns])
     table.insert(1, "index", range(len(table)))
-    return LineLog(table, decoder.unreadable, raw.cut_at, raw.lost_bytes)
+    return LineLog(table, decoder.unreadable, raw.cut_at, raw.lost_bytes, tuple(faults_of(raw, session)))

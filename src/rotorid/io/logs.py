@@ -79,7 +79,7 @@ def read_log(path: str | Path) -> Log:
     path = Path(path)
     raw = rawlog.read_raw(path)
     session = _session_of(path)
-    _same_recording(path, raw, session)
+    same_recording(path, raw, session)
     intake = Intake(wire.INSTRUMENTS.get(session.instrument) if session is not None else None)
     starts: list[wire.StartRecord] = []
     end = None
@@ -127,7 +127,7 @@ def read_log(path: str | Path) -> Log:
     if session is not None and session.ended != Ended.RECORDING:
         counts = session.counts
         unseen = max(unseen, counts.samples + counts.missing + (counts.malformed_samples or 0) - sent_so_far())
-    faults = [*([fault] if fault else []), *_faults(raw, session)]
+    faults = [*([fault] if fault else []), *faults_of(raw, session)]
     if starts:
         start = starts[-1]
     else:
@@ -164,7 +164,7 @@ def _note(data: bytes) -> dict:
     return note if isinstance(note, dict) else {}
 
 
-def _same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> None:
+def same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> None:
     """Raises LogError where the log's own name is not that of the metadata beside it."""
     if session is None:
         return
@@ -179,7 +179,7 @@ def _same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> 
             return
 
 
-def _faults(raw: rawlog.RawLog, session: Session | None) -> list[str]:
+def faults_of(raw: rawlog.RawLog, session: Session | None) -> list[str]:
     """What is not as it was written, a sentence each."""
     faults = []
     if raw.damages:

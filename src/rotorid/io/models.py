@@ -5,17 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rotorid.errors import InputError
-from rotorid.recordings.explain import explain
-from rotorid.recordings.text_files import LARGEST_YAML, MOST_NODES, read_yaml
+from rotorid.text_files import LARGEST_YAML, MOST_NODES, read_yaml
+from rotorid.wording import explain
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number: no text, no `true`."""
 Whole = Annotated[int, Field(strict=True)]
 
 Model = TypeVar("Model", bound=BaseModel)
+
+
+class KnownKeys(BaseModel):
+    """A part of a file that has these keys and no others: what is misspelled is told, not passed over."""
+
+    model_config = ConfigDict(extra="forbid")
 
 
 def read_model(

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rotorid.errors import InputError
-from rotorid.recordings.text_files import read_bytes
+from rotorid.text_files import read_bytes
 
 MAGIC = b"ROTORLOG1\n"
 CHUNK_HEAD = struct.Struct("<BQH")

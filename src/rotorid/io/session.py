@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
 from rotorid.errors import InputError
-from rotorid.io.models import Number, Whole, read_model
+from rotorid.io.models import KnownKeys, Number, Whole, read_model
 
 LARGEST_METADATA, MOST_VALUES = 10_000_000, 200_000
 
@@ -34,14 +34,10 @@ class Ended(StrEnum):
     FAILED = "failed"
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
 Place = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
-class Air(_Model):
+class Air(KnownKeys):
     """Air during the recording."""
 
     temperature_c: Number = Field(ge=-90, le=70)
@@ -57,7 +53,7 @@ class Air(_Model):
         return (self.pressure_pa - vapour_pa) / (287.05 * kelvin) + vapour_pa / (461.5 * kelvin)
 
 
-class Setup(_Model):
+class Setup(KnownKeys):
     """What the operator knows and the instrument does not. Everything is optional."""
 
     kind: str = "free"  # calibration, static, dynamic, thrust, torque, dynamics, tensile, free
@@ -87,7 +83,7 @@ class Setup(_Model):
     remarks: str | None = None
 
 
-class GapEntry(_Model):
+class GapEntry(KnownKeys):
     """Frames that never came, in device time of their segment."""
 
     segment: int
@@ -97,7 +93,7 @@ class GapEntry(_Model):
     stop_s: float
 
 
-class Event(_Model):
+class Event(KnownKeys):
     """Something that happened to the line, at the host's time since the recording began."""
 
     host_s: float
@@ -105,7 +101,7 @@ class Event(_Model):
     text: str
 
 
-class Counts(_Model):
+class Counts(KnownKeys):
     """Totals of a recording."""
 
     bytes_received: int = 0
@@ -127,7 +123,7 @@ class Counts(_Model):
     unknown_kinds: int | None = None  # frames of a kind that this version does not know
 
 
-class Session(_Model):
+class Session(KnownKeys):
     """One recording of one instrument."""
 
     format: Literal["rotorid-session-1"] = "rotorid-session-1"

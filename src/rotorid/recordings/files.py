@@ -9,15 +9,21 @@ import yaml
 from pydantic import ValidationError
 
 from rotorid.errors import InputError
+from rotorid.names import hint
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import check_belief
-from rotorid.recordings.explain import explain
-from rotorid.recordings.names import hint
 from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.tables import TooFewSamples, check_table, read_csv, read_parquet
-from rotorid.recordings.text_files import check_file, read_yaml
+from rotorid.recordings.tables import (
+    TooFewSamples,
+    check_table,
+    parquet_is_here,
+    read_csv,
+    read_parquet,
+    write_table,
+)
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.wording import printable
+from rotorid.text_files import check_file, read_yaml
+from rotorid.wording import explain, printable
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
@@ -190,18 +196,17 @@ def read_set(folder: Path) -> RecordingSet:
     return RecordingSet(folder.name, vehicle, tuple(runs), held_out, str(folder), tuple(left_out))
 
 
-def write_set(recordings: RecordingSet, parent: Path, suffix: str = ".parquet") -> Path:
-    """Write a set below `parent`; returns its folder. `suffix` is one of RUN_SUFFIXES."""
+def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:
+    """Write a set below `parent`; returns its folder.
+
+    `suffix` is one of RUN_SUFFIXES, by default .parquet, and .csv.gz where pyarrow is not installed.
+    """
+    suffix = suffix or (".parquet" if parquet_is_here() else ".csv.gz")
     folder = Path(parent) / recordings.name
     folder.mkdir(parents=True, exist_ok=True)
     write_vehicle(recordings.vehicle, folder / "vehicle.yaml")
     for run in recordings.runs:
-        path = folder / f"{run.name}{suffix}"
-        if suffix == ".parquet":
-            run.table.to_parquet(path, index=False)
-        else:
-            compression = {"method": "gzip", "mtime": 0} if suffix.endswith(".gz") else None
-            run.table.to_csv(path, index=False, compression=compression)
+        write_table(run.table, folder / f"{run.name}{suffix}")
     if recordings.held_out is not None:
         (folder / "split.yaml").write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
     return folder

@@ -29,17 +29,24 @@ class Run:
         """Time stamps, shape (n,), s."""
         return self.table[c.TIME].to_numpy(float)
 
+    @cached_property
+    def _with_values(self) -> frozenset[str]:
+        """Columns that hold at least one value; asked for so often that pandas would be a tenth of a short analysis."""
+        return frozenset(self.table.columns[self.table.notna().any()])
+
     def has(self, *names: str) -> bool:
         """Whether every named column is there with at least one value."""
-        return all(n in self.table.columns and self.table[n].notna().any() for n in names)
+        return self._with_values.issuperset(names)
 
     def array(self, names: tuple[str, ...]) -> np.ndarray:
         """Named columns as an array, shape (n, len(names)); NaN where missing."""
-        return self.table.reindex(columns=list(names)).to_numpy(float)
+        return np.array([self.column(name) for name in names]).reshape(len(names), len(self.table)).T
 
     def column(self, name: str) -> np.ndarray:
         """One column, shape (n,); NaN where missing."""
-        return self.array((name,))[:, 0]
+        if name not in self.table.columns:
+            return np.full(len(self.table), np.nan)
+        return self.table[name].to_numpy(float, copy=True)
 
     @property
     def unknown_columns(self) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.names import listed, nearest, plain
 from rotorid.recordings import columns as c
-from rotorid.recordings.names import listed, nearest, plain
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import place
 from rotorid.recordings.vehicle import Vehicle

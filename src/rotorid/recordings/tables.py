@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import zlib
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.text_files import check_file, check_text, read_bytes
+from rotorid.text_files import check_file, check_text, read_bytes
 from rotorid.wording import printable
 
 LARGEST_FILE = 4_000_000_000
@@ -32,7 +33,7 @@ class TooFewSamples(InputError):
 
 def read_csv(path: Path) -> pd.DataFrame:
     """The table of a CSV file, plain or gzipped, not yet checked for its clock."""
-    data = _unpacked(path) if path.name.endswith(".gz") else read_bytes(path, LARGEST_FILE)
+    data = unpacked(path) if path.name.endswith(".gz") else read_bytes(path, LARGEST_FILE)
     check_text(data, path)
     data = data.removeprefix(b"\xef\xbb\xbf")
     heading = _heading(data, path)
@@ -45,11 +46,32 @@ def read_csv(path: Path) -> pd.DataFrame:
     return _numbers(table, path)
 
 
+NO_PARQUET = "Parquet files need pyarrow, which is not installed: pip install 'rotorid[parquet]'"
+
+
+def parquet_is_here() -> bool:
+    """Whether Parquet files can be read and written: pyarrow is large, and a verdict on CSV does without it."""
+    return find_spec("pyarrow") is not None
+
+
+def write_table(table: pd.DataFrame, path: Path) -> None:
+    """Write a run by the suffix of its file, one of .csv, .csv.gz and .parquet; the same bytes every time."""
+    if path.name.endswith(".parquet"):
+        if not parquet_is_here():
+            raise InputError(f"{path}: {NO_PARQUET}")
+        table.to_parquet(path, index=False)
+    else:
+        compression = {"method": "gzip", "mtime": 0} if path.name.endswith(".gz") else None
+        table.to_csv(path, index=False, compression=compression)
+
+
 def read_parquet(path: Path) -> pd.DataFrame:
     """The table of a Parquet file, not yet checked for its clock."""
+    check_file(path)
+    if not parquet_is_here():
+        raise InputError(f"{path}: {NO_PARQUET}")
     import pyarrow.parquet as parquet
 
-    check_file(path)
     try:
         with parquet.ParquetFile(path) as file:
             cells = file.metadata.num_rows * max(file.metadata.num_columns, 1)
@@ -101,7 +123,7 @@ def _like_time(name: str) -> bool:
     return name.lower().strip("_ ").startswith(("time", "timestamp")) or name.lower() in ("t", "t_s", "sec", "seconds")
 
 
-def _unpacked(path: Path) -> bytes:
+def unpacked(path: Path) -> bytes:
     """Content of a gzipped file; InputError where it is none, is cut off or unpacks to far more than a log would."""
     packed = read_bytes(path, LARGEST_FILE)
     if not packed:

@@ -64,7 +64,7 @@ def read_bytes(path: Path, most: int) -> bytes:
         raise InputError(f"{path}: has {size / 1e6:.3g} MB, expected at most {most / 1e6:.3g} MB")
     try:
         with open(path, "rb") as file:
-            return file.read(most + 1)
+            return file.read(size + 1)  # not more: Python makes room for all that is asked for
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
 

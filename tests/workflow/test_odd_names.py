@@ -1,0 +1,86 @@
+"""Names through Snakemake, and two workflows at once."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from copied_project import Project
+
+from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
+from rotorid.recordings import columns as c
+
+SET = "-rf 'it' \"is\" $x$ #a & 100% *"
+RUNS = ("-o", "$\\frac 1$", "&lt;img&gt;; rm")
+
+
+def bench_set(folder: Path, name: str, runs: tuple[str, ...]) -> Path:
+    """A bench whose gain is wrong by a tenth."""
+    rng = np.random.default_rng(3)
+    made = []
+    for run in sorted(runs):
+        load = np.repeat(rng.uniform(-20, 20, (12, 3)), 25, axis=0)
+        reading = load * [1.1, 1.0, 1.0] + 0.05 * rng.standard_normal(load.shape)
+        columns = {c.TIME: np.arange(len(load)) / 25}
+        columns |= dict(zip(c.FORCE, reading.T, strict=True)) | dict(zip(c.REFERENCE_FORCE, load.T, strict=True))
+        made.append(Run(run, pd.DataFrame(columns)))
+    return write_set(RecordingSet(name, Vehicle(name=name, kind="bench", tared=True), tuple(made)), folder, ".csv")
+
+
+@pytest.mark.slow
+def test_odd_names_of_set_and_runs_go_through_snakemake(project: Project, tmp_path: Path) -> None:
+    bench_set(tmp_path / "sets", SET, RUNS)
+    target = f"results/mismatch/{SET}/verdict.json"
+    project.snakemake(target, "--config", f"recordings={tmp_path / 'sets'}")
+    found = json.loads((project.root / target).read_text())
+    assert found["set"] == SET and {*found["runs"]["training"], *found["runs"]["held_out"]} == set(RUNS)
+    assert list(found["parameters"]) and not (project.root / "x").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", ["a{x}", "<img src=x>"])
+def test_names_that_snakemake_takes_for_its_own_are_refused(run: str, project: Project, tmp_path: Path) -> None:
+    """Before: angle brackets were an undefined path variable."""
+    folder = bench_set(tmp_path / "sets", "one", (run,))
+    said = project.snakemake(
+        "results/mismatch/one/verdict.json", "--config", f"recordings={tmp_path / 'sets'}", succeeds=False
+    )
+    wanted = "Snakemake takes braces and angle brackets in a name for its own; rename it without them"
+    assert f"{folder / run}.csv: {wanted}" in said and not (project.root / "results" / "mismatch").exists()
+
+
+@pytest.mark.slow
+def test_a_wrong_row_of_the_index_is_one_sentence(project: Project) -> None:
+    """Before: a row that lacks cells ended in a traceback of the rule file."""
+    index = project.root / "raw" / "sessions.tsv"
+    lines = index.read_text().splitlines()
+    index.write_text("\n".join([*lines[:3], "short\tline", *lines[3:]]) + "\n")
+    said = project.snakemake("--dry-run", succeeds=False)
+    assert "sessions.tsv, line 4: has 2 cells, expected 22" in said and "Traceback" not in said
+
+
+@pytest.mark.slow
+def test_the_second_of_two_workflows_waits_for_nobody_and_spoils_nothing(project: Project, tmp_path: Path) -> None:
+    bench_set(tmp_path / "sets", "one", ("a", "b", "c"))
+    target = "results/mismatch/one/verdict.json"
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", target, "--configfile", "tests/configs/small.yaml"]
+    command += ["--config", f"recordings={tmp_path / 'sets'}"]
+    first = subprocess.Popen(command, cwd=project.root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    locks = project.root / ".snakemake" / "locks"
+    while first.poll() is None and not (locks.is_dir() and any(locks.iterdir())):
+        time.sleep(0.1)
+    second = subprocess.run(command, cwd=project.root, capture_output=True, text=True)
+    said, _ = first.communicate()
+    assert first.returncode == 0, said
+    assert second.returncode != 0 and "locked" in second.stdout + second.stderr
+    whole = (project.root / target).read_bytes()
+    shutil.rmtree(project.root / "results" / "mismatch")
+    project.snakemake(target, "--config", f"recordings={tmp_path / 'sets'}")
+    assert (project.root / target).read_bytes() == whole
