@@ -3,12 +3,12 @@
  *
  *   ESC of motors 1 to 4   GPIO 25, 26, 27, 33 (50 pulses a second, 1 to 2 ms)
  *   battery voltage        GPIO 34 (ADC1 channel 6) behind a divider of 11
- *   lamp                   GPIO 16 red, 17 yellow, 18 green
+ *   lamp                   GPIO 16 red, 17 yellow, 18 green (modules with PSRAM need 16 and 17 themselves: take others)
  *
- * Build: cd firmware/esp32 && idf.py set-target esp32 && idf.py -p PORT flash
+ * Build: cd firmware/esp32 && idf.py set-target esp32 && idf.py -p PORT flash   (ESP-IDF 5.2 or newer)
  *
- * `make -C firmware esp32-form` looks at this file on any computer against the declarations in tests/esp_idf, which
- * are only those used here. It has not been built by Espressif's compiler nor run on a board.
+ * Without Espressif's tools: `make -C firmware esp32-xtensa` compiles it by Debian's Xtensa GCC, `make -C firmware
+ * host` makes a program of this computer of it, both against tests/esp_idf. It has not been on a board.
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -39,6 +39,7 @@
 
 static const int esc_pins[4] = {25, 26, 27, 33};
 static const gpio_num_t lamp_pins[3] = {GPIO_NUM_16, GPIO_NUM_17, GPIO_NUM_18};
+static uint32_t pulse_steps[4]; /* as the controller has them */
 static adc_oneshot_unit_handle_t adc;
 static char serial_number[13];
 
@@ -76,6 +77,8 @@ uint32_t board_boot_count(void) {
 void quadrotor_motors(const uint16_t throttle[4]) {
     for (int i = 0; i < 4; i++) {
         uint32_t steps = STEPS_PER_MS + STEPS_PER_MS * throttle[i] / 10000u;
+        if (steps == pulse_steps[i]) continue; /* this is asked far oftener than a pulse comes */
+        pulse_steps[i] = steps;
         ledc_set_duty(LEDC_LOW_SPEED_MODE, (ledc_channel_t)i, steps);
         ledc_update_duty(LEDC_LOW_SPEED_MODE, (ledc_channel_t)i);
     }
@@ -109,6 +112,7 @@ static void set_up_motors(void) {
             .duty = STEPS_PER_MS, /* zero throttle from the first pulse on */
         };
         ESP_ERROR_CHECK(ledc_channel_config(&channel));
+        pulse_steps[i] = STEPS_PER_MS;
     }
 }
 
@@ -124,7 +128,10 @@ static void set_up(void) {
     const adc_oneshot_chan_cfg_t input = {.atten = ADC_ATTEN_DB_12, .bitwidth = ADC_BITWIDTH_12};
     uint8_t mac[6] = {0};
     set_up_motors(); /* first: an ESC without pulses beeps, one with a stray pulse turns */
-    for (uint8_t i = 0; i < 3; i++) gpio_set_direction(lamp_pins[i], GPIO_MODE_OUTPUT);
+    for (uint8_t i = 0; i < 3; i++) {
+        ESP_ERROR_CHECK(gpio_reset_pin(lamp_pins[i]));
+        ESP_ERROR_CHECK(gpio_set_direction(lamp_pins[i], GPIO_MODE_OUTPUT));
+    }
     if (nvs_flash_init() != ESP_OK) { /* a full or old partition */
         ESP_ERROR_CHECK(nvs_flash_erase());
         ESP_ERROR_CHECK(nvs_flash_init());

@@ -6,13 +6,10 @@
  */
 #define _GNU_SOURCE
 #include <errno.h>
-#include <fcntl.h>
 #include <poll.h>
-#include <pty.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <termios.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -20,6 +17,7 @@
 #include "../instruments/bench.h"
 #include "../instruments/quadrotor.h"
 #include "../instruments/rotor.h"
+#include "pseudo_terminal.h"
 
 const char board_firmware[] = FIRMWARE " (simulated)";
 const char board_serial_number[] = "HOST-1";
@@ -94,24 +92,12 @@ uint16_t quadrotor_voltage_mv(void) { return 16000; }
 void quadrotor_led(uint8_t colour) { (void)colour; }
 
 int main(int argc, char **argv) {
-    int slave;
-    struct termios raw;
-    if (argc != 3 || openpty(&master, &slave, NULL, NULL, NULL)) {
+    if (argc != 3) {
         fprintf(stderr, "usage: %s LINK BOOT_COUNT_FILE\n", argv[0]);
         return 2;
     }
-    tcgetattr(slave, &raw);
-    cfmakeraw(&raw);
-    tcsetattr(slave, TCSANOW, &raw);
-    fcntl(master, F_SETFL, O_NONBLOCK);
     boot_file = argv[2];
-    unlink(argv[1]);
-    if (symlink(ttyname(slave), argv[1])) {
-        perror(argv[1]);
-        return 1;
-    }
-    printf("ready\n");
-    fflush(stdout);
+    if ((master = open_pseudo_terminal(argv[1])) < 0) return 1;
     device_boot();
     for (;;) {
         struct pollfd wait = {master, POLLIN, 0};

@@ -18,7 +18,7 @@ static struct answer start(void) {
 const struct instrument instrument = {
     .name = "bench",
     .interval_us = 20000,
-    .shortest_us = 3800, /* three conversions of 1.18 ms, and their commands */
+    .shortest_us = 3800, /* three conversions of 1.18 ms; what their commands take beyond is counted as skipped */
     .payload = 24,
     .starts_with_g = true,
     .read = read,

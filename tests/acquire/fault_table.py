@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
 
 HELD = "held when it was first tried"
 TABLE: list[tuple[str, str, str]] = []  # fault, what was seen before, test
@@ -23,7 +25,7 @@ def seen(fault: str, before: str = HELD) -> Callable:
 
 def show() -> None:
     """Print the table: fault, what was seen before, test."""
-    from tests.acquire import test_fault_table, test_faults  # noqa: F401 - importing them fills it
-
+    for path in sorted(Path(__file__).parent.glob("test_*.py")):  # importing them fills it
+        import_module(f"{__package__}.{path.stem}")
     for fault, before, test in TABLE:
         print(f"{fault}\t{before}\t{test}")

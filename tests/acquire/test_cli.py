@@ -19,6 +19,7 @@ from rotorid.acquire.identify import stable_name, udev_rule, who_is_there
 from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
+from tests.acquire.fault_table import seen
 
 ACQUIRE = [sys.executable, "-m", "rotorid.acquire"]
 
@@ -160,6 +161,7 @@ def test_ports_say_who_is_there(plugged):
     assert "rotor, firmware rotor 1.2 (emulated)" in result.output and "no such port" in result.output
 
 
+@seen("a device of no kind of ours on the port", "the message did not say what was heard")
 def test_a_port_with_another_device_says_what_was_heard(tmp_path):
     master, slave = os.openpty()
     over = threading.Event()
@@ -249,6 +251,13 @@ def test_live_view_in_a_terminal(plugged, recorder_on):
     assert "load-cell bench · finished" in text and "cell_6_v" in text and "remaining" in text
     assert len(read_log(recorder.log_path).table) >= 2000
     assert "cell_1_v" in plot.render().plain
+
+
+def test_noise_of_a_curve_is_not_the_load_that_was_put_on():
+    plot, noise = Plot("cell_1_v", 0), np.random.default_rng(1).normal(0, 2e-7, 600)
+    for number, value in enumerate(noise):
+        plot.see((value + 2.5e-5 * min(max(number - 300, 0) / 20, 1),))  # in 0.4 s
+    assert float(plot.render().plain.split("noise")[1].split()[0]) == pytest.approx(2e-7, rel=0.3)
 
 
 def test_braille_curve_by_hand():

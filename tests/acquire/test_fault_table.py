@@ -303,12 +303,13 @@ def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
 # ---- 4. every end stops the device ------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
 @seen("SIGHUP: the terminal is closed", "the recorder died, the device streamed on, metadata said 'recording'")
-def test_hang_up_stops_the_device(plugged, tmp_path):
+def test_hang_up_stops_the_device(plugged, tmp_path, number):
     ports = plugged("bench", speed=20.0)
     process = start_recorder(ports.names[0], tmp_path)
     wait_for_bytes(process, tmp_path / "run.rlog", 3000)
-    process.send_signal(signal.SIGHUP)
+    process.send_signal(number)
     process.communicate(timeout=20)
     log = read_log(tmp_path / "run.rlog")
     assert log.complete and log.session.ended == Ended.INTERRUPTED

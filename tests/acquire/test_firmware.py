@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
@@ -20,13 +21,15 @@ from rotorid.acquire.recorder import Timings
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended
 from rotorid.io.wire.bench import VOLTS_PER_COUNT
-from rotorid.io.wire.quadrotor import SINE, Programme
+from rotorid.io.wire.quadrotor import SINE, TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
+from tests.acquire.fault_table import seen
 from tests.acquire.test_faults import assert_metadata_agree
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 needs_gcc = pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("make")), reason="gcc")
+needs_xtensa = pytest.mark.skipif(not shutil.which("xtensa-lx106-elf-gcc"), reason="gcc-xtensa-lx106 and picolibc")
 needs_avr = pytest.mark.skipif(not (shutil.which("avr-gcc") and SIMAVR.exists()), reason="avr-gcc")
 pytestmark = pytest.mark.xdist_group("firmware")  # one build at a time
 
@@ -41,15 +44,25 @@ def made(*targets: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+def started(command: list[str]) -> subprocess.Popen:
+    """Start a program that may have been linked a moment ago: some file systems hold it as being written a little on."""
+    deadline = time.monotonic() + 5
+    while True:
+        try:
+            return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        except OSError as error:
+            if error.errno != errno.ETXTBSY or time.monotonic() > deadline:
+                raise
+        time.sleep(0.05)
+
+
 @pytest.fixture
 def run_program(tmp_path) -> Iterator[Callable[..., subprocess.Popen]]:
     """Start a program that makes a port; it is ready when this returns, and gone after the test."""
     with ExitStack() as stack:
 
         def start(*command: str | Path) -> subprocess.Popen:
-            process = subprocess.Popen(
-                [str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-            )
+            process = started([str(word) for word in command])
             stack.callback(lambda: (process.kill(), process.communicate()))
             while "ready" not in process.stdout.readline():
                 assert process.poll() is None
@@ -59,10 +72,10 @@ def run_program(tmp_path) -> Iterator[Callable[..., subprocess.Popen]]:
 
 
 @pytest.fixture
-def on_host(run_program, tmp_path) -> Callable[[str], str]:
-    def start(instrument: str) -> str:
+def on_host(run_program, tmp_path) -> Callable[..., str]:
+    def start(instrument: str, *more: Path) -> str:
         made("host")
-        run_program(FIRMWARE / "build" / "host" / instrument, tmp_path / "tty", tmp_path / "boots")
+        run_program(FIRMWARE / "build" / "host" / instrument, tmp_path / "tty", tmp_path / "boots", *more)
         return str(tmp_path / "tty")
 
     return start
@@ -79,15 +92,13 @@ def on_avr(run_program, tmp_path) -> Callable[..., tuple[str, subprocess.Popen]]
     return start
 
 
-def assert_pattern(log: Log, whole: bool = True) -> None:
-    """Cell k of scan n reads 1000 n + k − 1; no scan is missing, unless the line lost one."""
+def assert_pattern(log: Log) -> None:
+    """Cell k of scan n reads 1000 n + k − 1; a scan is missing only where the line lost a sample that was counted."""
     counts = np.rint(log.table[list(log.instrument.columns)].to_numpy() / VOLTS_PER_COUNT).astype(int)
     np.testing.assert_array_equal(counts % 1000, np.tile(np.arange(6), (len(counts), 1)))
-    for _, part in log.table.groupby("segment"):
-        scans = counts[part.index, 0] // 1000
-        np.testing.assert_array_equal(np.diff(scans), 1)
-        if whole:
-            np.testing.assert_array_equal(np.diff(part["index"]), 1)
+    steps = [np.diff(counts[part.index, 0] // 1000) for _, part in log.table.groupby("segment")]
+    assert min(step.min() for step in steps) == 1
+    assert sum((step - 1).sum() for step in steps) <= log.missing
 
 
 # ---- the protocol core on this computer -------------------------------------------------------------------
@@ -98,10 +109,59 @@ def test_core_under_sanitizers_takes_any_bytes():
     made("check", "FUZZ_S=2")
 
 
+@needs_xtensa
+def test_esp32_program_is_code_for_its_family_of_processors():
+    """Debian's GCC for the ESP8266 takes every file of it without a word. It says nothing of a board."""
+    shutil.rmtree(FIRMWARE / "build" / "xtensa", ignore_errors=True)
+    made("esp32-xtensa")
+    objects = sorted((FIRMWARE / "build" / "xtensa").glob("*.o"))
+    assert [path.stem for path in objects] == ["device", "esp32", "frame", "quadrotor"]
+    for path in objects:
+        head = path.read_bytes()[:20]
+        assert head[:4] == b"\x7fELF" and int.from_bytes(head[18:20], "little") == 94  # EM_XTENSA
+
+
 @needs_gcc
-def test_form_of_the_esp32_board_file():
-    """Against declarations of our own: it says nothing of Espressif's compiler, nor of a board."""
-    made("esp32-form")
+def test_esp32_board_file_sends_each_frame_and_gives_the_pulses_of_its_programme(on_host, recorder_on, tmp_path):
+    boots = []
+    for name in ("a", "b"):
+        recorder = recorder_on("quadrotor", on_host("esp32", tmp_path / "pulses"))
+        with recorder:
+            procedures.fly_programme(recorder, "h", Programme(TRAPEZOID, (0.4, 0.2, 0.1, 0.3), 0.2, 0.4, 0.0))
+        log = read_log(recorder.log_path)
+        assert log.complete and log.end.reason == 1 and log.missing == 0 and log.session.source == "emulator"
+        assert log.end.sent == len(log.table) > 50 and log.end.skipped == log.session.counts.device_skipped
+        assert (log.start.instrument, log.start.serial_number) == ("quadrotor", "240AC4000102")
+        np.testing.assert_allclose(log.table.battery_voltage_v, 16.0, atol=0.02)
+        boots.append(log.start.boot_id)
+        table = np.loadtxt(tmp_path / "pulses", dtype=int)[4:]  # four lines set the channels up
+        zero_ms = 2**14 // 20  # steps in a millisecond of 50 pulses a second
+        assert (table[:, 1:5].max(axis=0) == [zero_ms + zero_ms * share // 10 for share in (4, 2, 1, 3)]).all()
+        assert (table[[0, -1], 1:5] == zero_ms).all()
+        lamps = [int(pin) for pin in table[:, 5]]
+        assert lamps[0] == lamps[-1] == 16 and {16, 17, 18} == set(lamps)  # red, yellow, green
+        for path in (recorder.log_path, recorder.session_path):
+            path.rename(path.with_stem(name))
+        assert_metadata_agree(log)
+    assert boots == [1, 2]
+
+
+@needs_gcc
+def test_esp32_board_file_takes_the_pulses_back_when_nobody_is_heard(on_host, recorder_on, tmp_path):
+    port = on_host("esp32", tmp_path / "pulses")
+    recorder = recorder_on("quadrotor", port, Timings(poll_s=0.02, reply_s=0.5, watchdog_s=0.3))
+    with pytest.raises(DeviceFault, match="heard nothing"):
+        with recorder:
+            procedures.start_programme(recorder, "b", Programme(SINE, (0.4, 0.4, 0.4, 0.4), 0.0, 30.0, 1.0))
+            for _ in recorder.rows(10):
+                pass
+            time.sleep(1.0)
+            for _ in recorder.rows(500):
+                pass
+    log = read_log(recorder.log_path)
+    assert log.end.reason == 3 and log.session.ended == Ended.DEVICE_FAULT and log.table.throttle_1.max() > 0
+    pulses = np.loadtxt(tmp_path / "pulses", dtype=int)
+    assert (pulses[-1, 1:5] == 2**14 // 20).all() and pulses[:, 1].max() > 2**14 // 20
 
 
 @needs_gcc
@@ -194,6 +254,8 @@ def test_avr_every_sample_of_the_pattern(on_avr, recorder_on, rate_hz):
     log = read_log(recorder.log_path)
     assert_pattern(log)
     assert log.missing == 0 and log.end.sent == len(log.table) >= wanted
+    # A byte on the simulated SPI takes about 0.1 ms, six channels 9.5 ms: only at 250 Hz is any skipped.
+    assert (log.end.skipped > 0) == (rate_hz == 250)
     # what the device says it skipped is what its clock says: sent and skipped fill the time
     spanned = round(log.table.time_s.iloc[-1] * rate_hz) + 1
     assert abs(log.end.sent + log.end.skipped - spanned) <= 2
@@ -210,6 +272,7 @@ def test_avr_an_interval_it_cannot_do_is_refused(on_avr, recorder_on):
 
 @needs_avr
 @pytest.mark.parametrize("word", ["reset", slow("brownout")])
+@seen("reset and brown-out of the simulated UNO in the midst of a recording")
 def test_avr_reset_in_the_midst(on_avr, recorder_on, word):
     port, process = on_avr()
     recorder = recorder_on("bench", port, Timings(poll_s=0.02, reply_s=1.0, silence_s=1.0, reconnect_s=20))
@@ -231,6 +294,7 @@ def test_avr_reset_in_the_midst(on_avr, recorder_on, word):
 
 @needs_avr
 @pytest.mark.slow
+@seen("the computer looks away for a second, the simulated UNO sends on")
 def test_avr_and_host_starved_of_time(on_avr, recorder_on):
     """The computer looks away for a second: the port's buffers hold what they can, and every loss is counted."""
     port, process = on_avr(speed=1)
@@ -248,7 +312,7 @@ def test_avr_and_host_starved_of_time(on_avr, recorder_on):
         procedures.stream(recorder, 120, 0.01)
     log = read_log(recorder.log_path)
     assert log.end.sent == len(log.table) + log.missing and log.resets == 0
-    assert_pattern(log, whole=log.missing == 0)
+    assert_pattern(log)
     assert_metadata_agree(log)
 
 

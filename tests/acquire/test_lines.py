@@ -7,6 +7,7 @@ import os
 import threading
 import time
 import tty
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -19,9 +20,11 @@ from rotorid.acquire.errors import BadName, DeviceSilent, Interrupted
 from rotorid.acquire.lines import record_lines
 from rotorid.acquire.transport import SerialTransport
 from rotorid.acquire.view import LinesPanel, Plot
+from rotorid.io import rawlog
 from rotorid.io.lines import Description, DescriptionError, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
-from rotorid.io.session import Ended, read_session
+from rotorid.io.session import Ended, Session, read_session, write_session
+from tests.acquire.fault_table import seen
 
 ROOT = Path(__file__).parents[2]
 FORMS = {
@@ -145,8 +148,8 @@ def test_a_silent_line_ends_with_a_sentence(line, tmp_path):
     assert (tmp_path / "run.yaml").exists()
 
 
+@seen("plain lines: Ctrl-C, a silence, a limit", "the instrument streamed on")
 def test_an_instrument_is_told_to_stop_whatever_the_end(line, tmp_path):
-    """Before: after Ctrl-C, a silence or a limit it streamed on."""
     master, port = line
     description, stop = Description(name="x", end="S\r\n", **FORMS["csv"][0]), threading.Event()
     stop.set()
@@ -156,6 +159,29 @@ def test_an_instrument_is_told_to_stop_whatever_the_end(line, tmp_path):
     with pytest.raises(DeviceSilent):
         record_lines(description, SerialTransport(port, 9600), SystemClock(), tmp_path, "b", silence_s=0.05)
     assert os.read(master, 100) == b"S\r\n"
+
+
+@seen("a bit of a log of plain lines flipped", "two halves made a line of a wrong number, and nothing was told")
+def test_damage_joins_no_halves_of_lines_and_is_told(tmp_path):
+    description = Description(name="x", **FORMS["csv"][0])
+    parts = [b"0.0,1.5\n0.1,2", b".5\n0.2,3.", b"5\n0.3,4.5\n"]
+    chunks = [rawlog.pack_chunk(RECEIVED, 10**9 + number, part) for number, part in enumerate(parts)]
+    path = tmp_path / "run.rlog"
+    path.write_bytes(rawlog.MAGIC + b"".join(chunks))
+    told = {"name": "lines", "description": description.model_dump(mode="json", exclude_none=True)}
+    whole = sha256(path.read_bytes()).hexdigest()
+    session = Session(
+        id="run", instrument="x", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log=path.name, log_sha256=whole
+    )
+    write_session(session.model_copy(update={"procedure": told, "ended": Ended.FINISHED}), tmp_path / "run.yaml")
+    assert list(read_line_log(path).table.force_z_n) == [3.0, 5.0, 7.0, 9.0] and not read_line_log(path).faults
+    data = bytearray(path.read_bytes())
+    data[len(rawlog.MAGIC) + len(chunks[0]) + 15] ^= 1  # inside the second
+    path.write_bytes(data)
+    found = read_line_log(path)
+    assert list(found.table.force_z_n) == [3.0, 9.0] and len(found.faults) == 2  # not 2 and 5 as 25
+    shown = CliRunner().invoke(app, ["check", str(path)])
+    assert shown.exit_code == 1 and shown.output.count("NOT AS RECORDED") == 2
 
 
 def test_a_limit_ends_the_recording_and_columns_are_those_of_the_description(line, tmp_path):
@@ -188,7 +214,7 @@ def test_the_look_at_lines_while_recording():
     console = Console(width=100, file=io.StringIO())
     console.print(panel.render(), plot.render())
     shown = console.file.getvalue()
-    for words in ("20/40", "10.0", "2.0", "19", "noise of the last 20: 5.77"):
+    for words in ("20/40", "10.0", "2.0", "19", "noise 0.707"):
         assert words in shown, shown
 
 

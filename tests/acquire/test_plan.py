@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
+import pty
+import struct
 import subprocess
 import sys
+import termios
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -21,6 +26,7 @@ from rotorid.acquire.run_plan import Desk, check, emulated_ports, run
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
 from rotorid.io.session import Ended
+from tests.acquire.fault_table import seen
 
 GROUP = {
     "name": "quiet-{load_gf}-r{repeat}",
@@ -97,6 +103,10 @@ def test_steps_one_by_one_one_skipped_one_again_and_the_index(tmp_path, emulated
     assert any("put 100.0 gf on" in text for text in told) and "2 left" in " ".join(told)
 
 
+@seen(
+    "a campaign of 20 steps killed twice",
+    "two ballasts of 64 KiB stayed, and sessions.tsv said 0 samples of the two recordings that were broken off",
+)
 def test_a_campaign_of_twenty_steps_killed_twice(tmp_path):
     """By the command line; what was killed has left its log, and the next start goes on."""
     plan = plan_with(tmp_path, ports={"bench": "/dev/b"})
@@ -111,14 +121,44 @@ def test_a_campaign_of_twenty_steps_killed_twice(tmp_path):
         process.wait()
         done = sum(is_done(plan, step) for step in steps_of(plan))
         assert killed_at - 2 <= done <= killed_at
-    finished = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    finished = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert finished.returncode == 0 and "20 of 20 recordings are there" in finished.stdout, finished.stderr
     shown = CliRunner().invoke(app, ["campaign", str(tmp_path / "plan.yaml"), "--show"]).output.splitlines()
     assert len(shown) == 20 and all(line.startswith("done") for line in shown)
-    rows = [row for row in read_index(plan.out) if row["kind"] == "free" and row["id"].startswith("quiet")]
-    assert 20 <= len(rows) <= 22 and sum(row["ended"] == "finished" for row in rows) in (20, 21)
+    rows = [row for row in read_index(plan.out) if row["id"].startswith("quiet")]
+    whole = [row for row in rows if row["ended"] == "finished"]
+    broken_off = [row for row in rows if row["ended"] == "recording"]
+    assert len(whole) == 20 and len(broken_off) <= 2 and len(rows) == len(whole) + len(broken_off)
+    for row in rows:  # nothing that came before a kill is lost: counts are those of the log
+        log = read_log(plan.out / row["file"])
+        assert int(row["samples"]) == len(log.table) and log.missing == 0
+    assert not list(plan.out.rglob("*.ballast"))
 
 
+def test_curves_of_a_campaign_in_a_terminal(tmp_path):
+    """Two channels drawn while each step is recorded; a column of no instrument of the plan is a mistake."""
+    plan_with(tmp_path, [GROUP | {"over": {"load_gf": [0.0, 100.0]}, "repeats": 1}], ports={"bench": "/dev/b"})
+    words = ["campaign", str(tmp_path / "plan.yaml"), "--emulate", "--speed", "20", "--place-s", "0.2"]
+    assert CliRunner().invoke(app, [*words, "--plot", "throttle"]).exit_code == 2
+    master, slave = pty.openpty()
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 160, 0, 0))
+    command = [sys.executable, "-m", "rotorid.acquire", *words, "--plot", "cell_1_v", "--plot", "cell_4_v"]
+    process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=os.environ | {"TERM": "xterm"})
+    os.close(slave)
+    shown = b""
+    with suppress(OSError):  # the terminal ends with the program
+        while part := os.read(master, 65536):
+            shown += part
+    os.close(master)
+    text = shown.decode()
+    assert process.wait() == 0 and "2 of 2 recordings are there" in text
+    assert "step 1 of 2 (2 left)" in text and "step 2 of 2 (1 left)" in text
+    for column in ("cell_1_v", "cell_4_v"):
+        assert text.count(f"{column}   noise ") >= 2
+    assert any(0x2800 < ord(sign) <= 0x28FF for sign in text)  # dots of a curve
+
+
+@seen("a log of a campaign damaged after it was recorded")
 def test_a_log_damaged_later_is_to_be_recorded_again(tmp_path, emulated):
     plan = plan_with(tmp_path, [GROUP | {"over": {"load_gf": [0.0]}, "repeats": 1}])
     run(plan, emulated(plan), desk([]), checked=True)
@@ -132,6 +172,7 @@ def test_a_log_damaged_later_is_to_be_recorded_again(tmp_path, emulated):
     assert run(plan, emulated(plan), desk([]), checked=True) == 0 and len(attempts(plan, step)) == 2
 
 
+@seen("a reading beyond its limit", "there were no limits: the motor turned on")
 def test_a_limit_stops_motor_and_campaign(tmp_path, emulated):
     thrust = {"name": "t-{throttle}", "do": "thrust", "over": {"throttle": [0.1, 0.5, 0.2]}}
     plan = plan_with(

@@ -1,5 +1,5 @@
-/* Of ESP-IDF 5.x only what boards/esp32.c uses, as its documentation declares it: to look at that file's form on a
- * computer without Espressif's tools. Nothing of this is linked. */
+/* Of ESP-IDF 5 only what boards/esp32.c uses, declared as its headers do (fewer fields and values): so that the file is
+ * compiled where Espressif's tools are not, and run on a computer against host.c. */
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
@@ -12,6 +12,7 @@ typedef int esp_err_t;
 /* driver/gpio.h */
 typedef enum { GPIO_NUM_16 = 16, GPIO_NUM_17 = 17, GPIO_NUM_18 = 18 } gpio_num_t;
 typedef enum { GPIO_MODE_OUTPUT = 2 } gpio_mode_t;
+esp_err_t gpio_reset_pin(gpio_num_t pin);
 esp_err_t gpio_set_direction(gpio_num_t pin, gpio_mode_t mode);
 esp_err_t gpio_set_level(gpio_num_t pin, uint32_t level);
 
@@ -55,7 +56,8 @@ typedef struct {
     uart_hw_flowcontrol_t flow_ctrl;
 } uart_config_t;
 typedef uint32_t TickType_t;
-esp_err_t uart_driver_install(uart_port_t port, int rx, int tx, int queue_size, void *queue, int flags);
+typedef struct QueueDefinition *QueueHandle_t;
+esp_err_t uart_driver_install(uart_port_t port, int rx, int tx, int queue_size, QueueHandle_t *queue, int flags);
 esp_err_t uart_param_config(uart_port_t port, const uart_config_t *config);
 int uart_read_bytes(uart_port_t port, void *buffer, uint32_t length, TickType_t wait);
 int uart_write_bytes(uart_port_t port, const void *bytes, size_t n);
@@ -77,7 +79,8 @@ esp_err_t adc_oneshot_read(adc_oneshot_unit_handle_t unit, adc_channel_t channel
 /* esp_mac.h, esp_timer.h, esp_task_wdt.h, freertos/task.h, nvs.h, nvs_flash.h */
 esp_err_t esp_efuse_mac_get_default(uint8_t *mac);
 int64_t esp_timer_get_time(void);
-esp_err_t esp_task_wdt_add(void *task);
+typedef struct tskTaskControlBlock *TaskHandle_t;
+esp_err_t esp_task_wdt_add(TaskHandle_t task);
 esp_err_t esp_task_wdt_reset(void);
 void vTaskDelay(TickType_t ticks);
 typedef uint32_t nvs_handle_t;

@@ -467,6 +467,9 @@ def campaign(
     emulate_it: Annotated[bool, typer.Option("--emulate", help="with emulators in the place of the ports")] = False,
     speed: Annotated[float, typer.Option(help="of the emulators, device seconds per second")] = 20.0,
     place_s: Annotated[float | None, typer.Option(help="give a load so many seconds; nobody is asked")] = None,
+    plot: Annotated[
+        list[str] | None, typer.Option("--plot", help="draw this column while it is recorded; repeatable")
+    ] = None,
 ) -> None:
     """Record a campaign by its plan: checks first, then step after step; goes on where it was left."""
     from functools import partial
@@ -489,6 +492,7 @@ def campaign(
     if repeat is not None and repeat not in [step.name for step in steps]:
         near = get_close_matches(repeat, [step.name for step in steps], 1)
         _fail(f"{plan}: no step is called {repeat!r}" + (f"; did you mean {near[0]}?" if near else ""))
+    _of([column for instrument in planned.ports for column in INSTRUMENTS[instrument].columns], plot)
     wait_s = place_s if place_s is not None else (4.0 if emulate_it else None)
 
     def ask(text: str) -> str:
@@ -501,7 +505,7 @@ def campaign(
     def watch(recorders: list[Recorder], work: Callable[[], None]) -> None:
         for recorder in recorders:
             recorder.stop_asked = stop
-        view.watch(recorders, work, stop, [], console)
+        view.watch(recorders, work, stop, _curves(recorders, plot), console)
 
     desk = run_plan.Desk(
         say=lambda text: console.print(text),
@@ -554,15 +558,9 @@ def _record(
         )
     except AcquireError as error:
         _fail(str(error))
-    plots = [
-        view.Plot.of(recorder, column)
-        for recorder in recorders
-        for column in shared.plot or []
-        if column in recorder.instrument.columns
-    ]
     code = 0
     try:
-        view.watch(recorders, lambda: run_with(recorders, run), stop, plots, console)
+        view.watch(recorders, lambda: run_with(recorders, run), stop, _curves(recorders, shared.plot), console)
     except Interrupted as error:
         console.print(str(error))
         code = 130
@@ -600,6 +598,16 @@ def _prompt(recorder: Recorder, place_s: float | None) -> procedures.Prompt:
     return prompt
 
 
+def _curves(recorders: list[Recorder], wanted: list[str] | None) -> list[view.Plot]:
+    """A curve of each wanted column of each recorder that has it."""
+    return [
+        view.Plot.of(recorder, column)
+        for recorder in recorders
+        for column in wanted or []
+        if column in recorder.instrument.columns
+    ]
+
+
 def _of(columns: list[str], wanted: list[str] | None) -> list[str]:
     """The columns that are to be drawn. Raises typer.BadParameter for one that is none."""
     for column in wanted or []:
@@ -618,9 +626,15 @@ def _check_lines(log: Path, csv: Path | None) -> bool:
     found = read_line_log(log)
     typer.echo(f"{log}: {len(found.table)} lines read, {found.unreadable} could not be", nl=False)
     typer.echo(f", {found.damaged_bytes} bytes damaged" if found.damaged_bytes else "")
+    if found.cut_at is not None:
+        typer.echo(f"cut off at byte {found.cut_at}; everything before that is there")
+    for fault in found.faults:
+        typer.echo(f"NOT AS RECORDED: {fault}")
     if csv is not None:
         found.table.to_csv(csv, index=False)
         typer.echo(f"table: {csv}")
+    if found.faults:
+        raise typer.Exit(1)
     return True
 
 

@@ -16,8 +16,9 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 class LogWriter:
     """An open raw log.
 
-    A ballast file beside it keeps 64 KiB of the disk in reserve. When the disk runs full the ballast is
-    given up, so that the chunk in hand and the session's metadata still find room; then DiskFull is raised.
+    A ballast keeps 64 KiB of the disk in reserve: a file that is open and has no name any more, so that it is gone with
+    this program, however that ends. When the disk runs full the ballast is given up, so that the chunk in hand and the
+    session's metadata still find room; then DiskFull is raised.
     """
 
     def __init__(self, path: Path, durable: bool = True) -> None:
@@ -27,11 +28,11 @@ class LogWriter:
         self.bytes_written = 0
         self.durable = durable
         self._synced_ns = 0
-        self._ballast = path.with_name(path.name + ".ballast")
+        self._ballast = -1
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         try:
             if durable:
-                self._ballast.write_bytes(bytes(BALLAST_BYTES))
+                self._take_ballast()
             self._append(rawlog.MAGIC)
         except OSError as error:
             self.discard()
@@ -48,13 +49,12 @@ class LogWriter:
             os.fsync(self._file)
         os.close(self._file)
         self._file = -1
-        self._ballast.unlink(missing_ok=True)
+        self._drop_ballast()
 
     def discard(self) -> None:
         """Leave nothing behind: for a recording that never began."""
         self.durable = False
         self.close()
-        self._ballast.unlink(missing_ok=True)
         self.path.unlink(missing_ok=True)
 
     def _write(self, packed: bytes, host_ns: int) -> None:
@@ -67,7 +67,7 @@ class LogWriter:
         except OSError as error:
             if error.errno not in FULL:
                 raise
-            self._ballast.unlink(missing_ok=True)
+            self._drop_ballast()
             full = self._full(error)
             try:
                 self._append(packed[self.bytes_written - start :])
@@ -75,6 +75,19 @@ class LogWriter:
             except OSError:  # not even the ballast's room was enough: the log ends in a cut chunk
                 pass
             raise full from error
+
+    def _take_ballast(self) -> None:
+        path = self.path.with_name(self.path.name + ".ballast")
+        self._ballast = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
+        path.unlink()
+        data = bytes(BALLAST_BYTES)
+        while data:
+            data = data[os.write(self._ballast, data) :]
+
+    def _drop_ballast(self) -> None:
+        if self._ballast >= 0:
+            os.close(self._ballast)
+            self._ballast = -1
 
     def _append(self, data: bytes) -> None:
         while data:

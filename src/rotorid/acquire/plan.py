@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from rotorid.acquire.recorder import NAME
 from rotorid.errors import InputError
 from rotorid.io.logs import LogError, read_log
-from rotorid.io.models import read_model
+from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import NotALog
 from rotorid.io.session import Ended, SessionError, Setup, read_session
 from rotorid.io.wire import INSTRUMENTS
-from rotorid.recordings.explain import explain
-from rotorid.recordings.names import hint
+from rotorid.names import hint
+from rotorid.wording import explain
 
 Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]
 NEEDS: dict[str, tuple[str, ...]] = {
@@ -54,11 +54,7 @@ class PlanError(InputError):
     """The plan is not what it should be; the sentence names file and place."""
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class Checks(_Model):
+class Checks(KnownKeys):
     """What is looked at before the first step. Keys of the dictionaries are columns."""
 
     disk_mb: float = 100
@@ -68,7 +64,7 @@ class Checks(_Model):
     clock_s: float = 5  # the newest recording in the folder may not be further in the future
 
 
-class Group(_Model):
+class Group(KnownKeys):
     """Steps of one kind: all combinations of `over`, each `repeats` times."""
 
     name: str  # of the recordings; {key} stands for a value of `over`, {repeat} for the repeat
@@ -82,7 +78,7 @@ class Group(_Model):
     settings: dict[str, Any] = {}  # of the procedure: samples, throttle, hold_s, number, …
 
 
-class Plan(_Model):
+class Plan(KnownKeys):
     """A campaign."""
 
     name: str
@@ -204,7 +200,7 @@ def attempts(plan: Plan, step: Step) -> list[str]:
     found = []
     for number in itertools.count(1):
         name = step.name if number == 1 else f"{step.name}.{number}"
-        files = [plan.out / f"{stem}{end}" for stem in _stems(step, name) for end in (".yaml", ".rlog", ".rlog.gz")]
+        files = [plan.out / f"{stem}{end}" for stem in stems(step, name) for end in (".yaml", ".rlog", ".rlog.gz")]
         if not any(path.exists() for path in files):
             return found
         found.append(name)
@@ -218,10 +214,11 @@ def next_attempt(plan: Plan, step: Step) -> str:
 
 def is_done(plan: Plan, step: Step) -> bool:
     """Whether one attempt has finished and its logs are as they were recorded."""
-    return any(all(_whole(plan.out, stem) for stem in _stems(step, name)) for name in attempts(plan, step))
+    return any(all(_whole(plan.out, stem) for stem in stems(step, name)) for name in attempts(plan, step))
 
 
-def _stems(step: Step, name: str) -> list[str]:
+def stems(step: Step, name: str) -> list[str]:
+    """File names, without their ends, of an attempt: one for each instrument."""
     return [name] if len(step.instruments) == 1 else [f"{name}-{instrument}" for instrument in step.instruments]
 
 

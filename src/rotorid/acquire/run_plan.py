@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -13,14 +13,16 @@ import numpy as np
 
 from rotorid.acquire import procedures
 from rotorid.acquire.errors import AcquireError
-from rotorid.acquire.plan import Plan, Step, is_done, next_attempt, steps_of
+from rotorid.acquire.plan import Plan, Step, attempts, is_done, next_attempt, stems, steps_of
 from rotorid.acquire.programmes import programme_of
 from rotorid.acquire.record import recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
+from rotorid.acquire.repair import repair
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
-from rotorid.io.logs import read_log
-from rotorid.io.session import Setup
+from rotorid.io.logs import LogError, read_log
+from rotorid.io.rawlog import NotALog
+from rotorid.io.session import Ended, SessionError, Setup, read_session
 
 Say = Callable[[str], None]
 Ask = Callable[[str], str]
@@ -149,6 +151,18 @@ def _carry_out(step: Step, desk: Desk, *recorders: Recorder) -> None:
         procedures.stream(first, None, moves=True)
 
 
+def complete_killed(plan: Plan, steps: list[Step], say: Say) -> None:
+    """Counts and gaps for the metadata of attempts whose recorder was killed; the attempts stay what they are."""
+    for step in steps:
+        for name in attempts(plan, step):
+            for stem in stems(step, name):
+                with suppress(SessionError, LogError, NotALog, OSError):  # such a one is no recording to complete
+                    session = read_session(plan.out / f"{stem}.yaml")
+                    log = plan.out / session.log
+                    if session.ended == Ended.RECORDING and repair(log, read_log(log)):
+                        say(f"{log}: its recorder was killed; the metadata now say what the log holds")
+
+
 def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, checked: bool = False) -> int:
     """All steps that are not done, or `repeat` alone once more. Returns how many are left.
 
@@ -156,10 +170,10 @@ def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, c
     a step fails: what was wrong has to be seen to before the next one.
     """
     steps = steps_of(plan)
-    wanted = [step for step in steps if step.name == repeat] if repeat else [s for s in steps if not is_done(plan, s)]
-    desk.say(
-        f"{plan.name}: {len(steps) - sum(not is_done(plan, s) for s in steps)} of {len(steps)} recordings are there"
-    )
+    complete_killed(plan, steps, desk.say)
+    done = {step.name for step in steps if is_done(plan, step)}
+    wanted = [step for step in steps if step.name == repeat or (repeat is None and step.name not in done)]
+    desk.say(f"{plan.name}: {len(done)} of {len(steps)} recordings are there")
     if wanted and not checked:
         with ports_of(None) as ports:
             needed = {instrument for step in wanted for instrument in step.instruments}
@@ -167,8 +181,8 @@ def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, c
         if faults:
             raise AcquireError("before the first recording: " + "; ".join(faults))
     for step in wanted:
-        left = sum(not is_done(plan, s) for s in steps)
-        word = desk.ask(f"step {step.number} of {len(steps)} ({left} left), {step.name}: {step.ask or 'ready?'}")
+        left = f"{len(steps) - len(done)} left"
+        word = desk.ask(f"step {step.number} of {len(steps)} ({left}), {step.name}: {step.ask or 'ready?'}")
         if word in ("q", "quit"):
             break
         if word in ("s", "skip"):
@@ -176,7 +190,9 @@ def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, c
         with ports_of(step) as ports:
             record_step(plan, step, ports, desk)
         write_index(plan.out)
-    return sum(not is_done(plan, step) for step in steps)
+        if is_done(plan, step):
+            done.add(step.name)
+    return len(steps) - len(done)
 
 
 @contextmanager

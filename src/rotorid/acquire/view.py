@@ -68,7 +68,8 @@ class Plot:
 
     def render(self) -> Text:
         values = list(self._values)
-        noise = f"   noise of the last {len(values)}: {np.std(values):.3g}" if len(values) > 1 else ""
+        # By the differences of successive samples: a load that was put on meanwhile is no noise.
+        noise = f"   noise {np.sqrt(np.mean(np.diff(values) ** 2) / 2):.3g}" if len(values) > 1 else ""
         return Text(f"{self.column}{noise}\n" + "\n".join(braille(values)))
 
 
