@@ -4,7 +4,6 @@
 - Writes what each says of each set, in the words of a verdict.
 """
 
-import sys
 from pathlib import Path
 
 from rotorid import log
@@ -13,12 +12,7 @@ from rotorid.proof.peers.asking import ask_folder
 
 def main(sets: str, peers: str) -> None:
     """Ask every peer about every set below `sets`."""
-    ask_folder(Path(sets), Path(peers), progress=report_progress)
-
-
-def report_progress(text: str) -> None:
-    """One line for the person who waits."""
-    print(f"  {text}", file=sys.stderr, flush=True)
+    ask_folder(Path(sets), Path(peers), progress=log.progress)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@
 - Writes one verdict a set, the time that each took, and the hash of the code that judged it.
 """
 
-import sys
 from pathlib import Path
 
 from rotorid import log
@@ -13,12 +12,7 @@ from rotorid.proof.judge import judge_folder
 
 def main(sets: str, verdicts: str, code: str) -> None:
     """Judge every set below `sets` by the code of this hash."""
-    judge_folder(Path(sets), Path(verdicts), progress=report_progress, code=code)
-
-
-def report_progress(text: str) -> None:
-    """One line for the person who waits."""
-    print(f"  {text}", file=sys.stderr, flush=True)
+    judge_folder(Path(sets), Path(verdicts), progress=log.progress, code=code)
 
 
 if __name__ == "__main__":

@@ -14,12 +14,7 @@ from rotorid.fleet.judge import judge_sets
 
 def main(folders: list[str], code: str, verdicts: str, memory: str) -> None:
     """Judge the sets in `folders` into the folder `verdicts`."""
-    judge_sets([Path(f) for f in folders], code, Path(verdicts), Path(memory), progress=report_progress)
-
-
-def report_progress(text: str) -> None:
-    """One line for the person who waits."""
-    print(f"  {text}", file=sys.stderr, flush=True)
+    judge_sets([Path(f) for f in folders], code, Path(verdicts), Path(memory), progress=log.progress)
 
 
 if __name__ == "__main__":

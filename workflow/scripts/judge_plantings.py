@@ -4,7 +4,6 @@
 - Writes one verdict a set with the hash of the code that judged it.
 """
 
-import sys
 from pathlib import Path
 
 from rotorid import log
@@ -15,12 +14,7 @@ from rotorid.proof.plantings.plan import parsed
 def main(recordings: str, plantings: list[str], code: str, verdicts: str, memory: str) -> None:
     """Judge the plantings of these names, all in the public set in `recordings`, into the folder `verdicts`."""
     wanted = [parsed(name) for name in plantings]
-    judge_plantings(Path(recordings), wanted, code, Path(verdicts), Path(memory), progress=report_progress)
-
-
-def report_progress(text: str) -> None:
-    """One line for the person who waits."""
-    print(f"  {text}", file=sys.stderr, flush=True)
+    judge_plantings(Path(recordings), wanted, code, Path(verdicts), Path(memory), progress=log.progress)
 
 
 if __name__ == "__main__":

@@ -16,12 +16,7 @@ from rotorid.recordings import read_set
 
 def main(folder: str, verdict: str, page: str, improved: str, off: list[str]) -> None:
     """Analyse the set in `folder`, without the rules named in `off`, and write the three files."""
-    deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), report_progress, off)
-
-
-def report_progress(text: str) -> None:
-    """One line for the person who waits."""
-    print(f"  {text}", file=sys.stderr, flush=True)
+    deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), log.progress, off)
 
 
 if __name__ == "__main__":

@@ -76,10 +76,15 @@ def settings(config: Mapping[str, Any]) -> pd.DataFrame:
     for section, values in config.items():
         for key, value in values.items():
             if isinstance(value, Mapping):
-                rows += [{"setting": f"{section}.{key}.{name}", "value": str(entry)} for name, entry in value.items()]
+                rows += [{"setting": f"{section}.{key}.{name}", "value": shown(entry)} for name, entry in value.items()]
             else:
-                rows.append({"setting": f"{section}.{key}", "value": str(value)})
+                rows.append({"setting": f"{section}.{key}", "value": shown(value)})
     return pd.DataFrame(rows)
+
+
+def shown(value: Any) -> str:
+    """A setting's value as a reader would write it."""
+    return ", ".join(map(shown, value)) if isinstance(value, (list, tuple)) else str(value)
 
 
 def main(

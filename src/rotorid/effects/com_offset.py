@@ -24,9 +24,11 @@ def with_lever_arm(motion, vehicle, values):
 
 
 def kernel(m, v, p, w):
+    thrust = 0.0
     for i in range(v.rotors):
-        w.moment[0] += p[1] * m.thrust[i]
-        w.moment[1] -= p[0] * m.thrust[i]
+        thrust += m.thrust[i]
+    w.moment[0] += p[1] * thrust
+    w.moment[1] -= p[0] * thrust
 
 
 def forms(vehicle):

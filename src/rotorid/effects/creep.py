@@ -1,13 +1,13 @@
 """A reading that goes on growing for a while after a load has come on."""
 
 import numpy as np
-from numba import njit
 
+from rotorid.compiling import compiled
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import change_of_load, one_per_channel
 
 
-@njit(cache=True)
+@compiled()
 def _follow(load, share):
     out = np.empty_like(load)
     for j in range(load.shape[1]):

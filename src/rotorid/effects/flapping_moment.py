@@ -31,9 +31,12 @@ def rolling(motion, vehicle, values):
 
 
 def kernel_hub_moment(m, v, p, w):
+    along = across = 0.0
     for i in range(v.rotors):
-        w.moment[0] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 1]
-        w.moment[1] += p[0] * m.rotor_speed[i] * m.hub_velocity[i, 0]
+        along += m.rotor_speed[i] * m.hub_velocity[i, 0]
+        across += m.rotor_speed[i] * m.hub_velocity[i, 1]
+    w.moment[0] -= p[0] * across
+    w.moment[1] += p[0] * along
 
 
 def kernel_independent_of_speed(m, v, p, w):
@@ -42,9 +45,12 @@ def kernel_independent_of_speed(m, v, p, w):
 
 
 def kernel_rolling(m, v, p, w):
+    along = across = 0.0
     for i in range(v.rotors):
-        w.moment[0] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 0]
-        w.moment[1] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 1]
+        along += m.rotor_speed[i] * m.hub_velocity[i, 0]
+        across += m.rotor_speed[i] * m.hub_velocity[i, 1]
+    w.moment[0] -= p[0] * along
+    w.moment[1] -= p[0] * across
 
 
 def forms(vehicle):

@@ -1,8 +1,8 @@
 """A reading that depends on whether the load came from below or from above."""
 
 import numpy as np
-from numba import njit
 
+from rotorid.compiling import compiled
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import AXES, UNITS, change_of_load, cross_channels, on_channels, one_per_channel
 
@@ -13,7 +13,7 @@ MIDDLE = (NARROW * WIDE) ** 0.5
 WIDTHS = {"narrow": NARROW, "middle": MIDDLE, "wide": WIDE}
 
 
-@njit(cache=True)
+@compiled()
 def _play(load, width):
     out = np.empty_like(load)
     state = 0.0
@@ -28,7 +28,7 @@ def play(load, width):
     return _play(np.ascontiguousarray(load), width)
 
 
-@njit(cache=True)
+@compiled()
 def _settling(load, width):
     out = np.empty_like(load)
     state, before = 0.0, 0.0

@@ -1,12 +1,12 @@
 """Motors that need time to reach the commanded speed."""
 
 import numpy as np
-from numba import njit
 
+from rotorid.compiling import compiled
 from rotorid.effects.contract import Effect, Parameter, SpeedForm
 
 
-@njit(cache=True)
+@compiled()
 def _lag(command, up, down):
     """First-order lag with its own step (1 - exp(-dt/τ), weight of the command's change) up and down."""
     out = np.empty_like(command)

@@ -14,8 +14,10 @@ def reaction(motion, vehicle, values):
 
 
 def kernel(m, v, p, w):
+    total = 0.0
     for i in range(v.rotors):
-        w.moment[2] += p[0] * m.rotor_acceleration[i] * v.yaw_sign[i]
+        total += m.rotor_acceleration[i] * v.yaw_sign[i]
+    w.moment[2] += p[0] * total
 
 
 def forms(vehicle):

@@ -37,17 +37,19 @@ def saturating(motion, vehicle, values):
 def kernel_growing(m, v, p, w):
     speed = sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
     x, y = m.air_velocity[0] / max(speed, 1e-6), m.air_velocity[1] / max(speed, 1e-6)
+    lost, x, y = p[0] * speed, x / v.reach, y / v.reach
     for i in range(v.rotors):
-        rear = min(max(-(x * v.hub[i, 0] + y * v.hub[i, 1]) / v.reach, 0.0), 1.0)
-        w.hub_force[i, 2] += p[0] * speed * rear * m.thrust[i]
+        rear = min(max(-(x * v.hub[i, 0] + y * v.hub[i, 1]), 0.0), 1.0)
+        w.hub_force[i, 2] += lost * rear * m.thrust[i]
 
 
 def kernel_saturating(m, v, p, w):
     speed = sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
     x, y = m.air_velocity[0] / max(speed, 1e-6), m.air_velocity[1] / max(speed, 1e-6)
+    lost, x, y = p[0] * speed / (speed + v.hover_inflow), x / v.reach, y / v.reach
     for i in range(v.rotors):
-        rear = min(max(-(x * v.hub[i, 0] + y * v.hub[i, 1]) / v.reach, 0.0), 1.0)
-        w.hub_force[i, 2] += p[0] * speed / (speed + v.hover_inflow) * rear * m.thrust[i]
+        rear = min(max(-(x * v.hub[i, 0] + y * v.hub[i, 1]), 0.0), 1.0)
+        w.hub_force[i, 2] += lost * rear * m.thrust[i]
 
 
 def forms(vehicle):

@@ -4,6 +4,9 @@ import numpy as np
 
 from rotorid.effects.contract import Effect, Parameter, SpeedForm
 
+SLOPE = "a_1"
+"""Symbol of what a curve adds to the slope between command and speed."""
+
 
 def affine(path, values):
     """ω = ω_c + a_0 ω_max + a_1 ω_c."""
@@ -54,7 +57,7 @@ EFFECT = Effect(
             "ω = (1 + a_1) ω_c + a_0 ω_max",
             (
                 Parameter("a_0", "1", -0.8, 0.8, meaning="speed at no command, share of ω_max", negligible=LINEAR),
-                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope", negligible=LINEAR),
+                Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope", negligible=LINEAR),
             ),
             0,
             affine,
@@ -64,7 +67,7 @@ EFFECT = Effect(
             "quadratic",
             "ω = (1 + a_1 + a_2 ω_c/ω_max) ω_c",
             (
-                Parameter("a_1", "1", -0.8, 2.0, meaning="excess of the slope at no command", negligible=LINEAR),
+                Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope at no command", negligible=LINEAR),
                 Parameter("a_2", "1", -2.0, 2.0, meaning="growth of the slope with the command", negligible=LINEAR),
             ),
             0,

@@ -46,11 +46,15 @@ def _single(k):
 
 def kernel_at_the_hubs(m, v, p, w):
     """F_i += T_i (ε_x,i, ε_y,i, 0), M -= ±Q_i (ε_x,i, ε_y,i, 0); `p` is ε_x, ε_y of each rotor."""
+    roll = pitch = 0.0
     for i in range(v.rotors):
         torque = v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
-        for j in range(2):
-            w.hub_force[i, j] += m.thrust[i] * p[2 * i + j]
-            w.moment[j] -= torque * p[2 * i + j]
+        roll += torque * p[2 * i]
+        pitch += torque * p[2 * i + 1]
+        w.hub_force[i, 0] += m.thrust[i] * p[2 * i]
+        w.hub_force[i, 1] += m.thrust[i] * p[2 * i + 1]
+    w.moment[0] -= roll
+    w.moment[1] -= pitch
 
 
 def kernel_thrust_alone(m, v, p, w):

@@ -60,9 +60,11 @@ def _one(k, count, function):
 
 def kernel(m, v, p, w):
     """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i); `p` is d_i, q_i of each rotor."""
+    yaw = 0.0
     for i in range(v.rotors):
         w.hub_force[i, 2] -= p[2 * i] * m.thrust[i]
-        w.moment[2] += p[2 * i + 1] * v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
+        yaw += p[2 * i + 1] * v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
+    w.moment[2] += yaw
 
 
 def _excess(function, weights):

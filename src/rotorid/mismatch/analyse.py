@@ -13,14 +13,15 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
+from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
-from rotorid.mismatch.leave_one_out import without_each
+from rotorid.mismatch.leave_one_out import without_each, without_each_value
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
@@ -33,10 +34,10 @@ from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
 from rotorid.mismatch.split import split_runs
-from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import (
     changed_vehicle,
     contract_values,
+    names_of,
     only_throttle,
     speed_for_coefficients,
     throttle_scale,
@@ -48,8 +49,6 @@ from rotorid.mismatch.within_trust import beyond_trust, settled
 from rotorid.mismatch.wrench import WrenchModel, chosen, nonlinear_intervals
 from rotorid.recordings import RecordingSet
 
-ABSORBED_P = 1e-6
-CLAIMED = ("established", "ambiguous")
 UNITS = {"force": "N", "moment": "N m"}
 SURELY_HEAVIER = 2.0
 """Standard errors by which a vehicle must be heavier than believed to carry a payload."""
@@ -89,17 +88,16 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         told = speed_for_coefficients(values, prepared.vehicle)
         if prepared.vehicle.rotor_speed_limits_rad_s is None:
             told, scale = throttle_scale(values, model, full_speed(known.runs, prepared.vehicle))
-    fit, moved = settled(prepared, model, values, model.selection.active)
+    fit, moved = settled(model, values, model.selection.active)
     improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
     for _, full, _, _ in scale.values():
         improved = improved.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
-    plain_fit, plain_values = refitted(prepared, model)
+    plain_fit, plain_values = refitted(model)
 
     findings = [*mistakes, *findings_of(found, prepared)]
-    findings = rectified(payload_or_offset(findings, {**moved, **values}))
+    findings = payload_or_offset(findings, {**moved, **values})
     findings += absorbed_findings(model, values, findings)
     findings, told = with_square_term(findings, told, model)
-    told = without_values_in_question(findings, told)
     if found.commanded:
         told = told_of_commands(findings, told)
     strained = beyond_trust(model, values, model.selection.active)
@@ -138,6 +136,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         not_testable=not_testable(prepared, found.chain, findings),
         traces=traces,
         without=without_each(found, seen, values, fit, findings, traces),
+        without_values=without_each_value(model, seen, values, moved, names_of(told), traces),
         noise_floor=noise_floors(prepared, found),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(seen.segments, seen.prepared),
@@ -153,7 +152,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         instead=instead_of(model, values),
         put_right=within_trust.in_words(moved),
     )
-    return weighed(analysis)
+    return without_values_in_question(weighed(analysis))
 
 
 def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
@@ -298,20 +297,6 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
     return out
 
 
-def rectified(findings: list[Finding]) -> list[Finding]:
-    """An error of the accelerometer beside a vibration is what the sensor makes of the vibration."""
-    if not any(f.id == "vibration" for f in findings) or not rules.RECTIFIED.on:
-        return findings
-    why = "an error of the accelerometer did not hold: a vibration that the sensor rectifies looks the same"
-    held = ("established", "ambiguous")
-    return [
-        Finding(id=f.id, status="not_established", sentence=why)
-        if f.id == "accelerometer_error" and f.status in held
-        else f
-        for f in findings
-    ]
-
-
 def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     """A centre of mass off its place on a vehicle that is heavier than believed may be a payload as well.
 
@@ -339,37 +324,12 @@ def throttle_or_thrust(finding: Finding) -> Finding:
     return replace(finding, status="ambiguous", alternatives=both)
 
 
-def absorbed_findings(model: WrenchModel, values: dict, findings: list[Finding]) -> list[Finding]:
-    """Effects that look significant while the wrong values are held at their belief, and vanish with them."""
-    if not values:
-        return []
-    search, regression = model.search, model.search.regression
-    held = [k for k in search.always if k not in values]
-    base = regression.fit(held + model.selection.active)
-    taken = {f.id for f in findings}
-    out: dict[str, Finding] = {}
-    for term in regression.terms:
-        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
-            continue
-        fit = regression.fit([*held, *model.selection.active, term.key])
-        p = regression.wald(fit, regression.columns([term.key]), search.blocks)
-        if p < ABSORBED_P and fit.gain - base.gain > 50:
-            name = catalogue()[term.effect].name
-            out[term.effect] = Finding(
-                id=term.effect,
-                status="absorbed",
-                sentence=f"{name} looked significant with the believed values; the refitted values explain it",
-                p_value=p,
-            )
-    return list(out.values())
-
-
 def make_traces(
     model: WrenchModel, found: Fitted, refitted: list[np.ndarray], delivered: list[np.ndarray]
 ) -> tuple[Trace, ...]:
     """Residual of every channel before refitting, after refitting and with the effects, (n, 12) each per stretch."""
     prepared, chain = model.prepared, found.chain
-    believed_left = believed_residuals(prepared, model, found.commanded)
+    believed_left = believed_residuals(prepared, model.rows, found.commanded)
     out = []
     parts = (model.rows, prepared.segments, believed_left, refitted, delivered)
     for r, segment, before, plain, after in zip(*parts, strict=True):

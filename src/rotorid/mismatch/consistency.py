@@ -80,8 +80,11 @@ def missing_places(
             there.add(own[0])
     if not there and not analysis.wrong_values:
         out |= {c: analysis.p_values.get(c, (1.0, 1.0))[1] for c in analysis.unexplained_channels if c in channels}
+    # Where nothing is stated, values put right within their trust may be all that it takes.
+    stated = with_status(analysis, *CLAIMED) or analysis.wrong_values
     for name, channel in channels.items():
-        errors = [e.before for e in (channel.rmse.held_out, channel.rmse.training) if e.before is not None]
+        both = (channel.rmse.held_out, channel.rmse.training)
+        errors = [x for e in both if (x := e.before if stated else e.after) is not None]
         wrench = name.split("_")[0] in ("force", "moment")
         if wrench and name not in there and max(errors, default=0.0) > PLAINLY_OFF * (channel.noise_floor or np.inf):
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])

@@ -12,7 +12,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch import rules
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.findings import Estimate, Finding
-from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression
+from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import (
     LEAST_PROMISE,
@@ -281,6 +281,7 @@ def exchangeable(
     is wrong by.
     """
     named = list(values)
+    regression = regression.with_room(VALUE_LIMITS[1])
     always = regression.keys_of("nuisance", "wind") + selection.active
     loose = dict.fromkeys(regression.keys_of("value"), WIDEST_TRUST)
 

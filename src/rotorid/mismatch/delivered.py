@@ -1,38 +1,50 @@
-"""What is delivered: values called wrong, named effects, winds and those nuisances that are sure, and what they leave.
+"""What is delivered: values called wrong, named effects, winds and nuisances, and what they leave of the rows.
 
-Terms without a name stay out: an improved vehicle cannot hold them.
+Terms without a name stay out: an improved vehicle cannot hold them. The same for flights, stands and benches.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
-from rotorid.mismatch.decide import WIDEST_TRUST, coefficients
+from rotorid.mismatch.contributions import Contributions
+from rotorid.mismatch.decide import WIDEST_TRUST
 from rotorid.mismatch.prepare import Prepared
-from rotorid.mismatch.regression import Fit
-from rotorid.mismatch.rows import residual
-from rotorid.mismatch.wrench import WrenchModel
-
-SURE_Z = 3.0
-"""Standard errors by which a nuisance must differ from nothing to be delivered."""
+from rotorid.mismatch.regression import Fit, Regression
+from rotorid.mismatch.rows import Rows, residual
+from rotorid.mismatch.select import Search, Selection
 
 Values = dict[str, tuple[float, float]]
 """Relative change and one-sigma of believed values, by the key of their term."""
 
 
-def with_sure(model: WrenchModel, keys: Sequence[str], values: Values) -> list[str]:
-    """Keys of the terms that are delivered with those of `keys`: winds, and the nuisances that are sure beside them.
+class FittedModel(Protocol):
+    """What is asked of the model of a flight or of an instrument's reading once it is fitted."""
 
-    A calm flight does not know the offset between two sensors, and one that is nothing but noise where it was fitted
-    is a mismatch in the first turn held out.
-    """
-    regression = model.regression
-    nuisances = regression.keys_of("nuisance")
-    always = [*regression.keys_of("wind"), *keys]
-    fit = regression.fit([*nuisances, *always], loose=widely(values))
-    return [*(k for k in nuisances if surely_there(*coefficients(regression, fit, k))), *always]
+    rows: list[Rows]
+    regression: Regression
+    search: Search
+    selection: Selection
+    contributions: Contributions
+
+    @property
+    def rows_per_block(self) -> int:
+        """Rows over which residuals are compared as one."""
+
+    def unnamed(self, columns: np.ndarray) -> np.ndarray:
+        """Mask of the columns of terms without a name."""
+
+    def delivered_with(self, keys: Sequence[str], loose: dict[str, float]) -> list[str]:
+        """Keys of the terms that are delivered with those of `keys`."""
+
+    def values_beside(self, active: Sequence[str]) -> list[str]:
+        """Keys of the believed values that are free beside the terms at work."""
+
+    def change(self, key: str, coefficient: float, sd: float) -> tuple[float, float]:
+        """Relative change of a believed value and its one-sigma from its coefficient."""
 
 
 def widely(values: Values) -> dict[str, float]:
@@ -40,10 +52,16 @@ def widely(values: Values) -> dict[str, float]:
     return dict.fromkeys(values, WIDEST_TRUST)
 
 
-def left_out_residuals(model: WrenchModel, keys: Sequence[str], values: Values) -> list[np.ndarray]:
-    """What a model of some terms leaves of every stretch where it was not fitted, (n, 12).
+def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tuple[list[str], Fit]:
+    """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values free."""
+    delivered = model.delivered_with(keys, widely(values))
+    return delivered, model.regression.fit(delivered, loose=widely(values))
 
-    Each environment of the fitted runs is judged by coefficients found without it. Empirical terms stay out.
+
+def left_out_residuals(model: FittedModel, keys: Sequence[str], values: Values) -> list[np.ndarray]:
+    """What a model of some terms leaves of every stretch where it was not fitted, (n, channels).
+
+    Each environment of the fitted runs is judged by coefficients found without it.
     """
     regression = model.regression
     cols, betas = regression.left_out(tuple(keys), False, widely(values))
@@ -53,29 +71,24 @@ def left_out_residuals(model: WrenchModel, keys: Sequence[str], values: Values) 
     return [r.y - part for r, part in zip(model.rows, added, strict=True)]
 
 
-def judged_rows(model: WrenchModel) -> list[np.ndarray]:
+def judged_rows(model: FittedModel) -> list[np.ndarray]:
     """Mask of the rows of every stretch that are in an environment."""
     return [b >= 0 for b in model.regression.blocks_of_rows]
 
 
-def surely_there(beta: np.ndarray, covariance: np.ndarray) -> bool:
-    """Whether a nuisance is other than nothing."""
-    return abs(float(beta[0])) > SURE_Z * float(np.sqrt(covariance[0, 0]))
-
-
-def residuals_of(model: WrenchModel, fit: Fit) -> list[np.ndarray]:
-    """What values and named effects of a fit leave of every stretch, (n, 12); empirical terms stay out."""
+def residuals_of(model: FittedModel, fit: Fit) -> list[np.ndarray]:
+    """What values and named effects of a fit leave of every stretch, (n, channels)."""
     named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
     added = model.contributions.of(fit.columns, named)
     return [r.y - part for r, part in zip(model.rows, added, strict=True)]
 
 
-def believed_residuals(prepared: Prepared, model: WrenchModel, commanded: bool) -> list[np.ndarray]:
-    """What the believed vehicle leaves of every stretch, (n, 12); if `commanded`, rotors turn as commanded."""
+def believed_residuals(prepared: Prepared, rows: list[Rows], commanded: bool) -> list[np.ndarray]:
+    """What the believed vehicle leaves of every stretch of a flight, (n, 12); if `commanded`, rotors turn as told."""
     if not commanded:
-        return [r.y for r in model.rows]
+        return [r.y for r in rows]
     out = []
-    for r, segment in zip(model.rows, prepared.segments, strict=True):
+    for r, segment in zip(rows, prepared.segments, strict=True):
         left, groups = np.full_like(r.y, np.nan), residual(segment, prepared.vehicle)
         for index, group in enumerate(("force", "moment")):
             if group in groups:

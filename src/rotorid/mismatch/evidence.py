@@ -15,11 +15,10 @@ import numpy as np
 
 from rotorid.mismatch import rules
 from rotorid.mismatch.comparison import VOTES_FROM
-from rotorid.mismatch.findings import Analysis, Finding, Trace
+from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
 from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.words import channel_words
 
-CLAIMED = ("established", "ambiguous")
 ACTS = 1 / 3
 """Contribution to a channel, in units of its noise and beside the strongest, from which an effect acts there."""
 BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
@@ -61,24 +60,49 @@ class Evidence:
         """Why the effect is not established; empty where it is."""
         if not self.ratios:
             return "the runs held out say nothing about it"
-        worse = next((r for r in self.ratios if r.low > WORSE_RATIO), None)
-        if rules.WORSE(worse is not None):
-            percent = f"{100 * (worse.value - 1):.0f} %"
-            return f"on the runs held out the error of the {channel_words(worse.channel)} is {percent} larger with it"
-        if rules.NOT_BETTER(self.ratios[0].high >= 1.0):
-            return "on the runs held out no channel is surely better with it"
+        if self.contradiction:
+            return self.contradiction
         if rules.BELOW_LEFTOVER(not self.beyond_leftover):
             return "it is smaller than what the model leaves over"
         return ""
 
+    @property
+    def contradiction(self) -> str:
+        """What the runs held out say against it; empty where they bear it out, or say nothing."""
+        worse = next((r for r in self.ratios if r.low > WORSE_RATIO), None)
+        if rules.WORSE(worse is not None):
+            percent = f"{100 * (worse.value - 1):.0f} %"
+            return f"on the runs held out the error of the {channel_words(worse.channel)} is {percent} larger with it"
+        if rules.NOT_BETTER(bool(self.ratios) and self.ratios[0].high >= 1.0):
+            return "on the runs held out no channel is surely better with it"
+        return ""
+
+    def undone_by(self, whole: Evidence) -> str:
+        """Why a gain says nothing: with all that was found a channel is worse than as believed; empty else.
+
+        An effect may gain only by mending what a wrong value beside it spoils.
+        """
+        worse = {r.channel: r for r in whole.ratios if r.low > WORSE_RATIO}
+        own = next((worse[r.channel] for r in self.ratios if r.channel in worse), None)
+        if not rules.WORSE(own is not None):
+            return ""
+        percent = f"{100 * (own.value - 1):.0f} %"
+        words = channel_words(own.channel)
+        return f"on the runs held out the error of the {words} is {percent} larger with all that was found"
+
 
 def weighed(analysis: Analysis) -> Analysis:
-    """The analysis with gains on the runs held out, and with the words of its effects that these allow."""
+    """The analysis with gains on the runs held out, and with the words of its effects and values that these allow."""
     part = fitted_part(analysis)
     held = [part(t.run, t.time_s) < 0 for t in analysis.traces]
     shares = effect_shares(analysis, held)
-    findings = tuple(judged(f, analysis, held, shares.get(f.id, 0.0)) for f in analysis.findings)
-    return replace(analysis, findings=findings, shares=shares)
+    whole = evidence(analysis, tuple(t.before for t in analysis.traces), held)
+    findings = tuple(judged(f, analysis, held, shares.get(f.id, 0.0), whole) for f in analysis.findings)
+    found = {n: evidence(analysis, left, held) for n, left in analysis.without_values.items()}
+    against = {n: e.contradiction or e.undone_by(whole) for n, e in found.items()}
+    doubtful = {n: (analysis.values[n], why) for n, why in against.items() if why}
+    values = {n: v for n, v in analysis.values.items() if n not in doubtful}
+    return replace(analysis, findings=findings, shares=shares, values=values, suggested_values=doubtful)
 
 
 def effect_shares(analysis: Analysis, held: list[np.ndarray]) -> dict[str, float]:
@@ -103,8 +127,11 @@ def effect_shares(analysis: Analysis, held: list[np.ndarray]) -> dict[str, float
     return {i: float(np.clip((energy(x) - after) / (before - after), 0.0, 1.0)) for i, x in analysis.without.items()}
 
 
-def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: float) -> Finding:
-    """A finding with its gain and the word that it deserves; one that no model holds (a mistake) as it is."""
+def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: float, whole: Evidence) -> Finding:
+    """A finding with its gain and the word that it deserves; one that no model holds (a mistake) as it is.
+
+    `whole` is the evidence on all that was found together.
+    """
     if finding.status not in CLAIMED or finding.id not in analysis.without:
         return finding
     without = analysis.without[finding.id]
@@ -113,7 +140,7 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: 
         # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
         found = evidence(analysis, without, [in_windows(t, finding.windows) for t in analysis.traces])
     nothing = rules.MAY_BE_NOTHING(not away_from_nothing(finding))
-    reason = found.objection or ("every number of it may be nothing" if nothing else "")
+    reason = found.objection or found.undone_by(whole) or ("every number of it may be nothing" if nothing else "")
     slight = found.ratios and found.ratios[0].value > PLAIN_RATIO
     if rules.SLIGHT(bool(not reason and share < LEAST_SHARE and slight and not finding.windows)):
         reason = f"it carries {100 * share:.1f} % of the error that goes"

@@ -2,7 +2,7 @@
 
 1. the chain from command to speed, 2. the grouped search over force, moment and sensor effects with the believed
 values free, refined in its nonlinear parameters, the wind and the gusts, 3. the chain once more with the effects found
-known, and without it where the rotors' differences explain as much, 4. less what may as well be nothing.
+known, 4. less what may as well be nothing.
 """
 
 from __future__ import annotations
@@ -13,16 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.contract import Form
+from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import coefficients, wrong_values
 from rotorid.mismatch.delivered import Values
+from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.gusts import with_gusts
 from rotorid.mismatch.payload_windows import Windows, carried_windows, changes, laden
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
-from rotorid.mismatch.speedpath import SpeedResult, nothing_between
+from rotorid.mismatch.speedpath import SpeedResult
 from rotorid.mismatch.unsure import without_unsure
 from rotorid.mismatch.wrench import (
     WrenchModel,
@@ -100,15 +102,23 @@ def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
         # The wrench effects found change what the commands must explain: once more with them known.
         chain = speed_path(prepared, chosen(model))
         model = refined_model(prepared, *turning(prepared, chain))
-    if [k for k, _ in chain[0].fit.chain] == ["throttle_curve"]:
-        # A curve alters differences between rotors too: unequal rotors at one throttle look like one.
-        plain = refined_model(prepared, *turning(prepared))
-        # A thrust curve in its place is the same column over again, with the torque's share left to a wrong value.
-        renamed = any(plain.search.terms[k].effect == "thrust_curve" for k in plain.selection.active)
-        limit = cost_of(model, model.regression.filters) + curve_cost(chain[0])
-        if rules.CURVE_OR_ROTORS(not renamed and cost_of(plain, model.regression.filters) < limit):
-            return (nothing_between(chain[0]), *chain[1:]), plain
+    if rules.MERE_SCALE(only_scales(chain[0])):
+        result, *full = speed_path(prepared, chosen(model), ("throttle_curve",))
+        reason = Reason("mere_scale", "another thrust coefficient explains as much")
+        chain = replace(result, dropped={**result.dropped, "throttle_curve": reason}), *full
+        model = refined_model(prepared, *turning(prepared, chain))
     return chain, model
+
+
+def only_scales(result: SpeedResult) -> bool:
+    """Whether a throttle curve between command and speed is nothing but another slope, as far as it is known."""
+    form = dict(result.fit.chain).get("throttle_curve")
+    if form is None or SLOPE not in [p.symbol for p in form.parameters]:
+        return False
+    where = result.fit.slice_of("throttle_curve")
+    sd = np.sqrt(np.diag(result.fit.covariance)[where])
+    away = np.abs(result.fit.values[where] - np.array(form.neutral)) > 1.96 * sd
+    return not any(away[i] for i, p in enumerate(form.parameters) if p.symbol != SLOPE)
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
@@ -203,8 +213,3 @@ def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
             left += float((causal(taps, part[:, channel])[len(taps) :] ** 2).sum())
     terms = [model.search.terms[k] for k in model.selection.active]
     return left + sum(COST_PER_EFFECT + COST_PER_PARAMETER * t.size for t in terms)
-
-
-def curve_cost(result: SpeedResult) -> float:
-    """What the forms between command and rotor speed cost."""
-    return sum(COST_PER_EFFECT + COST_PER_PARAMETER * len(form.parameters) for _, form in result.fit.chain)

@@ -6,21 +6,20 @@ runs that neither was fitted to.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.delivered import Values, residuals_of
-from rotorid.mismatch.findings import Finding, Trace
+from rotorid.mismatch.delivered import FittedModel, Values, delivered_fit, residuals_of
+from rotorid.mismatch.findings import CLAIMED, Finding, Trace
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.report_runs import rows_of, scaled_by_run
-from rotorid.mismatch.rows import CHANNELS
+from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.speedpath import commanded_path
 from rotorid.mismatch.within_trust import settled
 from rotorid.mismatch.wrench import WrenchModel, path_segments
-
-CLAIMED = ("established", "ambiguous")
 
 
 def without_each(
@@ -45,21 +44,51 @@ def without_each(
         own = [k for k in active if model.search.terms[k].effect == finding.id]
         in_chain = found.chain is not None and finding.id in {k for k, _ in found.chain[0].fit.chain}
         if own:
-            fewer = settled(found.prepared, model, values, [k for k in active if k not in own])[0]
+            fewer = settled(model, values, [k for k in active if k not in own])[0]
             left = residuals_of(seen, scaled_by_run(seen, fewer))
-            out[finding.id] = on_traces(traces, seen, left)
+            out[finding.id] = on_traces(traces, seen.rows, left)
         elif in_chain and found.measured:
             out[finding.id] = speeds_without(found, seen, finding.id, traces)
         elif in_chain:
             segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), cutoff_of(seen))
-            out[finding.id] = on_traces(traces, seen, made_by(seen, segments, fit))
+            out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
         elif finding.id == "steady_wind" and seen.wind is not None:
             still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
-            out[finding.id] = on_traces(traces, seen, made_by(seen, still, fit))
+            out[finding.id] = on_traces(traces, seen.rows, made_by(seen, still, fit))
         elif finding.id == "gust" and seen.gusts:
             steady = np.zeros(3) if seen.wind is None else np.array([*seen.wind, 0.0])
             calm = [replace(s, motion=replace(s.motion, wind=steady)) for s in seen.segments]
-            out[finding.id] = on_traces(traces, seen, made_by(seen, calm, fit))
+            out[finding.id] = on_traces(traces, seen.rows, made_by(seen, calm, fit))
+    return out
+
+
+def without_each_value(
+    model: FittedModel,
+    seen: FittedModel,
+    values: Values,
+    moved: Values,
+    names: Mapping[str, Sequence[str]],
+    traces: Sequence[Trace],
+) -> dict[str, tuple[np.ndarray, ...]]:
+    """To the name of every wrong value the residual (n,) of every trace with it as believed, in the traces' order.
+
+    Parameters
+    ----------
+    model, seen
+        What was chosen, and the same with the rows of every run.
+    values, moved
+        The values called wrong, and those that were put right within their trust.
+    names
+        Name of a value to the keys of `values` that it stands for.
+    traces
+        Those of the analysis.
+    """
+    out = {}
+    for name, keys in names.items():
+        others = {k: v for k, v in values.items() if k not in keys}
+        fit = delivered_fit(model, [*others, *moved, *model.selection.active], others)[1]
+        left = residuals_of(seen, scaled_by_run(seen, fit))
+        out[name] = on_traces(traces, seen.rows, left)
     return out
 
 
@@ -92,11 +121,11 @@ def made_by(model: WrenchModel, segments, fit: Fit) -> list[np.ndarray]:
     return [r.y - r.x[:, :, fit.columns] @ named for r in rows]
 
 
-def on_traces(traces: tuple[Trace, ...], seen: WrenchModel, left: list[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Residuals (n, 12) of every stretch on the traces; what is delivered where a trace is of no channel of theirs."""
+def on_traces(traces: Sequence[Trace], rows: Sequence[Rows], left: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Residuals (n, channels) of every stretch on the traces; what is delivered where a trace is of none of them."""
     known = {}
-    for r, part in zip(seen.rows, left, strict=True):
-        known |= {(r.run, first_s(r.time_s), channel): part[:, k] for k, channel in enumerate(CHANNELS)}
+    for r, part in zip(rows, left, strict=True):
+        known |= {(r.run, first_s(r.time_s), CHANNELS[k]): values for k, values in enumerate(part.T)}
     return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.after) for t in traces)
 
 

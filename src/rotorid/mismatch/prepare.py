@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -262,11 +263,10 @@ def prepare(
     vehicle, split = recordings.vehicle, split_runs(recordings)
     rate_hz, cutoff = analysis_rate_hz(recordings.runs, vehicle, cutoff_hz)
     noise = sensor_noise(recordings.runs, vehicle, cutoff)
-    rng = np.random.default_rng(0)
     segments, noisy, full = [], [], full_speed(recordings.runs, vehicle)
     for run in recordings.runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
-        noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng, full)
+        noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 0), full)
     thinner = Thinner(rate_hz, cutoff)
     if len(noisy) == len(segments) and rules.COLOURED_NOISE(
         bool(factors := noise_factors(segments, noisy, vehicle, thinner))
@@ -274,7 +274,7 @@ def prepare(
         noise = {k: v * factors.get(k, 1.0) for k, v in noise.items()}
         noisy = []
         for run in recordings.runs:
-            noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, rng, full)
+            noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 1), full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     segments = representative(without_noise(segments))
     prepared = Prepared(recordings, vehicle, split, segments, noisy, thinner, noise, [], unseen=unseen)
@@ -282,16 +282,22 @@ def prepare(
     return replace(prepared, terms=terms, not_testable=reasons)
 
 
+def draws_of(run: Run, number: int) -> np.random.Generator:
+    """The noise that is added to a run once more, by what the run holds: its name and its place change no number."""
+    names = [n for n in c.ANGULAR_VELOCITY if run.has(n)]
+    signs = run.array(tuple(names)) > 0.0 if names else np.zeros(0, bool)  # signs outlive rounding
+    return np.random.default_rng([number, len(run.time_s), zlib.crc32(np.packbits(signs).tobytes())])
+
+
 def prepare_like(prepared: Prepared, recordings: RecordingSet) -> tuple[list[Segment], list[Segment]]:
     """Segments of other runs of the same vehicle, and the same with the noise that `prepared` found added once more."""
     vehicle = prepared.vehicle
     full = full_speed(prepared.recordings.runs, vehicle)
-    rng = np.random.default_rng(1)
     segments, noisy = [], []
     for run in recordings.runs:
         own = run, vehicle, prepared.segments[0].rate_hz, prepared.thinner.cutoff_hz, None
         segments += build_segments(*own, full_speed_rad_s=full)
-        noisy += build_segments(*own, prepared.noise, rng, full)
+        noisy += build_segments(*own, prepared.noise, draws_of(run, 1), full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     return representative(without_noise(segments)), noisy
 

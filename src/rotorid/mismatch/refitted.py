@@ -8,17 +8,16 @@ import numpy as np
 
 from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.delivered import Values
-from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.within_trust import settled
 from rotorid.mismatch.wrench import WrenchModel
 
 
-def refitted(prepared: Prepared, model: WrenchModel) -> tuple[Fit, Values]:
+def refitted(model: WrenchModel) -> tuple[Fit, Values]:
     """The fit of a model's rows by believed values alone, and what it changes of them."""
     values = values_alone(model)
-    fit, moved = settled(prepared, model, values, ())
+    fit, moved = settled(model, values, ())
     return fit, {**moved, **values}
 
 

@@ -176,17 +176,15 @@ SETTLED = rule("settled", "Values not called wrong move within their trust where
 UNSURE = rule("unsure", "An effect of which every parameter may be nothing is not in the model.")
 OWN_SCALES = rule("own_scales", "Where thrust differs between runs each run has its own scale.")
 CARRIED = rule("carried", "A load of two plateaus is a payload on board for so long.")
-CURVE_OR_ROTORS = rule(
-    "curve_or_rotors", "Differences between rotors are preferred to a throttle curve that explains as much."
+MERE_SCALE = rule(
+    "mere_scale",
+    "Without measured rotor speeds a throttle curve of which the slope alone is sure is a thrust coefficient.",
 )
 CLOSED_LOOP_BIAS = rule(
     "closed_loop_bias", "A delay no later than a loop that answers the gyroscope's noise makes it look is none."
 )
 COLOURED_NOISE = rule(
     "coloured_noise", "Noise of speeds and gyroscope in the band analysed may be more than its white part."
-)
-RECTIFIED = rule(
-    "rectified", "An error of the accelerometer beside a vibration is what the sensor makes of the vibration."
 )
 
 # Stands and benches
@@ -199,7 +197,6 @@ NOISE_IN_A_PLAY = rule(
 )
 EARLY_FILTER = rule("early_filter", "A reading is not smoothed and early at once: that is noise of the speeds.")
 TWO_ROUNDS = rule("two_rounds", "Forms of many parameters join in a second round: they would swallow several causes.")
-REMAINDER = rule("remainder", "An effect is still needed where a strong one may do anything with its own inputs.")
 APPROXIMATE = rule("approximate", "An effect is still needed where a stronger one's gain may vary smoothly.")
 NEEDLESS_VALUE = rule("needless_value", "A wrong value is still needed where an effect's form is free or richer.")
 CURVED_GAIN = rule("curved_gain", "A gain beside a curved characteristic is wrong at small loads and over all of them.")

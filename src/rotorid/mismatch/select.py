@@ -155,9 +155,9 @@ class Search:
                 continue
             column = self.regression.start[term.key]
             most = min(rules.STRAIN["deviations"] * term.prior_sd[0], NEAR_LIMIT * self.regression.limit[column])
-            with_it = abs(fit.beta[fit.columns == column][0])
-            without = abs(base.beta[base.columns == column][0])
-            if with_it > most and with_it > without + term.prior_sd[0]:
+            with_it, without = fit.beta[fit.columns == column][0], base.beta[base.columns == column][0]
+            side = np.sign(with_it)  # a value that was off the other way is pushed all the further
+            if side * with_it > most and side * with_it > side * without + term.prior_sd[0]:
                 return True
         return False
 
@@ -208,8 +208,8 @@ class Search:
         judged = [
             self.judge(t.key, rest, base) for t in self.terms.values() if t.kind == "effect" and t.effect == effect
         ]
-        judged = [c for c in judged if c.physical] or judged
-        return max(judged, key=lambda c: c.score).key
+        physical = [c for c in judged if c.physical]
+        return max(physical, key=lambda c: c.score).key if physical else key
 
     def simpler(self, active: list[str]) -> list[str] | None:
         """A model with one id less and other forms of those that stay, if it explains nearly as much.

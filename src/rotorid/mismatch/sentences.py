@@ -107,6 +107,8 @@ def details(told: Told) -> list[str]:
     for finding in by_share(with_status(analysis, "suggested"), told.shares):
         name, numbers = capital(effect_words(finding.id)), _parameters(finding)
         out.append(f"{name} is suggested{f' ({numbers})' if numbers else ''}, not established: {finding.objection}.")
+    for name, (values, why) in analysis.suggested_values.items():
+        out.append(_wrong(name, values, why=why))
     if told.word in ("partly_explained", "unexplained"):
         out.append(
             capital(_rest(told))
@@ -295,7 +297,8 @@ def _either(finding: Finding, analysis: Analysis) -> str:
     return f"{text}, but this would: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
 
 
-def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = ()) -> str:
+def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = (), why: str = "") -> str:
+    """A wrong value, or with `why` one that the runs held out do not bear out."""
     believed, refitted, low, high = values
     words, unit = parameter_words(name)
     space = f" {unit}" if unit else ""
@@ -304,6 +307,9 @@ def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequen
     # Of a ratio that alone is known the least trusted value is called wrong; the reader may know better.
     other = f" (or, what explains as much here: {listed(list(instead), 'or')})" if instead else ""
     value = plus_minus(refitted, low, high)
+    if why:
+        believed_words = f"{number(believed, 4)}{space} believed"
+        return f"The {words} is suggested to be {value}{space} ({believed_words}), not established: {why}."
     return f"The {words} is {value}{space}, not the {number(believed, 4)}{space} believed{other}."
 
 

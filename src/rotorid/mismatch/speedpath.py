@@ -105,12 +105,6 @@ def commanded_path(
     return path.speed
 
 
-def nothing_between(result: SpeedResult, why: str = "the differences between the rotors explain as much"):
-    """The result (`SpeedResult`) of a search that found nothing, and why: rotors turn as commanded."""
-    fit = SpeedFit((), np.zeros(0), 0.0, result.fit.cost, np.zeros((0, 0)))
-    return SpeedResult(fit, {}, {}, {}, {**result.dropped, **{k: why for k, _ in result.fit.chain}}, None)
-
-
 class SpeedProblem:
     """Whitened residual of a chain over the training segments; subclasses say what the response is."""
 

@@ -1,9 +1,10 @@
 """Which runs are fitted and which are held out, where the set does not say.
 
 About a third of the runs is held out. An effect can be shown on runs that excite it alone, so of all choices the one is
-taken in which the runs held out and those fitted share what the flights do (speeds along each axis, turning, changes of
-the rotors, nearness of the ground, voltage); where choices are alike, the runs held out are spread evenly in time. Only
-what was flown decides, never how well a model describes it.
+taken in which the runs held out and those fitted share what is done (in flight speeds along each axis, turning, changes
+of the rotors, nearness of the ground, voltage; on a stand or bench loads along each axis, tilts, each rotor, warmth);
+where choices are alike, the runs held out are spread evenly in time. Only what was done decides, never how well a model
+describes it.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
     total = len(recordings.runs)
     count = max(1, round(total * HELD_OUT_SHARE))
     even = tuple(int((k + 0.5) * total / count) for k in range(count))
-    if recordings.vehicle.kind != "flight" or total < 3 or comb(total, count) > MOST_CHOICES:
+    if total < 3:
         return even
     groups = [g / g.sum() for g in activity(recordings) if g.sum() > 0]
     if not groups:
@@ -56,22 +57,35 @@ def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
         both = [min(h / HELD_OUT_SHARE, 1.0) + min((1.0 - h) / (1.0 - HELD_OUT_SHARE), 1.0) for h in held]
         return float(np.mean(both)) / 2.0
 
-    best = max(combinations(range(total), count), key=score)
+    best = max(choices(total, count), key=score)
     return best if score(best) > score(even) + WORTH_MOVING else even
 
 
-def activity(recordings: RecordingSet) -> list[np.ndarray]:
-    """How much of what is flown each run holds, (runs,) of each kind: energies about the mean of all runs.
+def choices(total: int, count: int) -> list[tuple[int, ...]]:
+    """Ways to take `count` of `total` runs: all of them, or as many drawn at random as are looked at."""
+    if comb(total, count) <= MOST_CHOICES:
+        return list(combinations(range(total), count))
+    draw = np.random.default_rng(0)
+    return [tuple(sorted(int(k) for k in draw.permutation(total)[:count])) for _ in range(MOST_CHOICES)]
 
-    Kinds: speed level and vertical, turning, changes of the rotors, nearness of the ground, the voltage's fall.
+
+def kinds_of_activity(recordings: RecordingSet) -> list[tuple[str, ...]]:
+    """Groups of columns that show what is done: in flight each group is one kind, on an instrument each column."""
+    count, flight = recordings.vehicle.rotor_count, recordings.vehicle.kind == "flight"
+    families = (c.rotor_columns(f, count) for f in ("rotor_speed", "rotor_command", "throttle"))
+    rotors = next((n for n in families if n and all(run.has(*n) for run in recordings.runs)), ())
+    if flight:
+        groups = (c.VELOCITY[:2], c.VELOCITY[2:], c.ANGULAR_VELOCITY, (c.BATTERY_VOLTAGE,), rotors)
+        return [g for g in groups if g]
+    return [(name,) for name in (*c.REFERENCE_FORCE, *c.MOUNT, *rotors, c.BATTERY_VOLTAGE, c.TEMPERATURE)]
+
+
+def activity(recordings: RecordingSet) -> list[np.ndarray]:
+    """How much of what is done each run holds, (runs,) of each kind: energies about the mean of all runs.
+
+    Beside `kinds_of_activity` nearness of the ground.
     """
-    vehicle = recordings.vehicle
-    kinds = [c.VELOCITY[:2], c.VELOCITY[2:], c.ANGULAR_VELOCITY, ("battery_voltage_v",)]
-    for family in ("rotor_speed", "rotor_command", "throttle"):
-        names = c.rotor_columns(family, vehicle.rotor_count)
-        if names and all(run.has(*names) for run in recordings.runs):
-            kinds.append(names)
-            break
+    vehicle, kinds = recordings.vehicle, kinds_of_activity(recordings)
     out = []
     for names in kinds:
         if all(run.has(*names) for run in recordings.runs):

@@ -3,23 +3,26 @@ curve beside them leaves of what is said about them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from rotorid.effects.throttle_curve import SLOPE
 from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z
 from rotorid.mismatch.delivered import Values
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.findings import Analysis, Estimate, Finding
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.wrench import WrenchModel
 from rotorid.recordings import RecordingSet, Vehicle, columns
 
-IN_QUESTION = {"payload": {"mass", "thrust"}, "throttle_curve": {"thrust", "torque", "speed"}}
+IN_QUESTION = {
+    "payload": {"mass_kg", "thrust_coefficient_n_s2"},
+    "throttle_curve": {"thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s"},
+}
 """Values that an id would change by itself; thrust in a payload's is its ratio to the mass."""
-SLOPE = "a_1"
-"""Symbol of what a throttle curve adds to the slope between command and speed."""
 
 
 def believed_value(vehicle: Vehicle, key: str) -> float:
@@ -32,9 +35,9 @@ def believed_value(vehicle: Vehicle, key: str) -> float:
         return float(vehicle.torque_coefficients_n_m_s2().mean())
     if key == "speed":
         return vehicle.rotor_speed_limits_rad_s[1]
-    if key == "arm":
-        return 1.0
-    return getattr(vehicle.inertia_kg_m2, key[-2:])
+    if key.startswith("inertia"):
+        return getattr(vehicle.inertia_kg_m2, key[-2:])
+    return 1.0  # an arm's or a reading's factor
 
 
 def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
@@ -60,15 +63,22 @@ def changed_vehicle(vehicle: Vehicle, relative: dict[str, float]) -> Vehicle:
     return vehicle.model_copy(update=change)
 
 
-def contract_values(vehicle: Vehicle, values: dict) -> dict[str, tuple[float, float, float, float]]:
-    """Wrong values under the names of vehicle.yaml: believed, refitted and its interval."""
+def contract_values(
+    vehicle: Vehicle, values: Values, names: Mapping[str, str] = PARAMETER_NAMES
+) -> dict[str, tuple[float, float, float, float]]:
+    """Wrong values under their names in the contract: believed, refitted and its interval."""
     out = {}
     for key, (relative, sd) in values.items():
         believed = believed_value(vehicle, key)
-        out[PARAMETER_NAMES[key]] = tuple(
+        out[names[key]] = tuple(
             float(believed * (1 + x)) for x in (0.0, relative, relative - 1.96 * sd, relative + 1.96 * sd)
         )
     return out
+
+
+def names_of(values: Values, names: Mapping[str, str] = PARAMETER_NAMES) -> dict[str, tuple[str, ...]]:
+    """Contract name of every value to the keys that it stands for: a full speed scales both coefficients."""
+    return {names[k]: ("thrust", "torque") if k == "speed" else (k,) for k in values}
 
 
 def only_throttle(recordings: RecordingSet) -> bool:
@@ -108,9 +118,10 @@ def throttle_scale(values: Values, model: WrenchModel, full_rad_s: float):
 
 
 def without_common_scale(values: Values) -> Values:
-    """Values where the scale of the rotors' speed is not known: a thrust, and a torque less its part in the scale."""
+    """Values where the scale of the rotors' speed is not known: no thrust, nor the mass that it carries, and a torque
+    less its part in the scale."""
     (thrust, thrust_sd), (torque, torque_sd) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "torque"))
-    kept = {k: v for k, v in values.items() if k not in ("thrust", "torque", "speed")}
+    kept = {k: v for k, v in values.items() if k not in ("thrust", "torque", "speed", "mass")}
     change, sd = (1 + torque) / (1 + thrust) - 1, float(np.hypot(thrust_sd, torque_sd))
     if "torque" in values and abs(change) > max(VALUE_Z * sd, SMALLEST_CHANGE):
         kept["torque"] = (change, sd)
@@ -129,16 +140,17 @@ def told_of_commands(findings: list[Finding], values: Values) -> Values:
 
 
 def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
-    """Values without a thrust that the slope of a throttle curve would make up for within its own interval.
+    """Values without a thrust per mass that the slope of a throttle curve would make up for within its own interval.
 
     Where rotor speeds are known from commands alone, a thrust coefficient larger by x is a slope larger by x/2.
     """
     curve = next((f for f in findings if f.id == "throttle_curve" and f.status in ("established", "ambiguous")), None)
     slope = next((p for p in curve.parameters if p.symbol == SLOPE), None) if curve else None
-    if slope is None or "thrust" not in values:
+    if slope is None:
         return values
+    (thrust, _), (mass, _) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "mass"))
     reach = (slope.high - slope.low) / 2 / max(1.0 + slope.value, 1e-3)
-    return without_common_scale(values) if abs(values["thrust"][0]) / 2 < reach else values
+    return without_common_scale(values) if abs((1 + thrust) / (1 + mass) - 1) / 2 < reach else values
 
 
 def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:
@@ -164,10 +176,14 @@ def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) 
     return [told if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
 
 
-def without_values_in_question(findings: list[Finding], values: dict) -> dict:
-    """Values less those that would be right, or others, if another member of an open class were at work."""
-    members = {i for f in findings if f.status == "ambiguous" for i in f.alternatives}
-    open_values = {key for i, keys in IN_QUESTION.items() if i in members for key in keys}
-    if not rules.VALUE_IN_QUESTION(bool(open_values & set(values))):
-        return values
-    return {k: v for k, v in values.items() if k not in open_values}
+def without_values_in_question(analysis: Analysis) -> Analysis:
+    """The analysis less wrong values that would be right, or others, if another member of an open class were at work.
+
+    Asked once the words are final: a class that is only suggested questions nothing.
+    """
+    members = {i for f in analysis.findings if f.status == "ambiguous" for i in f.alternatives}
+    open_values = {name for i, names in IN_QUESTION.items() if i in members for name in names}
+    if not rules.VALUE_IN_QUESTION(bool(open_values & set(analysis.wrong_values))):
+        return analysis
+    kept = {k: v for k, v in analysis.values.items() if k not in open_values or k not in analysis.wrong_values}
+    return replace(analysis, values=kept)

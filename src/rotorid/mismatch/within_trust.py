@@ -13,19 +13,11 @@ import numpy as np
 
 from rotorid.mismatch import rules
 from rotorid.mismatch.channel_errors import growth
-from rotorid.mismatch.decide import coefficients, relative_change
-from rotorid.mismatch.delivered import (
-    Values,
-    judged_rows,
-    left_out_residuals,
-    widely,
-    with_sure,
-)
-from rotorid.mismatch.prepare import Prepared
+from rotorid.mismatch.decide import coefficients
+from rotorid.mismatch.delivered import FittedModel, Values, delivered_fit, judged_rows, left_out_residuals
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.words import parameter_words
-from rotorid.mismatch.wrench import WrenchModel
 
 BEYOND_TRUST = 2.0
 """Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it."""
@@ -37,49 +29,45 @@ LEAST_Z = 2.0
 WORTH_A_WORD = 0.002
 
 
-def all_values(model: WrenchModel, values: Values, active: Sequence[str]) -> Fit:
-    """The fit with every value free: those called wrong (`values`) widely, the others within their trust."""
-    keys = with_sure(model, [*model.regression.keys_of("value"), *active], values)
-    return model.regression.fit(keys, loose=widely(values))
-
-
-def beyond_trust(model: WrenchModel, values: Values, active: Sequence[str]) -> bool:
+def beyond_trust(model: FittedModel, values: Values, active: Sequence[str]) -> bool:
     """Whether the recordings ask a value not called wrong to move further than its trust allows."""
-    return strained(model, values, changes(model, all_values(model, values, active)))
+    return strained(model, changes(model, values, active, all_free(model, values, active)[1]))
 
 
-def strained(model: WrenchModel, values: Values, moved: Values) -> bool:
+def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[list[str], Fit]:
+    """What is delivered with every value free: those called wrong widely, the others within their trust."""
+    return delivered_fit(model, [*model.values_beside(active), *active], values)
+
+
+def strained(model: FittedModel, moved: Values) -> bool:
     """Whether one of the changes of values not called wrong is beyond its trust."""
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
-    return any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items() if k not in values)
+    return any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items())
 
 
-def changes(model: WrenchModel, fit: Fit) -> Values:
-    """Relative change and one-sigma of every believed value in a fit."""
+def changes(model: FittedModel, values: Values, active: Sequence[str], fit: Fit) -> Values:
+    """Relative change and one-sigma of every believed value in a fit, those called wrong aside."""
     out = {}
-    for key in model.regression.keys_of("value"):
-        beta, covariance = coefficients(model.regression, fit, key)
-        out[key] = relative_change(key, float(beta[0]), float(np.sqrt(covariance[0, 0])))
+    for key in model.values_beside(active):
+        if key not in values:
+            beta, covariance = coefficients(model.regression, fit, key)
+            out[key] = model.change(key, float(beta[0]), float(np.sqrt(covariance[0, 0])))
     return out
 
 
-def settled(prepared: Prepared, model: WrenchModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:
+def settled(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:
     """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong.
 
     Those values move together, and only if where it was not fitted the error falls by it in some channel, grows in
     none, and none of them would move beyond its trust.
     """
-    plain = with_sure(model, [*values, *active], values)
-    free = with_sure(model, [*model.regression.keys_of("value"), *active], values)
-    fits = [model.regression.fit(keys, loose=widely(values)) for keys in (plain, free)]
-    moved = changes(model, fits[1])
-    if strained(model, values, moved):
-        return fits[0], {}
-    per = max(2, int(prepared.thinner.rate_hz))
+    plain, as_believed = delivered_fit(model, [*values, *active], values)
+    free, fit = all_free(model, values, active)
+    moved = changes(model, values, active, fit)
+    if strained(model, moved):
+        return as_believed, {}
     left = (left_out_residuals(model, keys, values) for keys in (plain, free))
-    if not pays(*left, judged_rows(model), per):
-        return fits[0], {}
-    return fits[1], {k: change for k, change in moved.items() if k not in values}
+    return (fit, moved) if pays(*left, judged_rows(model), model.rows_per_block) else (as_believed, {})
 
 
 def pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray], per: int) -> bool:

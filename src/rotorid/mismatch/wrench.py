@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from rotorid.effects.contract import Form
 from rotorid.mismatch import rules
 from rotorid.mismatch.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.contributions import Contributions
+from rotorid.mismatch.decide import coefficients, relative_change
 from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
@@ -52,6 +54,8 @@ MEMORY_GRID = 37
 """Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
 
+SURE_Z = 3.0
+"""Standard errors by which a nuisance must differ from nothing to be delivered."""
 MOST_INFLATION = 2.0
 """A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
 
@@ -92,6 +96,35 @@ class WrenchModel:
         """Mask of the columns that belong to empirical terms, which no finding may count as its own."""
         keys = [k for k in self.selection.active if self.search.terms[k].effect in UNKNOWNS]
         return np.isin(columns, self.regression.columns(keys))
+
+    @property
+    def rows_per_block(self) -> int:
+        """Rows of a second."""
+        return max(2, int(self.prepared.thinner.rate_hz))
+
+    def delivered_with(self, keys: Sequence[str], loose: dict[str, float]) -> list[str]:
+        """Keys of winds, of the nuisances that are sure beside the terms `keys`, and of these.
+
+        A calm flight does not know the offset between two sensors, and one that is nothing but noise where it was
+        fitted is a mismatch in the first turn held out.
+        """
+        nuisances = self.regression.keys_of("nuisance")
+        always = [*self.regression.keys_of("wind"), *keys]
+        fit = self.regression.fit([*nuisances, *always], loose=loose)
+
+        def sure(key: str) -> bool:
+            beta, covariance = coefficients(self.regression, fit, key)
+            return abs(float(beta[0])) > SURE_Z * float(np.sqrt(covariance[0, 0]))
+
+        return [*filter(sure, nuisances), *always]
+
+    def values_beside(self, active: Sequence[str]) -> list[str]:
+        """Keys of all believed values."""
+        return self.regression.keys_of("value")
+
+    def change(self, key: str, coefficient: float, sd: float) -> tuple[float, float]:
+        """Relative change of a believed value and its one-sigma from its coefficient."""
+        return relative_change(key, coefficient, sd)
 
 
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:
@@ -320,8 +353,9 @@ def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full
     return out
 
 
-def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None = None):
-    """Search between command and rotor speed; None where no command is recorded, or nothing can show it."""
+def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None = None, refused: Sequence[str] = ()):
+    """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
+    nothing can show it."""
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
     if not segments or any(s.command is None for s in segments):
         return None
@@ -364,7 +398,8 @@ def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None =
         )
         late_s = late_s if rules.CLOSED_LOOP_BIAS(late_s > 0.0) else 0.0
         problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
-    return SpeedSearch(problem, candidate_forms(segments, full_voltage is not None)).run(), full_speed, full_voltage
+    forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
+    return SpeedSearch(problem, forms).run(), full_speed, full_voltage
 
 
 def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 import pandas as pd
 
 RATIOS = ("location_f1", "oracle")
@@ -39,7 +42,7 @@ def _shown(present: str, rows: pd.DataFrame) -> pd.DataFrame:
                 "measured": number(row["id"], row["value"]),
                 "interval": ""
                 if pd.isna(row["low_95"]) or pd.isna(row["value"])
-                else f"{number(row['id'], row['low_95'])} to {number(row['id'], row['high_95'])}",
+                else span(row["id"], row["low_95"], row["high_95"]),
                 "cases": "" if pd.isna(row["cases"]) else str(int(row["cases"])),
                 "target": target(row),
                 "holds": "" if pd.isna(row["holds"]) else row["holds"],
@@ -78,11 +81,16 @@ def number(key: str, value: float) -> str:
     return f"{value:.2f}" if key in RATIOS else f"{100 * value:.1f} %"
 
 
+def span(key: str, low: float, high: float) -> str:
+    """Two ends, the unit once, kept on one line."""
+    return f"{number(key, low).removesuffix(' %')} to {number(key, high)}".replace(" ", "\u00a0")
+
+
 def target(row: pd.Series) -> str:
     """The target in words."""
     low, high = row["at_least"], row["at_most"]
     if pd.notna(low) and pd.notna(high):
-        return f"{number(row['id'], low)} to {number(row['id'], high)}"
+        return span(row["id"], low, high)
     if pd.notna(low):
         return "yes" if row["id"] == "better" else f"≥ {number(row['id'], low)}"
     return f"≤ {number(row['id'], high)}" if pd.notna(high) else ""
@@ -98,25 +106,30 @@ def of_methods(peers: pd.DataFrame) -> pd.DataFrame:
 
 
 def of_studies(real: pd.DataFrame) -> pd.DataFrame:
-    """Real recordings, one row each: ids in words; error of the channel group that was recorded best."""
+    """Real recordings, one row each: ids and wrong values in words; error of the channel group recorded best."""
     rows = []
     for _, row in real.iterrows():
         group, unit, digits = ("force", "N", 3) if pd.notna(row["force_after"]) else ("rotor_speed", "rad/s", 1)
         stages = [row[f"{group}_{stage}"] for stage in ("before", "refitted", "after")]
-        own = row.get(f"{group}_neurobem") if group == "force" else None
+        wrong = [VALUE_UNIT.sub("", v.strip()) for v in str(row["values"]).split(";") if pd.notna(row["values"])]
+        found = [words(row["found"])] if pd.notna(row["found"]) else []
+        found += [f"wrong {'values' if len(wrong) > 1 else 'value'}: {words(', '.join(wrong))}"] if wrong else []
+        error = " / ".join("–" if pd.isna(s) else f"{s:.{digits}f}" for s in stages) + f" {unit}"
         share = row["unexplained_share"]
         rows.append(
             {
                 "study": row["study"],
                 "about": row["about"],
-                "found": words(row["found"]) or "nothing",
-                "values": words(row["values"]),
-                "error": " / ".join("–" if pd.isna(s) else f"{s:.{digits}f}" for s in stages) + f" {unit}",
-                "reference": "" if own is None or pd.isna(own) else f"{own:.{digits}f} {unit}",
+                "found": "; ".join(found) or "nothing",
+                "error": error.replace(" ", "\u00a0"),
                 "unexplained": "–" if pd.isna(share) else f"{100 * share:.0f} %",
             }
         )
-    return pd.DataFrame(rows, columns=["study", "about", "found", "values", "error", "reference", "unexplained"])
+    return pd.DataFrame(rows, columns=["study", "about", "found", "error", "unexplained"])
+
+
+VALUE_UNIT = re.compile(r"_(kg_m2|kg|n_m_s2|n_s2|m_s2|rad_s)$")
+"""The unit at the end of the name of a believed value."""
 
 
 def words(ids: object) -> str:
@@ -125,12 +138,22 @@ def words(ids: object) -> str:
 
 
 def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
-    """Coefficients found beside published ones, as text."""
-    out = coefficients[["study", "effect", "symbol", "unit", "source"]].copy()
-    out["effect"] = [words(e) for e in out["effect"]]
-    out["found"] = [
-        f"{f:.3g} ({low:.3g} to {high:.3g})"
-        for f, low, high in zip(coefficients["found"], coefficients["low_95"], coefficients["high_95"], strict=True)
-    ]
-    out["published"] = [f"{p:.3g}" for p in coefficients["published"]]
-    return out
+    """Coefficients found beside published ones, as text: small ones in units of a power of ten."""
+    rows = []
+    for row in coefficients.itertuples():
+        power = 3 * math.floor(math.log10(abs(row.found)) / 3) if 0 < abs(row.found) < 1e-3 else 0
+        found, low, high, published = (
+            f"{x / 10**power:.3g}" for x in (row.found, row.low_95, row.high_95, row.published)
+        )
+        rows.append(
+            {
+                "study": row.study,
+                "effect": words(row.effect),
+                "symbol": row.symbol,
+                "found": f"{found} ({low} to {high})",
+                "published": published,
+                "unit": (f"1e{power} " if power else "") + row.unit,
+                "source": row.source,
+            }
+        )
+    return pd.DataFrame(rows)

@@ -12,12 +12,9 @@ from rotorid.effects.hysteresis import settling
 from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import form_reading, make_terms
-from rotorid.mismatch.instrument.freer_forms import FREE, remainder, without_remainders
-from rotorid.mismatch.instrument.model import fitted_model, kept_values, reading_model
+from rotorid.mismatch.instrument.model import kept_values, reading_model
 from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
-from rotorid.mismatch.prepare import parts_of
-from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
@@ -222,38 +219,6 @@ def test_crosstalk_and_a_loop_on_the_mixed_load_bring_no_company():
     assert named(analyse_instrument(recorded(mixed_loop))) == {"crosstalk", "hysteresis"}
 
 
-def test_what_a_narrow_form_leaves_over_is_a_remainder():
-    """A loop of 0.4 N with a narrow play for its form leaves what tares of each run take up in part.
-
-    With plays of many widths they are not needed. A tare of 0.04 N beside the same loop is: no loop makes one.
-    """
-
-    def model_with(change, active):
-        made = recorded(change, runs=3)
-        setup = set_up(parts_of(made, split_runs(made))[0], made)
-        terms, _ = make_terms(setup)
-        model = reading_model(setup, terms)
-        fit = model.search.regression.fit(model.search.always + active)
-        return setup, terms, replace(model, selection=replace(model.selection, active=active, fit=fit))
-
-    def loop(load, run, warmth):
-        return load - np.stack([0.4 * settling(f, 3.0) for f in load.T], axis=1)
-
-    play, tares = "hysteresis/narrow play", "tare_offset/own in each run"
-    setup, terms, model = model_with(loop, [play, tares])
-    found = remainder(model)
-    assert found.key == tares and found.kept < 0.2 and "hysteresis" in found.reason
-
-    def again(active, refused):
-        assert active == [play] and list(refused) == ["tare_offset"]
-        return fitted_model(setup, terms, active, refused=refused)
-
-    mended = without_remainders(model, again)
-    assert {mended.search.terms[k].effect for k in mended.selection.active} == {"hysteresis"}
-    assert "freer form" in mended.selection.not_established["tare_offset"]
-    assert remainder(model_with(lambda *a: loop(*a) + 0.04, [play, "tare_offset/constant"])[2]) is None
-
-
 def test_what_holds_by_itself_has_a_second_chance_unless_it_was_refused():
     def tilted(load, run, warmth):
         load[:, 0] += 0.02 * load[:, 2]
@@ -267,15 +232,6 @@ def test_what_holds_by_itself_has_a_second_chance_unless_it_was_refused():
     assert search.second_chance([chosen]) is None
     search.refused = {"crosstalk": "said so", "compliance": "said so"}
     assert search.second_chance([]) is None or search.terms[search.second_chance([])].effect not in search.refused
-
-
-def test_every_free_form_is_nothing_without_load_time_and_warming():
-    still = replace(loading(np.zeros(100)), run_time_s=np.zeros(100), session_time_s=np.zeros(100))
-    for effect, columns in FREE.items():
-        assert effect in catalogue()
-        for channel, values in columns(still, instrument()):
-            assert channel in (0, 1, 2) and values.shape == (100,)
-            assert np.abs(values).max() < 1e-12, effect
 
 
 def test_beside_an_s_shape_the_gains_stay_at_their_belief():

@@ -112,26 +112,6 @@ def test_what_differs_from_run_to_run_is_no_constant_of_the_vehicle():
     assert "odd" in selection.not_established
 
 
-@pytest.mark.parametrize("differs, elsewhere, doubted", [(0.0, True, True), (1.0, True, False), (0.0, False, False)])
-def test_another_cause_and_a_simpler_form_of_the_same_id_may_be_what_three_parameters_are(differs, elsewhere, doubted):
-    """Trims about three axes, of which an offset explains two; rotors that do more than that, or that turn out to be
-    needed about the same axes, are there in any case."""
-    rng = np.random.default_rng(8)
-    noise, parts = case(rng, 4)
-    rotors = [[p[0] + differs * p[3], p[1], p[2]] for p in parts]
-    x = [[*own, p[0], p[1], p[2]] for own, p in zip(rotors, parts, strict=True)]
-    y = [n + c[0] + c[1] + c[2] for n, c in zip(noise, x, strict=True)]
-    terms = [term("rotors", "three", size=3), term("offset", size=2), term("rotors", "one")]
-    alternatives = {}
-    for confusers in ({"rotors": ("offset",)}, {}):
-        search = search_of(terms, y, x, confusers=confusers)
-        shown = search.ask.sizes_of
-        moved = lambda k, b: np.roll(shown(k, b), elsewhere and k == "rotors/one")  # noqa: B023, E731
-        search.ask = replace(search.ask, sizes_of=moved)
-        alternatives[bool(confusers)] = search.alternatives("rotors/three", ["rotors/three"])
-    assert alternatives == {True: ["offset"] if doubted else [], False: []}
-
-
 def test_copies_of_a_column_are_alternatives_and_others_are_not():
     rng = np.random.default_rng(6)
     noise, x = case(rng, 2)
@@ -236,6 +216,26 @@ def test_effects_that_add_up_are_left_alone():
     assert search_of([term("e0"), term("e1")], y, x).cancelling(["e0/form", "e1/form"]) is None
 
 
+@pytest.mark.parametrize("differs, elsewhere, doubted", [(0.0, True, True), (1.0, True, False), (0.0, False, False)])
+def test_another_cause_and_a_simpler_form_of_the_same_id_may_be_what_three_parameters_are(differs, elsewhere, doubted):
+    """Trims about three axes, of which an offset explains two; rotors that do more than that, or that turn out to be
+    needed about the same axes, are there in any case."""
+    rng = np.random.default_rng(8)
+    noise, parts = case(rng, 4)
+    rotors = [[p[0] + differs * p[3], p[1], p[2]] for p in parts]
+    x = [[*own, p[0], p[1], p[2]] for own, p in zip(rotors, parts, strict=True)]
+    y = [n + c[0] + c[1] + c[2] for n, c in zip(noise, x, strict=True)]
+    terms = [term("rotors", "three", size=3), term("offset", size=2), term("rotors", "one")]
+    alternatives = {}
+    for confusers in ({"rotors": ("offset",)}, {}):
+        search = search_of(terms, y, x, confusers=confusers)
+        shown = search.ask.sizes_of
+        moved = lambda k, b: np.roll(shown(k, b), elsewhere and k == "rotors/one")  # noqa: B023, E731
+        search.ask = replace(search.ask, sizes_of=moved)
+        alternatives[bool(confusers)] = search.alternatives("rotors/three", ["rotors/three"])
+    assert alternatives == {True: ["offset"] if doubted else [], False: []}
+
+
 def imitated_value(change: float, own: float, copied: float = 0.98) -> Search:
     """A value that is `change` off, trusted to a twentieth, and an effect that looks nearly like it, `own` at work."""
     rng = np.random.default_rng(4)
@@ -261,3 +261,15 @@ def test_beside_an_effect_that_is_there_a_value_has_no_more_room():
     # Nor where no value is held at its limit.
     calm = imitated_value(0.02, 0.2)
     assert calm.values_alone(calm.run()) is None
+
+
+def test_a_term_that_turns_a_value_from_one_side_of_its_belief_to_the_other_strains_it():
+    """Without the term the value is three deviations low, with it five high: as far off, and pushed all the same."""
+    rng = np.random.default_rng(5)
+    noise, x = case(rng, 2)
+    x = [[30 * a, 30 * (a + 0.1 * b)] for a, b in x]
+    y = [n - 0.15 * columns[0] for n, columns in zip(noise, x, strict=True)]
+    search = search_of([Term("thrust", "value", prior_sd=(0.05,)), term("curve")], y, x)
+    base, fit = search.regression.fit(["thrust"]), search.regression.fit(["thrust", "curve/form"])
+    turned = replace(fit, beta=np.array([0.25, -0.4]))
+    assert search.strains(turned, base) and not search.strains(replace(fit, beta=np.array([-0.1, 0.0])), base)

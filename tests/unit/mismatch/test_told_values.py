@@ -25,6 +25,7 @@ def curve(slope: float, half: float, status: str = "established") -> list[Findin
     ],
 )
 def test_a_thrust_within_the_slope_of_a_throttle_curve_is_not_called_wrong(findings, told):
+    """Nor is a mass: where speeds are known from commands alone a flight knows the ratio of the two."""
     values = {"thrust": (-0.02, 0.002), "mass": (0.05, 0.001)}
     assert ("thrust" in without_scale_of_curve(findings, values)) is told
-    assert without_scale_of_curve(findings, values)["mass"] == (0.05, 0.001)
+    assert ("mass" in without_scale_of_curve(findings, values)) is told  # only thrust over mass is known

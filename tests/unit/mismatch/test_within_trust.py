@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch import within_trust
+from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.within_trust import beyond_trust, in_words, settled
 
@@ -33,7 +34,13 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
 
     made = Regression()
     made.terms = terms
-    model = SimpleNamespace(regression=made, segments=[], selection=SimpleNamespace(active=[]))
+    model = SimpleNamespace(
+        regression=made,
+        rows_per_block=40,
+        delivered_with=lambda keys, loose: list(keys),
+        values_beside=lambda active: list(TRUST),
+        change=relative_change,
+    )
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((4000, 12))
 
@@ -43,32 +50,32 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
 
     monkeypatch.setattr(within_trust, "left_out_residuals", residuals)
     monkeypatch.setattr(within_trust, "judged_rows", lambda *_: [np.ones(4000, bool)])
-    return SimpleNamespace(thinner=SimpleNamespace(rate_hz=40.0)), model
+    return model
 
 
 def test_a_thrust_within_its_trust_is_put_right(monkeypatch):
     """By −3 % of a trust of 5 %: both values move together, and one of them is worth a word."""
-    prepared, model = model_of(monkeypatch, -0.03)
-    fit, moved = settled(prepared, model, {}, ())
+    model = model_of(monkeypatch, -0.03)
+    fit, moved = settled(model, {}, ())
     assert len(fit.columns) == 2 and moved["thrust"][0] == pytest.approx(-0.03) and moved["mass"][0] == 0.0
     assert in_words(moved) == ("thrust coefficient −3.0 ± 0.0 %",)
 
 
 def test_a_value_called_wrong_is_not_told_twice(monkeypatch):
-    prepared, model = model_of(monkeypatch, -0.03)
-    _, moved = settled(prepared, model, {"thrust": (-0.03, 0.001)}, ())
+    model = model_of(monkeypatch, -0.03)
+    _, moved = settled(model, {"thrust": (-0.03, 0.001)}, ())
     assert list(moved) == ["mass"]
 
 
 def test_beyond_trust_something_else_is_missing(monkeypatch):
     """By 11 % of a trust of 5 %: more than two standard deviations, and nothing is moved."""
-    prepared, model = model_of(monkeypatch, 0.11)
+    model = model_of(monkeypatch, 0.11)
     assert beyond_trust(model, {}, ()) and not beyond_trust(model, {"thrust": (0.11, 0.001)}, ())
-    fit, moved = settled(prepared, model, {}, ())
+    fit, moved = settled(model, {}, ())
     assert moved == {} and len(fit.columns) == 0
 
 
 def test_values_that_help_no_held_out_channel_stay(monkeypatch):
-    prepared, model = model_of(monkeypatch, -0.03, helps=False)
-    fit, moved = settled(prepared, model, {}, ())
+    model = model_of(monkeypatch, -0.03, helps=False)
+    fit, moved = settled(model, {}, ())
     assert moved == {} and len(fit.columns) == 0

@@ -15,8 +15,10 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS, UNITS
 from rotorid.mismatch import rules
+from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.analyse import throttle_or_thrust
 from rotorid.mismatch.decide import wrong_values
+from rotorid.mismatch.delivered import Values, residuals_of
 from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
@@ -29,32 +31,28 @@ from rotorid.mismatch.instrument.chain import (
     without_id,
 )
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
+from rotorid.mismatch.instrument.curved_gain import curved_gains
 from rotorid.mismatch.instrument.decide import findings_of, with_plainer_forms
-from rotorid.mismatch.instrument.freer_forms import without_remainders
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.instrument.values import Values, curved_gains, delivered, settled, without_needless
-from rotorid.mismatch.leave_one_out import first_s
+from rotorid.mismatch.leave_one_out import first_s, on_traces, without_each_value
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.split import split_runs
-from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.values import changed_vehicle, told_of_commands
-from rotorid.mismatch.within_trust import in_words
+from rotorid.mismatch.values import changed_vehicle, contract_values, names_of, told_of_commands
+from rotorid.mismatch.within_trust import in_words, settled
 from rotorid.recordings import RecordingSet, Vehicle
 
-ABSORBED_P = 1e-6
 CURVES_OF_ONE_LOAD = ("load_nonlinearity", "thrust_curve")
 LOST_SHARE = 0.15
 """Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained."""
 SPEED_LEFT = "what was found between command and rotor speed does not carry over to the runs held out"
-ABSORBED_GAIN = 50.0
 
 
 def same_curve(chain: ChainResult) -> dict[str, str]:
@@ -100,9 +98,6 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         active = [k for k in model.selection.active if model.search.terms[k].effect not in refused]
         model = fitted_model(setup, terms, active, loadings, refused)
 
-    def once_more(active: list[str], refused: dict[str, str]) -> ReadingModel:
-        return fitted_model(setup, model.terms, active, loadings, {**model.search.refused, **refused})
-
     def values_in(model: ReadingModel, selection: Selection, refused: Collection[str] = ()) -> Values:
         size = sizes_of_values(model)
         return wrong_values(model.regression, model.search, selection, None, size, moving=False, refused=refused)
@@ -112,7 +107,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         active = [k for k in model.selection.active if k in kept]
         return fitted_model(setup, terms, active, loadings, model.search.refused)
 
-    model = with_plainer_forms(without_remainders(model, once_more), among)
+    model = with_plainer_forms(model, among)
     model, leftovers = without_leftovers_of_forms(model)
     values_of = partial(values_in, model)
     if chain is None:
@@ -122,8 +117,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         why = supply_reason(setup)
         if why is not None:
             reasons["battery_sag"] = why
-    model, values = without_needless(model, values_of)
-    refused: set[str] = set()
+    values, refused = values_of(model.selection), set()
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
@@ -136,7 +130,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         reasons["quantisation"] = why
 
     plain = values_of(Selection([], model.selection.fit))
-    findings += absorbed(model, values, findings)
+    findings += absorbed_findings(model, values, findings)
     fit, moved_values = settled(model, values, model.selection.active)
     refitted, moved_plain = settled(model, plain, [])
     told = values if measured else told_of_commands(findings, values)
@@ -166,7 +160,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         refitted=improved(setup.vehicle, {**moved_plain, **plain}),
         improved=with_full_speed(improved(setup.vehicle, {**moved_values, **values}), setup, chain),
         findings=tuple(findings),
-        values=named_values(setup, told) | full_speed_value(setup, chain),
+        values=contract_values(setup.vehicle, told, VALUE_NAMES) | full_speed_value(setup, chain),
         not_testable={k: v for k, v in reasons.items() if k not in claimed},
         traces=traces,
         noise_floor=noise_floors(setup, model, chain),
@@ -186,6 +180,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         notes=(*remarks, *notes_of(setup)),
         put_right=in_words(moved_values, VALUE_NAMES),
         without=without_each(model, seen, values, chain if measured else None, findings, traces),
+        without_values=without_each_value(model, seen, values, moved_values, names_of(told, VALUE_NAMES), traces),
     )
     return weighed(analysis)
 
@@ -203,20 +198,12 @@ def without_each(
     for effect in dict.fromkeys(model.search.terms[k].effect for k in active):
         if effect in names:
             fewer = settled(model, values, [k for k in active if model.search.terms[k].effect != effect])[0]
-            out[effect] = on_traces(traces, [(r.run, r.time_s) for r in seen.rows], delivered(seen, fewer))
+            out[effect] = on_traces(traces, seen.rows, residuals_of(seen, fewer))
     for key in [] if chain is None else [k for k, _ in chain.fit.chain if k in names and k not in out]:
         own = speed_traces(seen.setup, without_id(seen.setup, chain, key))
         left = {(t.run, t.channel, first_s(t.time_s)): t.after for t in own}
         out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
     return out
-
-
-def on_traces(traces, parts: list[tuple[str, np.ndarray]], left: list[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """Residuals (n, 6) of parts (run, time_s) on the traces; what is delivered where a trace is of none of them."""
-    known = {}
-    for (run, time_s), values in zip(parts, left, strict=True):
-        known |= {(run, name, first_s(time_s)): values[:, c] for c, name in enumerate(CHANNELS)}
-    return tuple(known.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
 
 
 def approximate_forms(model: ReadingModel, leftovers) -> list[str]:
@@ -300,50 +287,10 @@ def improved(vehicle: Vehicle, values: dict[str, tuple[float, float]]) -> Vehicl
     return changed if gain == [1.0, 1.0, 1.0] else changed.model_copy(update={"reading_gain": tuple(gain)})
 
 
-def named_values(setup: Setup, values: dict) -> dict[str, tuple[float, float, float, float]]:
-    """Wrong values under the contract's names: believed, refitted and its interval."""
-    out = {}
-    for key, (relative, sd) in values.items():
-        believed = believed_value(setup.vehicle, key)
-        out[VALUE_NAMES[key]] = tuple(
-            float(believed * (1 + x)) for x in (0.0, relative, relative - 1.96 * sd, relative + 1.96 * sd)
-        )
-    return out
-
-
-def believed_value(vehicle: Vehicle, key: str) -> float:
-    """The number that a value's name stands for; 1 for a factor."""
-    if key == "mass":
-        return vehicle.mass_kg
-    if key == "thrust":
-        return float(vehicle.thrust_coefficients_n_s2().mean())
-    return float(vehicle.torque_coefficients_n_m_s2().mean()) if key == "torque" else 1.0
-
-
-def absorbed(model: ReadingModel, values: dict, findings: list[Finding]) -> list[Finding]:
-    """Effects that look significant while the wrong values are held at their belief, and vanish with them."""
-    if not values:
-        return []
-    search, regression = model.search, model.regression
-    held = [k for k in search.always if k not in values]
-    base = regression.fit(held + model.selection.active)
-    taken, out = {f.id for f in findings}, {}
-    for term in regression.terms:
-        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
-            continue
-        fit = regression.fit([*held, *model.selection.active, term.key])
-        p = regression.wald(fit, regression.columns([term.key]), search.blocks)
-        if p < ABSORBED_P and fit.gain - base.gain > ABSORBED_GAIN:
-            name = catalogue()[term.effect].name
-            text = f"{name} looked significant with the believed values; the refitted values explain it"
-            out[term.effect] = Finding(id=term.effect, status="absorbed", sentence=text, p_value=p)
-    return list(out.values())
-
-
 def make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
     """Traces, and residuals (n, 6) of every part as believed, and with what is delivered."""
     before = [np.nan_to_num(r.y) for r in model.rows]
-    again, after = delivered(model, refitted), delivered(model, fit)
+    again, after = ([np.nan_to_num(x) for x in residuals_of(model, f)] for f in (refitted, fit))
     traces = [
         Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], values[:, c], left[:, c])
         for r, y, values, left in zip(model.rows, before, again, after, strict=True)

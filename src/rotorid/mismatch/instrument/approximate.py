@@ -20,12 +20,11 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import WIDEST_TRUST, coefficients
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, everything, restrain
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, everything, kept_values, restrain
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
-from rotorid.mismatch.instrument.values import selection_of
 from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import KEEP_P, SHARE_OF_LARGEST
+from rotorid.mismatch.select import KEEP_P, SHARE_OF_LARGEST, Selection
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 KNOTS = (0.0, 1 / 3, 2 / 3, 1.0)
@@ -204,7 +203,7 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     active = model.selection.active
     settled = {v for k in active for v in model.search.terms[k].form.takes_up}
     out = settled & set(values)
-    # Any smooth characteristic has a slope of its own: of gains the curve itself is asked (`values.curved_gains`).
+    # Any smooth characteristic has a slope of its own: of gains the curve itself is asked (`curved_gain`).
     for key in (v for v in set(values) - settled if not v.startswith(GAIN)):
         if any(left_of(model, key, s, active, c) < OF_ITS_OWN for s, c in stronger_ones(model, key, active)):
             out.add(key)
@@ -233,6 +232,14 @@ def without_leftovers_of_forms(model: ReadingModel) -> tuple[ReadingModel, tuple
         either = exchangeable(model, key, strong)
         model = replace(model, selection=selection)
         found.append(LeftOfForm(key, effect, strong, either))
+
+
+def selection_of(model: ReadingModel, active: list[str]) -> Selection:
+    """A selection of other terms, fitted and tested as the search does in the end."""
+    search = model.search
+    fit = search.regression.fit(kept_values(search, active) + active, jackknife=True)
+    p_values = {k: search.judge(k, active, search.without(k, active), jackknife=True).p_value for k in active}
+    return replace(model.selection, active=active, fit=fit, p_values=p_values)
 
 
 def exchangeable(model: ReadingModel, key: str, strong: str) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.instrument.setup import Setup, loaded_by, set_up, with_speed
+from rotorid.mismatch.mistakes import dropout
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 
@@ -64,6 +65,8 @@ def largest_spread(setup: Setup, channel: int) -> float:
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list[str]]:
     """The set with overwhelming mistakes corrected, their findings, and notes."""
     recordings, findings, notes = degrees(recordings)
+    recordings, lost = dropout.find(recordings)
+    findings += [lost] if lost else []
     setup = set_up(recordings)
     for find in (flipped, other_unit, wrong_rotors):
         found = find(recordings, setup)

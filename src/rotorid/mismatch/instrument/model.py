@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch import rules
 from rotorid.mismatch.comparison import LEAST_RUNS
+from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of, term_columns
 from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
@@ -268,13 +269,41 @@ class ReadingModel:
     noise: np.ndarray
     """One sigma of a row's noise by channel, (6,); NaN where a channel is not compared."""
 
+    @property
+    def contributions(self) -> Contributions:
+        """What the terms add to the reading."""
+        return Contributions(self.rows)
+
+    @property
+    def rows_per_block(self) -> int:
+        """Rows of a block of the regression."""
+        return block_length(self.setup, self.rows)
+
+    def unnamed(self, columns: np.ndarray) -> np.ndarray:
+        """Mask of the columns of terms without a name: fitted, so that nothing else takes them up; not delivered."""
+        keys = [k for k in self.selection.active if self.search.terms[k].effect in UNKNOWNS]
+        return np.isin(columns, self.regression.columns(keys))
+
+    def delivered_with(self, keys: Sequence[str], loose: dict[str, float]) -> list[str]:
+        """Keys of all nuisances and of the terms `keys`."""
+        return [*self.regression.keys_of("nuisance"), *keys]
+
+    def values_beside(self, active: Sequence[str]) -> list[str]:
+        """Keys of the believed values that no form at work takes up."""
+        kept = kept_values(self.search, active)
+        return [k for k in self.regression.keys_of("value") if k in kept]
+
+    def change(self, key: str, coefficient: float, sd: float) -> tuple[float, float]:
+        """Relative change of a believed value and its one-sigma: nothing accelerates on a stand, its coefficient."""
+        return coefficient, sd
+
 
 def of_single_runs(key: str) -> bool:
     """Whether a term has numbers of its own for each run."""
     return "own in each run" in key
 
 
-def kept_values(search: Search, active: list[str]) -> list[str]:
+def kept_values(search: Search, active: Sequence[str]) -> list[str]:
     """Terms that stand beside effects always, less believed values that a form at work takes up."""
     taken = {v for k in active for v in search.terms[k].form.takes_up}
     return [k for k in search.always if k not in taken]

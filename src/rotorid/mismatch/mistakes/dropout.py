@@ -1,4 +1,4 @@
-"""Stretches in which a sensor gave nothing: missing, held or zero readings while the vehicle flew on."""
+"""Stretches in which a sensor gave nothing: missing, held or zero readings while the vehicle or the load went on."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.mistakes.signals import replace_columns, sensor_columns
 from rotorid.mismatch.motion import stretches
 from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import columns as c
 
 SHORTEST_GAP_S = 0.3
 SHORTEST_GAP_PERIODS = 12
@@ -29,6 +30,8 @@ LARGEST_UNTOUCHED_SHARE = 0.5
 CHANCE = 1e-9
 SMOOTH = 0.3
 """Second differences of a reading without noise are this share of its first ones at most; white noise has 1.7."""
+PLAIN_CHANGE = 8.0
+"""Times the noise by which a reading should have changed to be called held: more than two steps of a coarse one."""
 LEAST_JUMP = 5.0
 """A reading without noise that was held jumps at the end by this many of its usual steps."""
 
@@ -90,9 +93,12 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
         present = [n for n in names if run.has(n)]
         if sensor in ("commands", "throttle") or not present:
             continue
+        flown = vehicle.kind == "flight"
+        if sensor == "rotors" and not flown:
+            continue  # on a stand rotors rest and turn evenly
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
         frozen = []
-        if len(present) > 1 and not zero:
+        if len(present) > 1 and not zero and flown:
             alive = not noisy.isdisjoint(present)
             frozen = held(run.time_s, run.array(tuple(present)), SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS, alive)
         for name in present:
@@ -104,8 +110,31 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
             found += _as_stretches(run, name, sensor, "missing", blank, 0.0)
             rest = np.where(zero.get(name, np.zeros(len(values), bool)), np.nan, values)
             for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy), *frozen]:
-                found += _as_stretches(run, name, sensor, "held", mask, p)
+                if flown or load_went_on(run, vehicle, values, mask):
+                    found += _as_stretches(run, name, sensor, "held", mask, p)
     return found
+
+
+def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.ndarray) -> bool:
+    """Whether a reading (n,) of an instrument should have changed where it was held, by what it does elsewhere.
+
+    By its regression on what drives it: the known load of a bench, on a stand thrusts and tilts.
+    """
+    families = (c.rotor_columns(f, vehicle.rotor_count) for f in ("rotor_speed", "rotor_command", "throttle"))
+    rotors = next((n for n in families if n and run.has(*n)), ())
+    drivers = [run.column(n) for n in c.REFERENCE_FORCE if run.has(n)]
+    drivers += [run.column(n) ** 2 for n in rotors] + [np.sin(run.column(n)) for n in c.MOUNT if run.has(n)]
+    if not drivers:
+        return False
+    x = np.column_stack([np.ones(len(reading)), *drivers])
+    known = np.isfinite(x).all(axis=1)
+    outside, inside = known & ~held_mask & np.isfinite(reading), known & held_mask
+    if outside.sum() < 10 * x.shape[1] or not inside.any():
+        return False
+    x = x / np.maximum(np.abs(x[known]).max(axis=0), 1e-300)
+    slopes = np.linalg.lstsq(x[outside], reading[outside], rcond=1e-9)[0]
+    noise = float((reading[outside] - x[outside] @ slopes).std())
+    return bool(np.ptp(x[inside] @ slopes) > PLAIN_CHANGE * noise)
 
 
 def _as_stretches(run: Run, name, sensor, kind, mask, p_value) -> list[Stretch]:

@@ -20,10 +20,15 @@ LONGEST_BRIDGED_SAMPLES = 6
 def sensor_columns(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
     """Sensor to its columns. One sensor is one clock."""
     count = vehicle.rotor_count
-    return {
+    driven = {
         "rotors": c.rotor_columns("rotor_speed", count),
         "commands": c.rotor_columns("rotor_command", count),
         "throttle": c.rotor_columns("throttle", count),
+    }
+    if vehicle.kind != "flight":
+        return {**driven, "force": c.FORCE, "moment": c.MOMENT}
+    return {
+        **driven,
         "gyroscope": c.ANGULAR_VELOCITY,
         "accelerometer": c.SPECIFIC_FORCE,
         "attitude": c.QUATERNION,
@@ -37,6 +42,8 @@ def channel_of(column: str, vehicle: Vehicle) -> str:
     sensor = next((s for s, names in sensor_columns(vehicle).items() if column in names), None)
     if sensor == "rotors":
         return column.removesuffix("_rad_s")
+    if sensor in ("force", "moment"):
+        return column.removesuffix("_n_m").removesuffix("_n")
     if sensor == "accelerometer":
         return "force_" + "xyz"[c.SPECIFIC_FORCE.index(column)]
     if sensor == "gyroscope":

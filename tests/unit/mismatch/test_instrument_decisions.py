@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.scale import rotor_inertia
-from rotorid.mismatch.delivered import surely_there
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.chain import find_chain
 from rotorid.mismatch.instrument.columns import OFFSET
 from rotorid.mismatch.instrument.model import MEMORY, MOST_OFFSET, UNMOVED, restrain
 from rotorid.mismatch.instrument.setup import set_up
-from rotorid.mismatch.regression import build, spread_of
+from rotorid.mismatch.regression import Fit, build, spread_of
 from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.wrench import WrenchModel
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from tests.unit.mismatch.test_stand import C_F, FULL_RAD_S, four_rotors, one_rotor, tilted_run
 
@@ -127,5 +127,13 @@ def test_a_rotor_may_be_as_heavy_as_stated_whatever_the_stand_s_inertia():
 
 
 def test_an_offset_in_time_must_be_three_standard_errors_from_none():
-    assert surely_there(np.array([0.004]), np.array([[0.001**2]]))
-    assert not surely_there(np.array([-0.0043]), np.array([[0.0018**2]]))
+    """Of two offsets, 4 and 2.4 of their errors, the surer one is delivered."""
+    keys = ["offset:surely", "offset:hardly"]
+    fit = Fit(np.array([0, 1]), np.array([0.004, -0.0043]), np.diag([0.001**2, 0.0018**2]), np.zeros(1), 0.0)
+    regression = SimpleNamespace(
+        keys_of=lambda *kinds: keys if kinds == ("nuisance",) else [],
+        columns=lambda asked: np.array([keys.index(k) for k in asked]),
+        fit=lambda asked, loose: fit,
+    )
+    model = SimpleNamespace(regression=regression)
+    assert WrenchModel.delivered_with(model, ["rotor_drag"], {}) == ["offset:surely", "rotor_drag"]

@@ -1,0 +1,1 @@
+"""What must not change a verdict: names, clocks, axes, order, format, and how often a sensor was written down."""
