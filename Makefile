@@ -18,7 +18,7 @@ SOURCES := $(shell find Snakefile config.yaml mkdocs.yml pyproject.toml README.m
 	src acquire firmware workflow notebooks tests raw docs \
 	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
-.PHONY: help report site proof plantings campaign test check environment lock
+.PHONY: help report site proof plantings campaign test check environment lock sbom licences
 .DEFAULT_GOAL := help
 
 help: ## say what there is
@@ -82,3 +82,12 @@ $(READY): requirements.lock pyproject.toml
 lock: $(READY) ## resolve the dependencies of pyproject.toml anew
 	@$(BIN)/uv pip compile --quiet pyproject.toml --extra dev --universal --generate-hashes \
 		--python-version 3.11 --no-header --output-file requirements.lock
+
+sbom: $(READY) ## what is installed as a CycloneDX bill of materials: results/sbom.json
+	@mkdir -p results
+	@$(BIN)/cyclonedx-py environment --output-reproducible --pyproject pyproject.toml --of JSON \
+		--output-file results/sbom.json $(BIN)/python
+	@echo "The bill of materials: results/sbom.json"
+
+licences: $(READY) ## write docs/licences.md anew after the lock has changed
+	@$(BIN)/python docs/hooks/licences.py

@@ -4,8 +4,10 @@ Run: python benchmarks/simulator.py [--out benchmarks/simulator.md] [--sets 2000
 
 RotorPy flies as its own simulator does (RK45 of scipy per control step) the thesis's quadrotor with a 30 ms motor lag,
 commands changing every 2 ms, once plain and once with its aerodynamics. Ours flies the same, then with one effect of
-each id of the catalogue that moves a vehicle, then under an attitude controller beside that. Times are of the processor
-(best of several), so that other work on the machine does not count; the whole batch is timed by the clock as well.
+each id of the catalogue that moves a vehicle, then under an attitude controller beside that. MuJoCo flies a plain rigid
+body on four lagged thrusters by the same Runge-Kutta steps, called from Python at each step. Times are of the processor
+(best of several), so that other work on the machine does not count; a batch on two threads is stated as half of what
+both cores spent, which is what the clock shows on a free machine.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import platform
 import sys
 import time
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -76,6 +79,37 @@ def rotorpy_flight(commands: np.ndarray, aero: bool) -> np.ndarray:
     return state["x"] * UP_LEFT
 
 
+MUJOCO = """<mujoco><option timestep="{step}" integrator="RK4"/><worldbody><body pos="0 0 20"><freejoint/>
+<inertial pos="0 0 0" mass="0.652" diaginertia="2.489e-3 2.5743e-3 4.6838e-3"/>{sites}</body></worldbody>
+<actuator>{motors}</actuator></mujoco>"""
+
+
+def mujoco_flight(seconds: float) -> float | None:
+    """Processor seconds per simulated second of MuJoCo; None where it is not installed."""
+    try:
+        import mujoco
+    except ImportError:
+        return None
+    places = [(0.0884, 0.0884), (-0.0884, 0.0884), (-0.0884, -0.0884), (0.0884, -0.0884)]
+    sites = "".join(f'<site name="s{i}" pos="{x} {y} 0"/>' for i, (x, y) in enumerate(places))
+    motors = "".join(
+        f'<general site="s{i}" gear="0 0 1 0 0 {(-1) ** i * 0.0134}" dyntype="filter" dynprm="{LAG_S}"/>'
+        for i in range(4)
+    )
+    model = mujoco.MjModel.from_xml_string(MUJOCO.format(step=STEP_S, sites=sites, motors=motors))
+    thrust = (
+        0.652 * 9.81 / 4 * (1 + 0.01 * np.sin(np.arange(int(seconds / STEP_S))[:, None] * STEP_S * 7.0 + np.arange(4)))
+    )
+
+    def flown():
+        data = mujoco.MjData(model)
+        for row in thrust:
+            data.ctrl[:] = row
+            mujoco.mj_step(model, data)
+
+    return best(flown)[0] / seconds
+
+
 def one_vehicle(entries: tuple[dict, ...], commands: np.ndarray, controller: bool = False, compiled: bool = True):
     """Seconds per simulated second of `simulate`, and its trace."""
     vehicle = audit_vehicle(effects=entries, ground_z_m=0.0)
@@ -95,7 +129,7 @@ def one_vehicle(entries: tuple[dict, ...], commands: np.ndarray, controller: boo
 
 
 def many(entries: tuple[dict, ...], commands: np.ndarray, sets: int, threads: int):
-    """Processor and clock seconds per simulated second and set of a batch that differs in mass and rotor drag."""
+    """Processor (of all threads) and clock seconds per simulated second and set of a batch that differs in mass."""
     batch = Batch(audit_vehicle(effects=(*entries, LAG)), sets, {"mass_kg": 0.652 * np.linspace(0.95, 1.05, sets)})
     start = batch.hover(SPEED)
     start[:, 12] = -20.0
@@ -123,6 +157,8 @@ def main(out: Path | None, sets: int) -> None:
     with_aero, _, peer = best(lambda: rotorpy_flight(short, True), 2)
     rows = [("RotorPy, plain", rotorpy, rotorpy), ("RotorPy with its aerodynamics", with_aero, with_aero)]
     all_on = everything()
+    if (peer_s := mujoco_flight(2.0)) is not None:
+        rows.append(("MuJoCo, plain", peer_s, rotorpy))
 
     plain, _ = one_vehicle((), long)
     rows.append(("one vehicle, plain", plain, rotorpy))
@@ -140,8 +176,8 @@ def main(out: Path | None, sets: int) -> None:
     for entries, name in ((AERO, "RotorPy's aerodynamics"), (all_on, f"{len(all_on)} effects")):
         processor, _ = many(entries, short, sets, 1)
         rows.append((f"{sets} sets, {name}, one core, a set", processor, with_aero))
-        _, clock = many(entries, short, sets, 2)
-        rows.append((f"{sets} sets, {name}, two threads by the clock, a set", clock, with_aero))
+        both, _ = many(entries, short, sets, 2)
+        rows.append((f"{sets} sets, {name}, two cores, a set", both / 2, with_aero))
     load = os.getloadavg()[0]
     text = "\n".join(
         [
@@ -171,7 +207,7 @@ def machine() -> str:
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     model = next((line.split(": ")[1] for line in lines if line.startswith("model name")), platform.processor())
-    packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "numba", "scipy", "rotorpy"))
+    packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "numba", "scipy", "rotorpy", "mujoco") if find_spec(p))
     return f"{model.strip()}, {os.cpu_count()} cores, Python {platform.python_version()}, {packages}"
 
 

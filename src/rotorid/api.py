@@ -17,11 +17,11 @@ import yaml
 from rotorid import templates
 from rotorid.errors import InputError
 from rotorid.exports import Exported, export_vehicle
+from rotorid.names import hint
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, vehicle_of
 from rotorid.recordings.belief import check_belief
 from rotorid.recordings.check import SetCheck, check_recordings
 from rotorid.recordings.files import check_rotors
-from rotorid.recordings.names import hint
 from rotorid.recordings.tables import check_table
 from rotorid.result import FILES, Result
 

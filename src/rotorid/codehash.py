@@ -43,6 +43,7 @@ class Code:
         self._source = self.root / "src"
         self._facts: dict[Path, _Facts] = {}
         self._files: dict[str, list[Path]] = {}
+        self._codes: dict[Path, str] = {}
         self._memory = Path(memory) if memory else None
         self._remembered = self._recall()
 
@@ -62,12 +63,14 @@ class Code:
             The script or a module that it reaches is not valid Python.
         """
         path = self.root / script
-        if not path.is_file():
-            raise FileNotFoundError(f"code_of: there is no file {path}.")
-        modules = self.reached_modules(path)
-        files = (path, *modules, *self._read_by(modules))
-        digests = [f"{file.name} {self._facts_of(file).digest}" for file in files]
-        return hashlib.sha256("\n".join(digests).encode()).hexdigest()[:16]
+        if path not in self._codes:
+            if not path.is_file():
+                raise FileNotFoundError(f"code_of: there is no file {path}.")
+            modules = self.reached_modules(path)
+            files = (path, *modules, *self._read_by(modules))
+            digests = [f"{file.name} {self._facts_of(file).digest}" for file in files]
+            self._codes[path] = hashlib.sha256("\n".join(digests).encode()).hexdigest()[:16]
+        return self._codes[path]
 
     def reached_modules(self, script: Path) -> list[Path]:
         """Files of the library that `script` reaches by imports of any depth, sorted."""

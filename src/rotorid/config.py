@@ -7,18 +7,17 @@ A stage that needs settings adds one class here and one field to `Config`; the J
 
 from __future__ import annotations
 
-import difflib
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from rotorid.errors import InputError
 from rotorid.mismatch.rules import RULES
-from rotorid.wording import expected, found
+from rotorid.wording import explained
 
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
 
@@ -299,68 +298,7 @@ def check(values: Mapping[str, Any], source: str = "config.yaml") -> Config:
     try:
         return Config.model_validate(dict(values))
     except ValidationError as error:
-        sentences = [_sentence(entry, source) for entry in _causes(error.errors())]
-        raise ConfigError("\n".join(sentences)) from None
-
-
-def _causes(entries: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """The entries of a pydantic error less lists that are too short only because what is in them is wrong."""
-    return [
-        entry
-        for entry in entries
-        if entry["type"] != "too_short"
-        or not any(e is not entry and e["loc"][: len(entry["loc"])] == entry["loc"] for e in entries)
-    ]
-
-
-def _sentence(entry: Mapping[str, Any], source: str) -> str:
-    """One sentence that names the key, from one entry of a pydantic error."""
-    key = _dotted(entry["loc"])
-    given, kind = entry.get("input"), entry["type"]
-    if kind == "extra_forbidden":
-        known = _keys_beside(entry["loc"])
-        close = difflib.get_close_matches(str(entry["loc"][-1]), known, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"known here are {', '.join(sorted(known))}."
-        return f"{source}: {key} is not a known key; {hint}"
-    if kind == "missing":
-        return f"{source}: {key} is missing."
-    if kind == "value_error":
-        return f"{source}: {key + ': ' if key else ''}{entry['ctx']['error']}."
-    wanted = expected(entry)
-    sentence = f"{source}: {key} is {found(entry)}, but it must be {wanted}."
-    if isinstance(given, str) and "number" in wanted and _reads_as_number(given):
-        sentence += " (YAML takes a number with an exponent only with a point and a sign: 1.0e-3.)"
-    return sentence
-
-
-def _reads_as_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _dotted(location: tuple[str | int, ...]) -> str:
-    """`("report", "chapters", 0)` as `report.chapters[0]`."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
-
-
-def _keys_beside(location: tuple[str | int, ...]) -> list[str]:
-    """The keys that the model knows in the section where `location` lies."""
-    section: type[BaseModel] = Config
-    for part in location[:-1]:
-        if isinstance(part, str) and part in section.model_fields:
-            section = next(_sections_in(section.model_fields[part].annotation), section)
-    return list(section.model_fields)
-
-
-def _sections_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """The section classes inside a type such as `dict[str, Filter]`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for inner in get_args(annotation):
-        yield from _sections_in(inner)
+        raise ConfigError("\n".join(f"{source}: {clause}" for clause in explained(error, Config))) from None
 
 
 def schema_text() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -40,3 +41,8 @@ def to(path: str | Path) -> Iterator[None]:
             root.removeHandler(handler)
             root.setLevel(level)
             handler.close()
+
+
+def progress(text: str) -> None:
+    """One line for the person who waits."""
+    print(f"  {text}", file=sys.stderr, flush=True)

@@ -28,9 +28,14 @@ MADE_OF = {
     "public": "Real recordings of other laboratories.",
     "thesis": "Real, printed in the thesis.",
     "mixed": "Real and simulated recordings.",
+    "campaign_simulated": "Recorded on the instruments, and simulated.",
+    "emulated_simulated": "Emulated instruments, and simulated.",
+    "drawn": "Drawn after the thesis.",
     "scheme": "",
 }
 """What a figure or table is made of, as its caption says first."""
+_SIGNS = re.compile(r"""[\\`*_{}\[\]<>#|$^~@&'"]|(?<=-)-|(?<=\.)\.""")
+"""What markdown reads as its own, with what pandoc would set as dashes, dots, quotation marks and entities."""
 WIDEST = 40
 """A column longer than this many characters gets no more room in a table."""
 
@@ -73,7 +78,7 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
     def captioned(caption: str, kind: str) -> str:
         if kind not in MADE_OF:
             raise ProseError(f"{path}: a figure or table is made of {', '.join(MADE_OF)}, not {kind!r}.")
-        made_of = MADE_OF["emulated" if emulated and kind == "campaign" else kind]
+        made_of = MADE_OF[kind.replace("campaign", "emulated") if emulated else kind]
         return f"*{made_of}* {caption}" if made_of else caption
 
     def figure(name: str, caption: str, kind: str, width: str = "100%", moving: str = "") -> str:
@@ -175,8 +180,9 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     caption
         Text above the table, markdown.
     columns
-        `(key, heading)` or `(key, heading, form)`; `form` is `text`, `symbol` (`J_xx` set as mathematics), or
-        `fixN`, `sciN` or `percentN` with N decimals.
+        `(key, heading)` or `(key, heading, form)`; `form` is `text`, `name` and `unit` (text that stays on one line; of
+        a unit with its powers raised), `symbol` (`J_xx` set as mathematics), `fixN`, `sciN` or `percentN` with N
+        decimals, or `sigN` with N significant digits.
     label
         Identifier for references.
     """
@@ -190,13 +196,14 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     ]
     attributes = f" widths={shares_of(headings, cells)}" if too_wide(headings, cells) else ""
     rules = [
-        ":" + "-" * width if form in ("text", "symbol") else "-" * width + ":"
-        for width, form in zip(widths, forms, strict=True)
+        ":" + "-" * width if form in WORDS else "-" * width + ":" for width, form in zip(widths, forms, strict=True)
     ]
     lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}{attributes}}}\n"
 
 
+WORDS = ("text", "name", "unit", "symbol")
+"""Forms of columns that are set from the left."""
 LINE_PT = 453.0
 """Width of the page's text, pt."""
 LETTER_PT, BOLD_PT, GAP_PT = 4.5, 5.0, 12.0
@@ -246,11 +253,13 @@ def _row(cells: Sequence[str]) -> str:
 
 def _formatted(value: Any, form: str) -> str:
     name, decimals = form.rstrip("0123456789"), form[len(form.rstrip("0123456789")) :]
-    if name in ("text", "symbol"):
-        return {"text": text, "symbol": symbol}[name](value)
-    if name not in ("fix", "sci", "percent") or not decimals:
-        raise ValueError(f"{form} is not a form of a number; forms are text, symbol, fixN, sciN and percentN")
-    return {"fix": fix, "sci": sci, "percent": percent}[name](value, int(decimals))
+    if name in WORDS:
+        return {"text": text, "name": one_line, "unit": unit, "symbol": symbol}[name](value)
+    if name not in ("fix", "sci", "sig", "percent") or not decimals:
+        raise ValueError(
+            f"{form} is not a form of a number; forms are {', '.join(WORDS)}, fixN, sciN, sigN and percentN"
+        )
+    return {"fix": fix, "sci": sci, "sig": sig, "percent": percent}[name](value, int(decimals))
 
 
 def fix(value: float | None, decimals: int) -> str:
@@ -272,6 +281,15 @@ def sci(value: float | None, decimals: int) -> str:
     return f"{mantissa.replace('-', '−')}\u00a0×\u00a010^{str(int(exponent)).replace('-', '−')}^"
 
 
+def sig(value: float | None, digits: int) -> str:
+    """A number with so many significant digits, below a thousandth with a power of ten."""
+    if value is None or math.isnan(value):
+        return "–"
+    if value and not 1e-3 <= abs(value) < 1e5:
+        return sci(value, digits - 1)
+    return fix(value, max(0, digits - 1 - (math.floor(math.log10(abs(value))) if value else 0)))
+
+
 def percent(value: float | None, decimals: int) -> str:
     """A share in per cent, without the sign: 0.021 is `2.1`."""
     return fix(None if value is None else 100 * value, decimals)
@@ -283,10 +301,30 @@ def interval(ends: Sequence[float], decimals: int, form: str = "fix") -> str:
     return f"{shown(ends[0], decimals)} to {shown(ends[1], decimals)}"
 
 
+GREEK = {"tau": "tau", "eps": "varepsilon", "alpha": "alpha", "beta": "beta", "zeta": "zeta", "omega": "omega"}
+
+
 def symbol(value: str) -> str:
-    """A symbol with its index as mathematics: `J_xx` is `$J_{xx}$`."""
+    """A symbol with its index as mathematics: `J_xx` is `$J_{xx}$`, `tau` a Greek letter, `gain_x` upright."""
     letter, _, index = value.partition("_")
+    if letter in GREEK:
+        letter = "\\" + GREEK[letter]
+    elif len(letter) > 1:
+        letter = f"\\mathrm{{{letter}}}"
+    index = index.replace("_", ",")
     return f"${letter}_{{{index}}}$" if index else f"${letter}$"
+
+
+def one_line(value: Any) -> str:
+    """A text that is not broken at its spaces and hyphens."""
+    return text(value).replace(" ", "\u00a0").replace("-", "\u2011")
+
+
+def unit(value: Any) -> str:
+    """A unit on one line with its powers raised: `kg m2` is `kg m²`, `1e-6 N` is `10⁻⁶ N`."""
+    raised = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+    shown = re.sub(r"(?<=[A-Za-z])-?[0-9]+", lambda power: power[0].translate(raised), text(value))
+    return re.sub("^1e(?=[⁻⁰-⁹¹²³])", "10", shown).replace(" ", "\u00a0")
 
 
 def text(value: Any) -> str:
@@ -295,4 +333,4 @@ def text(value: Any) -> str:
         return "–"
     if isinstance(value, float) and value.is_integer():
         value = int(value)
-    return "".join("\\" + sign if sign in "\\`*_{}[]<>#|$^~@" else sign for sign in str(value))
+    return _SIGNS.sub(r"\\\g<0>", str(value))

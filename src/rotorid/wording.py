@@ -1,9 +1,13 @@
-"""What a pydantic model expected, in plain words: no wording of the validator's own reaches a user."""
+"""Faults that a pydantic model finds, in plain words: no wording of the validator's own reaches a user."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from rotorid.names import hint, listed
 
 _EXACT = {
     "greater_than": "a number greater than {gt:g}",
@@ -30,8 +34,77 @@ _BY_START = (
     ("tuple", "a list"),
     ("list", "a list"),
 )
+_BRANCHES = ("float", "tuple[float, ...]", "constrained-float", "int", "str", "constrained-int")
+"""Parts of a pydantic location that name a kind of value, not a key."""
 LONGEST = 80
 """Characters of a value that is quoted."""
+MOST_KEYS = 8
+"""Keys that are listed where none is like the one given."""
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first fault of a pydantic error as one clause: key, found, expected, the nearest name."""
+    return explained(error, model)[0]
+
+
+def explained(error: ValidationError, model: type[BaseModel]) -> list[str]:
+    """Every fault of a pydantic error as a clause.
+
+    A misspelled key is also a missing one: it comes first, as its name says more. A list that is too short only because
+    what is in it is wrong is passed over.
+    """
+    entries = error.errors()
+    faults = [
+        entry
+        for entry in entries
+        if entry["type"] != "too_short"
+        or not any(e is not entry and e["loc"][: len(entry["loc"])] == entry["loc"] for e in entries)
+    ]
+    return [_clause(entry, model) for entry in sorted(faults, key=lambda e: e["type"] != "extra_forbidden")]
+
+
+def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
+    location, kind = entry["loc"], entry["type"]
+    key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
+    if kind == "extra_forbidden":
+        known = sorted(keys_at(model, location))
+        near = hint(str(location[-1]), known) or f"; known here are {listed(known, MOST_KEYS)}"
+        return f"{key}: no such key is known{near}"
+    if kind == "missing":
+        return f"{key}: is missing"
+    if kind == "value_error":
+        return ": ".join(x for x in (key, printable(entry["ctx"]["error"])) if x)
+    wanted = expected(entry)
+    clause = f"{key}: found {found(entry)}, expected {wanted}"
+    if "number" in wanted and _reads_as_number(entry.get("input")):
+        clause += " (YAML takes a number with an exponent only with a point and a sign: 1.0e-3)"
+    return clause
+
+
+def _reads_as_number(given: Any) -> bool:
+    if not isinstance(given, str):
+        return False
+    try:
+        float(given)
+    except ValueError:
+        return False
+    return True
+
+
+def keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
+    """Keys that `model` knows where a location of a pydantic error lies."""
+    for part in location[:-1]:
+        if isinstance(part, str) and part in model.model_fields:
+            model = next(_models_in(model.model_fields[part].annotation), model)
+    return list(model.model_fields)
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """The models inside a type such as `dict[str, Channel]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models_in(inner)
 
 
 def expected(entry: Mapping[str, Any]) -> str:

@@ -98,7 +98,7 @@ def test_check_says_what_is_lacking(flown: RecordingSet) -> None:
         (lambda t: t, "nowhere.yaml", "nowhere.yaml"),
         (lambda t: {}, "thesis", "holds no table"),
         (lambda t: 3, "thesis", "data is int"),
-        (lambda t: ["nothing.ulg"], None, "nothing.ulg: no such file"),
+        (lambda t: ["nothing.ulg"], None, "nothing.ulg: file is missing"),
     ],
 )
 def test_what_does_not_fit_is_told_in_one_sentence(flown: RecordingSet, spoil, vehicle, said: str) -> None:

@@ -272,8 +272,8 @@ def ros_messages(truth: pd.DataFrame, types, two: bool):
 ACTUATORS = "std_msgs/Header header\nfloat64[] position\nfloat64[] velocity\nfloat64[] normalized\n"
 
 
-def write_bag(path: Path, kind: str) -> Path:
-    """A bag of the known flight by rosbags' own writers; returns the path to import."""
+def write_bag(path: Path, kind: str, truth: pd.DataFrame) -> Path:
+    """A bag of a flight by rosbags' own writers; returns the path to import."""
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
@@ -290,7 +290,7 @@ def write_bag(path: Path, kind: str) -> Path:
         writer = Writer1(path)
     with writer:
         connections = {}
-        for topic, name, ns, message in ros_messages(flown(), store.types, two):
+        for topic, name, ns, message in ros_messages(truth, store.types, two):
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, name, typestore=store)
             raw = store.serialize_cdr(message, name) if two else store.serialize_ros1(message, name)
@@ -301,7 +301,7 @@ def write_bag(path: Path, kind: str) -> Path:
 @pytest.mark.parametrize("kind", ["bag", "mcap", "folder"])
 def test_ros(tmp_path: Path, kind: str) -> None:
     pytest.importorskip("rosbags")
-    path = write_bag(tmp_path / ("flight.bag" if kind == "bag" else "flight"), kind)
+    path = write_bag(tmp_path / ("flight.bag" if kind == "bag" else "flight"), kind, flown())
     found = read_log(path)
     assert found.format == "ros"
     (run,) = found.runs.values()

@@ -135,3 +135,33 @@ def test_symbols_are_set_as_mathematics() -> None:
     assert [prose.symbol(name) for name in ("m", "J_xx", "w_11")] == ["$m$", "$J_{xx}$", "$w_{11}$"]
     row = prose.table_of([{"name": "C_F"}], "Values.", [("name", "Parameter", "symbol")], "tbl:x").splitlines()[2]
     assert row == "| $C_{F}$ |"
+
+
+def test_units_and_names_stay_on_one_line_and_small_numbers_keep_their_digits() -> None:
+    assert [prose.unit(u) for u in ("kg m2", "N s2/(rad m)", "1e-6 kg/rad", "1")] == [
+        "kg\u00a0m²",
+        "N\u00a0s²/(rad\u00a0m)",
+        "10⁻⁶\u00a0kg/rad",
+        "1",
+    ]
+    assert prose.one_line("imrc-brushless a") == "imrc\u2011brushless\u00a0a"
+    assert [prose.sig(x, 3) for x in (0.20613, -0.00421, 12.0, 1.44e-6, None)] == [
+        "0.206",
+        "−0.00421",
+        "12.0",
+        "1.44\u00a0×\u00a010^−6^",
+        "–",
+    ]
+    assert [prose.symbol(s) for s in ("tau", "eps_x", "gain_x")] == [
+        "$\\tau$",
+        "$\\varepsilon_{x}$",
+        "$\\mathrm{gain}_{x}$",
+    ]
+
+
+def test_a_caption_of_two_kinds_says_that_instruments_were_emulated(tmp_path: Path, files: dict[str, str]) -> None:
+    text = '{{ figure("lines", "All lines.", kind="campaign_simulated") }}\n'
+    path = tmp_path / "chapter.md"
+    path.write_text(text)
+    assert "*Emulated instruments, and simulated.* All lines." in prose.render(path, files, emulated=True)
+    assert "*Recorded on the instruments, and simulated.*" in prose.render(path, files)

@@ -240,3 +240,22 @@ def test_a_run_that_is_not_there_is_a_key_error(folder: Path) -> None:
 )
 def test_the_unit_is_read_from_the_name(column: str, unit: str) -> None:
     assert c.unit_of(column) == unit
+
+
+def test_without_pyarrow_runs_are_packed_csv_and_parquet_is_refused_by_name(tmp_path, monkeypatch):
+    from rotorid import examples
+    from rotorid.recordings import tables
+
+    folder = tmp_path / "example"
+    examples.write(folder)
+    found = read_set(folder)
+    write_set(found, tmp_path / "with", ".parquet")
+    monkeypatch.setattr(tables, "find_spec", lambda name: None)
+    packed = write_set(found, tmp_path / "without")
+    assert sorted(p.name for p in packed.glob("flight*")) == ["flight_1.csv.gz", "flight_2.csv.gz"]
+    again = read_set(packed)
+    for one, other in zip(found.runs, again.runs, strict=True):
+        pd.testing.assert_frame_equal(one.table, other.table)
+    assert "flight_1.parquet: Parquet files need pyarrow" in message_of(tmp_path / "with" / "example")
+    with pytest.raises(InputError, match="pip install 'rotorid.parquet.'"):
+        write_set(found, tmp_path / "wished", ".parquet")

@@ -15,23 +15,23 @@ ROOT = Path(__file__).parents[2]
 SOUND = yaml.safe_load((ROOT / "config.yaml").read_text())
 INF, NAN = float("inf"), float("nan")
 WRONG = [
-    ("recordings", 7, "but it must be text"),
+    ("recordings", 7, "expected text"),
     ("recordings", "", "at least 1 character"),
-    ("recordings", None, "but it must be text"),
-    ("recordings", ["a"], "but it must be text"),
-    ("recordings", True, "but it must be text"),
-    ("raw", 7, "but it must be text"),
-    ("filter", 5, "but it must be keys with values"),
-    ("filter.bench", [], "but it must be keys with values"),
+    ("recordings", None, "expected text"),
+    ("recordings", ["a"], "expected text"),
+    ("recordings", True, "expected text"),
+    ("raw", 7, "expected text"),
+    ("filter", 5, "expected keys with values"),
+    ("filter.bench", [], "expected keys with values"),
     ("filter.bench.low_pass_hz", -1.0, "greater than 0"),
     ("filter.bench.low_pass_hz", 0.0, "greater than 0"),
     ("filter.bench.low_pass_hz", 25.0, "less than 25"),
     ("filter.bench.low_pass_hz", INF, "a finite number"),
     ("filter.bench.low_pass_hz", NAN, "a finite number"),
-    ("filter.bench.low_pass_hz", "1.5", "but it must be a number"),
+    ("filter.bench.low_pass_hz", "1.5", "expected a number"),
     ("filter.bench.low_pass_hz", "1e-3", "YAML takes a number with an exponent"),
-    ("filter.bench.low_pass_hz", True, "but it must be a number"),
-    ("filter.bench.low_pass_hz", None, "but it must be a number"),
+    ("filter.bench.low_pass_hz", True, "expected a number"),
+    ("filter.bench.low_pass_hz", None, "expected a number"),
     ("filter.bench.spike_window", 2, "3 or more"),
     ("filter.bench.spike_window", 5.5, "a whole number"),
     ("filter.jr3.steady_tolerance", INF, "a finite number"),
@@ -70,7 +70,7 @@ WRONG = [
     ("proof.batch", 0, "1 or more"),
     ("proof.peers", "yes", "true or false"),
     ("proof.peers", 1, "true or false"),
-    ("report.title", 5, "but it must be text"),
+    ("report.title", 5, "expected text"),
     ("report.chapters", [], "at least one entry"),
     ("report.chapters", ["../../etc"], "small letters"),
     ("report.chapters", ["A b"], "small letters"),
@@ -107,7 +107,7 @@ def test_a_misspelled_key_of_each_section_gets_the_right_one(section: str) -> No
     changed[section][key + "x"] = changed[section].pop(key)
     with pytest.raises(ConfigError) as error:
         check(changed)
-    assert f"{section}.{key}x is not a known key; did you mean {key}?" in str(error.value)
+    assert f"{section}.{key}x: no such key is known; did you mean {key}?" in str(error.value)
 
 
 def test_an_unknown_family_of_the_proof_is_named() -> None:

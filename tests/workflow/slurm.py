@@ -33,6 +33,7 @@ SlurmctldLogFile={folder}/slurmctld.log
 SlurmdLogFile={folder}/slurmd.log
 ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
+TaskProlog={folder}/prolog.sh
 MpiDefault=none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_CPU
@@ -67,6 +68,10 @@ def running(folder: Path) -> Iterator[dict[str, str]]:
     names = dict(host=host, folder=folder, controller=controller, node=node, memory=int(0.9 * memory))
     configuration = folder / "slurm.conf"
     configuration.write_text(CONFIGURATION.format(**names))
+    # A job's environment is cleared of the submitter's; its own srun must find this configuration, too.
+    prolog = folder / "prolog.sh"
+    prolog.write_text(f"#!/bin/sh\necho export SLURM_CONF={configuration}\n")
+    prolog.chmod(0o755)
     environment = {**os.environ, "SLURM_CONF": str(configuration), "PATH": _path()}
     munged = ["munged", "--foreground", "--force", f"--key-file={key}", f"--socket={folder}/munge.socket"]
     munged += [f"--{name}-file={folder}/munge.{name}" for name in ("pid", "log", "seed")]

@@ -47,7 +47,9 @@ def test_killed_in_the_middle_it_repeats_only_what_was_lost(fleet: Project) -> N
         running.wait()
     before = {path: path.stat().st_mtime_ns for path in verdicts(memory)}
     assert not (fleet.root / "results/fleet/sets.csv").exists()
-    done = subprocess.run([*command, "--nolock"], cwd=fleet.root, env=environment, capture_output=True, text=True)
+    # A killed Snakemake leaves its lock; the next one asks for this.
+    subprocess.run([*command, "--unlock"], cwd=fleet.root, env=environment, capture_output=True, check=True)
+    done = subprocess.run(command, cwd=fleet.root, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     after = {path: path.stat().st_mtime_ns for path in verdicts(memory)}
     assert len(after) == 3 and before.items() <= after.items()

@@ -62,4 +62,6 @@ def test_a_script_touches_snakemake_only_when_run_by_it(path: Path) -> None:
 @pytest.mark.parametrize("path", ACQUIRE, ids=lambda path: str(path.relative_to(ROOT)))
 def test_acquisition_uses_of_the_library_only_what_it_may(path: Path) -> None:
     used = {name for name in imported(ast.parse(path.read_text())) if name.startswith("rotorid")}
-    assert used <= {f"rotorid.{part}" for part in ("acquire", "io", "vehicle", "errors", "recordings")}
+    assert used <= {
+        f"rotorid.{part}" for part in ("acquire", "io", "vehicle", "errors", "recordings", "names", "wording")
+    }

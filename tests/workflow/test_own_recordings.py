@@ -1,10 +1,10 @@
 """Somebody's own recordings: taken by the index, from any folder, packed or plain, all kinds or only some."""
 
 import csv
-import gzip
 import json
 import re
 import shutil
+from hashlib import sha256
 from pathlib import Path
 
 import pandas as pd
@@ -13,6 +13,7 @@ import yaml
 from copied_project import Project
 from test_campaign import rewrite_index
 
+from rotorid.io import rawlog
 from rotorid.io.index import read_index, write_index
 
 EXPERIMENTS = {"1", "3", "22", "23", "24", "27"}
@@ -40,7 +41,14 @@ FOLLOWS = {  # what one more recording of a kind reruns
     },
     "static": {"Ingest: static, bench", "Filter: static, bench", "Bench: static tests"},
     "combined": {"Ingest: combined, bench", "Filter: combined, bench", "Bench: static tests"},
-    "dynamic": {"Ingest: dynamic, bench", "Filter: dynamic, bench", "Bench: dynamic tests"},
+    # A flight of the dynamic tests is recorded by the bench or by the reference sensor; a group of them holds both.
+    "dynamic": {
+        "Ingest: dynamic, bench",
+        "Filter: dynamic, bench",
+        "Ingest: dynamic, jr3",
+        "Filter: dynamic, jr3",
+        "Bench: dynamic tests",
+    },
     "tensile": {"Ingest: tensile, tensile", "Bench: tensile tests"},
     "thrust": {"Ingest: thrust, rotor"} | ROTOR,
     "torque": {"Ingest: torque, rotor", "Ingest: torque, wrench"} | ROTOR,
@@ -65,17 +73,33 @@ def jobs(project: Project) -> set[str]:
     return set(re.findall(r"^Job \d+: (.+)$", said, flags=re.MULTILINE))
 
 
-def record_again(raw: Path, rows: list[dict[str, str]], folder: Path) -> None:
+def record_again(raw: Path, rows: list[dict[str, str]], folder: Path, name: str = "mine") -> None:
     """The recordings of the first row's group once more, under other names and unpacked, in a folder of their own."""
     folder.mkdir(parents=True, exist_ok=True)
     for row in rows:
         if row["group"] != rows[0]["group"] or (row["kind"] == "calibration" and row is not rows[0]):
             continue
-        name = f"mine-{row['kind']}-{row['instrument']}"
+        own = f"{name}-{row['kind']}-{row['instrument']}"
         content = yaml.safe_load((raw / row["metadata"]).read_text())
-        content |= {"id": name, "log": f"{name}.rlog", "group": f"mine-{row['kind']}"}
-        (folder / f"{name}.rlog").write_bytes(gzip.decompress((raw / row["file"]).read_bytes()))
-        (folder / f"{name}.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+        log = under_another_name(raw / row["file"], own)
+        content |= {
+            "id": own,
+            "log": f"{own}.rlog",
+            "group": f"{name}-{row['kind']}",
+            "log_sha256": sha256(log).hexdigest(),
+        }
+        (folder / f"{own}.rlog").write_bytes(log)
+        (folder / f"{own}.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+
+
+def under_another_name(log: Path, name: str) -> bytes:
+    """The log, unpacked, with another recording's name in the note that opens it."""
+    packed = [rawlog.MAGIC]
+    for tag, host_ns, data in rawlog.read_raw(log).chunks:
+        if tag == rawlog.NOTE and (note := json.loads(data)).get("note") == "begin":
+            data = json.dumps(note | {"id": name}).encode()
+        packed.append(rawlog.pack_chunk(tag, host_ns, data))
+    return b"".join(packed)
 
 
 def points(project: Project) -> dict[str, int]:
@@ -129,12 +153,7 @@ def test_a_folder_with_thrust_tests_alone_gives_the_thrust_coefficient(project: 
     thrust = [row for row in read_index(raw) if row["kind"] == "thrust"][::5]
     elsewhere = project.root / "mine"
     for number, row in enumerate(thrust):
-        record_again(raw, [row], elsewhere / str(number))
-        for suffix in ("rlog", "yaml"):
-            path = elsewhere / str(number) / f"mine-thrust-rotor.{suffix}"
-            text = path.read_bytes().replace(b"mine-thrust-rotor", f"mine-{number}".encode())
-            (path.parent / f"mine-{number}.{suffix}").write_bytes(text)
-            path.unlink()
+        record_again(raw, [row], elsewhere, f"mine-{number}")
     write_index(elsewhere)
     project.snakemake("results/white_box/parameters.json", "--config", "raw=mine")
     fits = json.loads((project.root / "results/white_box/parameters.json").read_text())

@@ -1,13 +1,16 @@
 """The report's own machinery: numbering, references, and both files from one source."""
 
 import base64
+import csv
 import html
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
-from rotorid import typeset
+from rotorid import prose, typeset
 from tests.browser import CHROMIUM, Browser
 
 ROOT = Path(__file__).parents[2]
@@ -132,3 +135,61 @@ def test_the_html_is_as_wide_as_the_window_and_says_nothing_to_the_console(chapt
         assert browser.said == []
         assert browser.value("document.documentElement.scrollWidth") <= width
         assert browser.value("[...document.images].every((image) => image.naturalWidth > 0)")
+
+
+NASTY = [
+    "<img src=x onerror=document.title='taken'>",
+    "<script>document.title='taken'</script>",
+    "{x} {{ 7*7 }} {% raw %}",
+    "$\\frac{1}{$",
+    '#eval("1+1") #text(red)[x] @fig',
+    "[a](javascript:alert(1)) ![b](x.png)",
+    "*bold* _thin_ `code` ~~gone~~ H~2~O ^up^",
+    '&lt;b&gt; &amp; it\'s "so" -- ... a|b',
+    "\\textbf{x} \\(y\\) <!-- z -->",
+]
+"""Names, notes and columns as somebody may call them."""
+
+
+@pytest.fixture
+def named(chapters: list[str]) -> list[str]:
+    """A chapter with a table of such names, and one of them in a sentence and in its caption."""
+    with open("names.csv", "w", newline="") as file:
+        csv.writer(file).writerows([["name", "x"], *([name, 1] for name in NASTY)])
+    Path("three.md").write_text(
+        "# Third {#sec:third}\n\nRun {{ names[0].name|text }} and {{ names[4].name|text }}.\n\n"
+        '{{ table("names", "Names.", [["name", "name", "text"], ["x", "x", "fix0"]], kind="public") }}\n'
+    )
+    Path("named.md").write_text(prose.render("three.md", {"names": "names.csv"}))
+    return ["named.md"]
+
+
+def test_names_with_markup_are_text_in_the_html(named: list[str]) -> None:
+    typeset.html(named, "Title", "Subtitle", PARTS, "report.html")
+    page = Path("report.html").read_text()
+    seen = re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", "", page)))
+    assert [name for name in NASTY if name not in seen] == []
+    assert not re.search(r"<(img|script|a)[^>]*(taken|javascript|x\.png)", page)
+
+
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="needs pdftotext")
+def test_names_with_markup_are_text_in_the_pdf(named: list[str]) -> None:
+    """Before: an entity became its sign, quotation marks and dashes others."""
+    typeset.typst_source(named, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.pdf("report.typ", "report.pdf")
+    seen = subprocess.run(["pdftotext", "-layout", "report.pdf", "-"], capture_output=True, text=True).stdout
+    letters = re.sub(r"[\s-]", "", seen.replace("…", "..."))  # lines break inside names; typst sets three dots as one
+    assert [name for name in NASTY if re.sub(r"[\s-]", "", name) not in letters] == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+def test_a_browser_runs_nothing_in_the_html(named: list[str]) -> None:
+    typeset.html(named, "Title", "Subtitle", PARTS, "report.html")
+    page = Path("report.html").read_text()
+    for put in ("<script>document.title = 'taken'</script>", "<img src=x onerror=\"document.title = 'taken'\">"):
+        Path("put.html").write_text(page.replace("</main>", put + "</main>").replace("</body>", put + "</body>"))
+        with Browser(Path.cwd()) as browser:
+            browser.open(Path("put.html"), 800)
+            assert browser.value("document.title") == "Title"
+            assert any("Content Security Policy" in said for said in browser.said), browser.said

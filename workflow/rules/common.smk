@@ -1,5 +1,6 @@
 """What every stage uses: the checked configuration and the code of the library as a parameter."""
 
+from functools import cache
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -27,6 +28,21 @@ def code_of_chapter(name):
     return code_of("run_notebook") + code_of(f"notebooks/{name}.ipynb")
 
 
+def producers_of(path):
+    """Rules known by now that make a file, each with the results that it needs for that."""
+    return remembered_producers(path, sum(1 for _ in workflow.rules))
+
+
+@cache
+def remembered_producers(path, count):
+    """The same of so many rules: files are asked about many times, and Snakemake tries every rule's pattern on each."""
+    made_by = []
+    for producer in (known for known in workflow.rules if known.is_producer(path)):
+        inputs, *_ = producer.expand_input(producer.get_wildcards(path))
+        made_by.append((producer.name, [str(file) for file in inputs if str(file).startswith("results/")]))
+    return made_by
+
+
 def results_behind(*files):
     """The files and every result that they hang on, for a target to ask for by name.
 
@@ -36,9 +52,8 @@ def results_behind(*files):
     while waiting:
         path = waiting.pop()
         found.add(path)
-        for producer in (known for known in workflow.rules if known.is_producer(path)):
-            inputs, *_ = producer.expand_input(producer.get_wildcards(path))
-            waiting += {str(file) for file in inputs if str(file).startswith("results/")} - found
+        for _, inputs in producers_of(path):
+            waiting += set(inputs) - found
     return sorted(found)
 
 
@@ -47,13 +62,12 @@ def rules_behind(*files):
     found, seen, waiting = set(), set(), [(path, None) for path in files]
     while waiting:
         path, reader = waiting.pop()
-        for producer in (known for known in workflow.rules if known.is_producer(path)):
-            if reader not in (None, producer.name):
-                found.add((producer.name, reader))
+        for producer, inputs in producers_of(path):
+            if reader not in (None, producer):
+                found.add((producer, reader))
             if path not in seen:
                 seen.add(path)
-                inputs, *_ = producer.expand_input(producer.get_wildcards(path))
-                waiting += [(str(file), producer.name) for file in inputs if str(file).startswith("results/")]
+                waiting += [(file, producer) for file in inputs]
     return sorted(found)
 
 

@@ -1,16 +1,19 @@
 """From raw logs to tidy tables: one table of samples and one of recordings for each kind of test and instrument."""
 
-import csv
+from rotorid.errors import InputError
+from rotorid.io.index import read_index
 
 INDEX = f"{CONFIG.raw}/sessions.tsv"
 
 
 def index_rows():
     """Rows of the index of recordings; none where there is no index."""
-    if not Path(INDEX).is_file():
+    if not Path(INDEX).exists() and not Path(INDEX).is_symlink():
         return []
-    with open(INDEX, encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file, delimiter="\t"))
+    try:
+        return read_index(Path(CONFIG.raw))
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
 
 
 # The index is read here and is no rule's input: a new row reruns only what its own kind of test feeds.

@@ -25,9 +25,9 @@ def set_files(wildcards):
     if not files:
         raise WorkflowError(f"{folder}: no such recording set (a folder with vehicle.yaml and runs)")
     for path in files:
-        if "{" in path or "}" in path:
+        if set(path) & set("{}<>"):
             raise WorkflowError(
-                f"{path}: Snakemake takes braces in a name for a wildcard; rename it without them"
+                f"{path}: Snakemake takes braces and angle brackets in a name for its own; rename it without them"
             )
     return files
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -20,8 +21,11 @@ def one_sentence() -> Iterator[None]:
     except InputError as error:
         typer.echo(f"rotorid: {error}", err=True)
         raise typer.Exit(1) from None
-    except (PermissionError, IsADirectoryError, NotADirectoryError) as error:
-        typer.echo(f"rotorid: {error.filename}: {error.strerror.lower()}", err=True)
+    except OSError as error:  # a full disk, a folder that cannot be written
+        if error.errno is None or error.errno == errno.EPIPE:
+            raise
+        where = f"{error.filename}: " if error.filename else ""
+        typer.echo(f"rotorid: {where}{(error.strerror or str(error)).lower()}", err=True)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         typer.echo("rotorid: stopped; nothing is left half written", err=True)

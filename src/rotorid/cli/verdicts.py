@@ -73,6 +73,10 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
 
     With `series` the residuals are written, too, as `series.parquet`.
     """
+    from rotorid.recordings.tables import NO_PARQUET, parquet_is_here, write_table
+
+    if series and not parquet_is_here():
+        raise InputError(f"{target / 'series.parquet'}: {NO_PARQUET}")
     with progress(None, quiet) as step:
         step(f"reading {folder.name}")
         # The effects bring a compiler along, whose start takes seconds.
@@ -93,7 +97,7 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
         if series:
             from rotorid.result import residuals_of
 
-            residuals_of(analysis).to_parquet(target / "series.parquet", index=False)
+            write_table(residuals_of(analysis), target / "series.parquet")
         return verdict.sentence
 
 

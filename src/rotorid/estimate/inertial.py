@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from rotorid.compiling import compiled
 from rotorid.networks.training import Training
 
 MASK = np.array([[1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]], float)
@@ -76,7 +76,7 @@ class NetworkFit:
         return inertias_of_weights(self.weights)
 
 
-@njit(cache=True)
+@compiled()
 def _delta_rule(weights, inputs, targets, order, rate, epochs, group, every):  # pragma: no cover - compiled
     """Train the weights (3, 6) in place; the mean squared error (kept, 3) of each `every`-th epoch.
 

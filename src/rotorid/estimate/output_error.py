@@ -12,9 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.stats import t as student_t
 
+from rotorid.compiling import compiled
 from rotorid.estimate.inertial import weights_of_inertias
 
 
@@ -43,14 +43,14 @@ def joined(parts: list[RateWindows]) -> RateWindows:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slope(weights, p, q, r, a, b, c, out):
     out[0] = weights[0] * q * r + weights[3] * a - weights[6] * p
     out[1] = weights[1] * p * r + weights[4] * b - weights[7] * q
     out[2] = weights[2] * p * q + weights[5] * c - weights[8] * r
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _simulate(weights, start, moments, extra, dt, out):
     k1, k2, k3, k4 = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for w in range(start.shape[0]):

@@ -18,7 +18,7 @@ CONCEALED = ({"id": "rotor_drag", "form": "at the hubs", "parameters": {"k_d": 1
 
 def names() -> tuple[str, ...]:
     """Files of the set, sorted."""
-    return tuple(sorted(p.name for p in files(__name__).iterdir() if p.name.endswith((".yaml", ".parquet"))))
+    return tuple(sorted(p.name for p in files(__name__).iterdir() if p.name.endswith((".yaml", ".csv.gz"))))
 
 
 def write(folder: Path) -> tuple[Path, ...]:

@@ -8,6 +8,7 @@ from rotorid import templates
 from rotorid.control.swings import swings
 from rotorid.examples import CONCEALED, EVERY, FLIGHTS, SECONDS, SEED
 from rotorid.recordings import write_vehicle
+from rotorid.recordings.tables import write_table
 
 HEADING = """\
 # Two flights of {seconds:g} s of the thesis's quadrotor, simulated by rotorid with seed {seed}. What the vehicle
@@ -16,7 +17,7 @@ HEADING = """\
 
 
 def main(folder: Path) -> None:
-    """Fly and write `vehicle.yaml` and a Parquet file a flight; the same bytes in every run."""
+    """Fly and write `vehicle.yaml` and a table a flight, packed; the same bytes in every run."""
     vehicle = templates.read("thesis").model_copy(update={"effects": CONCEALED})
     flown = swings(vehicle, "example", SECONDS, FLIGHTS, SEED, every=EVERY)
     write_vehicle(flown.vehicle, folder / "vehicle.yaml")
@@ -24,7 +25,7 @@ def main(folder: Path) -> None:
     path.write_text(HEADING.format(seconds=SECONDS, seed=SEED) + path.read_text(encoding="utf-8"), encoding="utf-8")
     for run in flown.runs:
         table = run.table.astype(np.float32).assign(time_s=run.time_s.round(6))
-        table.to_parquet(folder / f"{run.name}.parquet", index=False, compression="zstd")
+        write_table(table, folder / f"{run.name}.csv.gz")
 
 
 if __name__ == "__main__":

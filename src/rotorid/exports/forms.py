@@ -30,6 +30,10 @@ class Exported:
     left_out: tuple[str, ...] = ()
     parameters: dict = field(default_factory=dict)
     """RotorPy only: the parameters as RotorPy takes them."""
+    rotor_order: tuple[int, ...] = ()
+    """gym-pybullet-drones only: which of our rotors, from 0, its links 0 to 3 are."""
+    mirrored: bool = False
+    """gym-pybullet-drones only: the rotors turn as in its DroneModel.RACE."""
 
 
 @dataclass(frozen=True)
@@ -348,6 +352,9 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     if np.abs(j - np.diag(np.diag(j))).max() > 0 or any(e["id"] == "inertia_products" for e in vehicle.effects):
         left.append("products of inertia: it takes the diagonal alone")
     left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it has 9.8")
+    left.append(
+        "air without friction: it leaves on Bullet's damping, a deceleration of 0.04 (1 + |v|) v and so for turning"
+    )
     hover = _hover(vehicle)
     limit = (vehicle.rotor_speed_limits_rad_s or (0.0, 2 * hover))[1]
     lift = float(parts.thrust.sum() * limit**2 / (parts.mass_kg * vehicle.gravity_m_s2))
@@ -397,7 +404,7 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
   <joint name="center_of_mass_joint" type="fixed"><parent link="base_link"/><child link="center_of_mass_link"/></joint>
 </robot>
 """
-    return Exported(text, "vehicle.urdf", tuple(left))
+    return Exported(text, "vehicle.urdf", tuple(left), rotor_order=tuple(order), mirrored=turned)
 
 
 def _round_the_left(places: np.ndarray, signs: np.ndarray, name: str) -> tuple[list[int], bool]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.networks.network import Network, gradients
-from rotorid.recordings.text_files import check_file
+from rotorid.text_files import check_file
 from rotorid.wording import printable
 
 LOGGER = logging.getLogger("rotorid.networks")

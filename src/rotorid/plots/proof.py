@@ -21,7 +21,7 @@ def targets(summary: pd.DataFrame) -> Figure:
     """Each rate that has a target, its 95 % interval, and the stretch that the target allows; grey: not refuted."""
     rows = summary[summary["at_least"].notna() | summary["at_most"].notna()]
     rows = rows[rows["value"].notna() & ~rows["id"].str.endswith(("oracle", "better", "failed"))].iloc[::-1]
-    fig, ax = style.figure(0.8 + 0.2 * len(rows))
+    fig, ax = style.figure(0.6 + 0.17 * len(rows))
     for k, row in enumerate(rows.itertuples()):
         low = row.at_least if np.isfinite(row.at_least) else 0.0
         high = row.at_most if np.isfinite(row.at_most) else 1.0

@@ -26,7 +26,7 @@ def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: d
     names
         Heading of each panel.
     """
-    fig, axes = style.figure(4.4, rows=2, columns=2, sharex=True)
+    fig, axes = style.figure(4.2, rows=2, columns=2, sharex=True)
     for axis, (propeller, fits) in zip(axes.flat, pooled.items(), strict=False):
         mine = points[(points["propeller"] == propeller) & points["used"]]
         for cells, colour in (("2s", style.BLUE), ("3s", style.ORANGE)):
@@ -65,7 +65,7 @@ def motors(table: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) 
     names
         Heading of each panel.
     """
-    fig, axes = style.figure(3.4, columns=len(names), sharey=True)
+    fig, axes = style.figure(2.5, columns=len(names), sharey=True)
     letters = sorted(table["motor"].unique())
     for axis, propeller in zip(np.atleast_1d(axes), names, strict=True):
         for form, colour, shift in (("origin", style.BLACK, -0.15), ("offset", style.RED, 0.15)):

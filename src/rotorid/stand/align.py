@@ -42,6 +42,9 @@ class Pair:
     """Two recordings of one experiment on the host's clock, by arrival times alone."""
 
     name: str
+    """The group of its recordings, as whoever recorded them called it."""
+    experiment: int
+    """Its number in the thesis's table A.1."""
     sine: bool
     quadrotor: pd.DataFrame
     """Samples with `host_s`, when they were taken."""
@@ -56,11 +59,13 @@ def on_host(table: pd.DataFrame, largest_error: float) -> tuple[pd.DataFrame, fl
     return table.assign(host_s=line.host(table["time_s"].to_numpy())), line.rate
 
 
-def pair_of(name: str, sine: bool, quadrotor: pd.DataFrame, wrench: pd.DataFrame, largest_error: float) -> Pair:
+def pair_of(
+    name: str, experiment: int, sine: bool, quadrotor: pd.DataFrame, wrench: pd.DataFrame, largest_error: float
+) -> Pair:
     """Both recordings by their arrival times."""
     first, rate_1 = on_host(quadrotor, largest_error)
     second, rate_2 = on_host(wrench, largest_error)
-    return Pair(name, sine, first, second, (rate_1, rate_2))
+    return Pair(name, experiment, sine, first, second, (rate_1, rate_2))
 
 
 def lift_cause(quadrotor: pd.DataFrame, when_s: np.ndarray, thrust_of: Callable) -> np.ndarray:
@@ -157,7 +162,7 @@ def table(aligned: list[Aligned]) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {
-                "experiment": int(entry.pair.name.split("-")[1]),
+                "experiment": entry.pair.experiment,
                 "sine": entry.pair.sine,
                 "quadrotor_rate_error": entry.pair.rates[0] - 1,
                 "wrench_rate_error": entry.pair.rates[1] - 1,

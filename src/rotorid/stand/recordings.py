@@ -117,6 +117,7 @@ def read_pairs(quadrotor: tuple, wrench: tuple, largest_error: float) -> list[Pa
     return [
         pair_of(
             sent.group,
+            int(sent.experiment),
             EXPERIMENTS[int(sent.experiment)].frequency_hz is not None,
             commands[sent.id],
             felt[read.id],

@@ -4,32 +4,39 @@ The same equations, step by step, as the array code in `rotorid.vehicle.simulato
 written as loops over vehicles for numba because a profile of the array code shows its time to go into calls on small
 arrays. Tests hold that both give the same numbers.
 
+Vehicles fly in blocks, as many at a time as there are records of an instant: each kernel is called for all of a block
+before the next kernel, which halves its cost, as the processor then works on several vehicles at once and guesses right
+where a call goes. What a vehicle does hangs on nothing of its block.
+
 A state is rates 0:3, quaternion 3:7, velocity (world) 7:10, position 10:13, rotor speeds 13:, SI.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from rotorid.compiling import compiled
 from rotorid.vehicle.kernels import call_kernel
 
 MOST_ROUNDS = 30
 CONVERGED = 1e-10
 """Change of the accelerations, relative to their largest, at which they are taken as solved for."""
+UNKNOWN, FOUND, EXACT = 0, 1, 2
+"""What is known of how accelerations answer to themselves: nothing yet, the matrix of the flight, and that its step was
+exact at this step's beginning, so that one is enough at the step's other stages."""
 
 
-@njit(cache=True, error_model="numpy")
-def _clear(w):
+@compiled(error_model="numpy")
+def _clear(v, w):
     for j in range(3):
         w.force[j] = 0.0
         w.moment[j] = 0.0
-    for i in range(w.hub_force.shape[0]):
+    for i in range(v.rotors):
         for j in range(3):
             w.hub_force[i, j] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _collect(v, w, wrench):
     """Add what the kernels left in `w` to a force and moment (6,) of the scratch record."""
     for j in range(3):
@@ -46,7 +53,7 @@ def _collect(v, w, wrench):
         wrench[5] += x * fy - y * fx
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _solved(m, v, own, wrench):
     """Accelerations `own` (6,), angular then linear, under a force and moment (6,)."""
     p, q, r = m.angular_velocity[0], m.angular_velocity[1], m.angular_velocity[2]
@@ -61,22 +68,34 @@ def _solved(m, v, own, wrench):
         own[3 + j] = wrench[j] / v.mass
 
 
-@njit(cache=True, error_model="numpy")
-def _implicit(m, v, w, x, addresses, explicit, offsets, values):
-    """Accelerations `x.own` that follow where the effects that read accelerations are told `x.at`."""
+@compiled(error_model="numpy")
+def _tell(m, v, w, x):
+    """Tell the effects that read accelerations those of `x.at`; what they add is to be collected from nothing."""
     for j in range(3):
         m.angular_acceleration[j] = x.at[j]
         m.specific_force[j] = x.at[3 + j]
-    _clear(w)
-    for e in range(explicit, addresses.shape[0]):
-        call_kernel(addresses[e], m, v, values, offsets[e], w)
+    _clear(v, w)
+
+
+@compiled(error_model="numpy")
+def _follow(m, v, w, x):
+    """Accelerations `x.own` that follow from what the effects did with those of `x.at`."""
     for j in range(6):
         x.wrench[j] = x.base[j]
     _collect(v, w, x.wrench)
     _solved(m, v, x.own, x.wrench)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
+def _implicit(m, v, w, x, addresses, explicit, offsets, values, shift):
+    """Accelerations `x.own` that follow where the effects that read accelerations are told `x.at`."""
+    _tell(m, v, w, x)
+    for e in range(explicit, addresses.shape[0]):
+        call_kernel(addresses[e], m, v, values, offsets[e] + shift, w)
+    _follow(m, v, w, x)
+
+
+@compiled(error_model="numpy")
 def _invert(matrix):
     """Put a small matrix's inverse in its place, by Gauss and Jordan with pivots from the column.
 
@@ -110,31 +129,26 @@ def _invert(matrix):
             matrix[i, order[j]] = copy[i, j]
 
 
-@njit(cache=True, error_model="numpy")
-def _relaxation(m, v, w, x, addresses, explicit, offsets, values):
+@compiled(error_model="numpy")
+def _relaxation(m, v, w, x, addresses, explicit, offsets, values, shift):
     """(I − A)⁻¹ of how the accelerations answer to themselves, A: added mass and inertia, constant in a flight."""
     for j in range(6):
         x.at[j] = 0.0
-    _implicit(m, v, w, x, addresses, explicit, offsets, values)
+    _implicit(m, v, w, x, addresses, explicit, offsets, values, shift)
     for j in range(6):
         x.first[j] = x.own[j]
     for j in range(6):
         x.at[j] = 1.0
-        _implicit(m, v, w, x, addresses, explicit, offsets, values)
+        _implicit(m, v, w, x, addresses, explicit, offsets, values, shift)
         x.at[j] = 0.0
         for i in range(6):
             x.matrix[i, j] = (1.0 if i == j else 0.0) - (x.own[i] - x.first[i])
     _invert(x.matrix)
 
 
-@njit(cache=True, error_model="numpy")
-def _accelerate(m, v, w, x, pushes, p, j, addresses, explicit, offsets, values, known):
-    """Accelerations `x.now`, angular then specific force, of a vehicle whose instant `m` is filled but for these.
-
-    `pushes[p, j]` (6,) is added to force and moment. What reads the accelerations that it changes is solved for from
-    the last ones, by steps that are exact where the effects are linear in them; `known` says whether `x.matrix` is that
-    of this flight already.
-    """
+@compiled(error_model="numpy")
+def _base(m, v, x, pushes, p, j):
+    """Force and moment `x.base` of the rotors and of a push `pushes[p, j]` (6,)."""
     for i in range(6):
         x.base[i] = pushes[p, j, i]
     for i in range(v.rotors):
@@ -143,139 +157,223 @@ def _accelerate(m, v, w, x, pushes, p, j, addresses, explicit, offsets, values, 
         x.base[3] += v.mixer[1, i] * square
         x.base[4] += v.mixer[2, i] * square
         x.base[5] += v.mixer[3, i] * square
+
+
+@compiled(error_model="numpy")
+def _stepped(x):
+    """Step to better accelerations `x.now`, exact where effects are linear in them; whether those told were right."""
+    turning = linear = 0.0
+    most_turning = most_linear = 1.0
+    for i in range(3):
+        turning = max(turning, abs(x.own[i] - x.at[i]))
+        linear = max(linear, abs(x.own[3 + i] - x.at[3 + i]))
+        most_turning = max(most_turning, abs(x.own[i]))
+        most_linear = max(most_linear, abs(x.own[3 + i]))
+    for i in range(6):
+        change = 0.0
+        for k in range(6):
+            change += x.matrix[i, k] * (x.own[k] - x.at[k])
+        x.now[i] = x.at[i] + change
+    return turning <= CONVERGED * most_turning and linear <= CONVERGED * most_linear
+
+
+@compiled(error_model="numpy")
+def _accelerate(count, first, alone, instant, body, added, scratch, addresses, explicit, offsets, values, stride):
+    """Accelerations `now` of each scratch record, angular then specific force, from its `base` and the effects.
+
+    Vehicle `first + c` is row c of a block of `count`; its constants are `body` at that number times `alone` (0 or 1),
+    its values begin at that number times `stride`. What reads the accelerations that it changes is solved for from the
+    last ones; a record's `known` is UNKNOWN, FOUND or EXACT and becomes one of the latter two.
+    """
     effects = addresses.shape[0]
     if explicit > 0:
-        _clear(w)
+        for c in range(count):
+            _clear(body[(first + c) * alone], added[c])
         for e in range(explicit):
-            call_kernel(addresses[e], m, v, values, offsets[e], w)
-        _collect(v, w, x.base)
+            for c in range(count):
+                n = first + c
+                call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
+        for c in range(count):
+            _collect(body[(first + c) * alone], added[c], scratch[c].base)
     if explicit == effects:
-        _solved(m, v, x.now, x.base)
+        for c in range(count):
+            _solved(instant[c], body[(first + c) * alone], scratch[c].now, scratch[c].base)
         return
-    if not known:
-        _relaxation(m, v, w, x, addresses, explicit, offsets, values)
-    for _ in range(MOST_ROUNDS):
-        for i in range(6):
-            x.at[i] = x.now[i]
-        _implicit(m, v, w, x, addresses, explicit, offsets, values)
-        turning = linear = 0.0
-        most_turning = most_linear = 1.0
-        for i in range(3):
-            turning = max(turning, abs(x.own[i] - x.at[i]))
-            linear = max(linear, abs(x.own[3 + i] - x.at[3 + i]))
-            most_turning = max(most_turning, abs(x.own[i]))
-            most_linear = max(most_linear, abs(x.own[3 + i]))
-        for i in range(6):
-            change = 0.0
-            for k in range(6):
-                change += x.matrix[i, k] * (x.own[k] - x.at[k])
-            x.now[i] = x.at[i] + change
-        if turning <= CONVERGED * most_turning and linear <= CONVERGED * most_linear:
-            break
+    for c in range(count):
+        x = scratch[c]
+        x.open = 1
+        if x.known == UNKNOWN:
+            v = body[(first + c) * alone]
+            _relaxation(instant[c], v, added[c], x, addresses, explicit, offsets, values, (first + c) * stride)
+            x.known = FOUND
+    for rounds in range(MOST_ROUNDS):
+        for c in range(count):
+            x = scratch[c]
+            if x.open:
+                for i in range(6):
+                    x.at[i] = x.now[i]
+                _tell(instant[c], body[(first + c) * alone], added[c], x)
+        for e in range(explicit, effects):
+            for c in range(count):
+                n = first + c
+                if scratch[c].open:
+                    call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
+        left = 0
+        for c in range(count):
+            x = scratch[c]
+            if x.open:
+                _follow(instant[c], body[(first + c) * alone], added[c], x)
+                settled = _stepped(x)
+                if x.known == EXACT or settled:
+                    x.open = 0
+                    if rounds < 2:
+                        x.known = EXACT
+                else:
+                    left += 1
+        if left == 0:
+            return
 
 
-@njit(cache=True, error_model="numpy")
-def _enter(m, v, s, attitude, effects, winds, row, column, height_offset):
-    """Fill an instant from a state, in the wind `winds[row, column]`; what the rotors do is in it already."""
-    p, q, r = s[0], s[1], s[2]
+@compiled(error_model="numpy")
+def _enter(m, v, x, size, effects, winds, row, column, height_offset):
+    """Fill an instant from the state tried, in the wind `winds[row, column]`; what rotors do is in it already."""
+    p, q, r = x.trial[0], x.trial[1], x.trial[2]
     m.angular_velocity[0] = p
     m.angular_velocity[1] = q
     m.angular_velocity[2] = r
-    if attitude:
-        w, x, y, z = s[3], s[4], s[5], s[6]
-        m.rotation[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-        m.rotation[0, 1] = 2.0 * (x * y - w * z)
-        m.rotation[0, 2] = 2.0 * (x * z + w * y)
-        m.rotation[1, 0] = 2.0 * (x * y + w * z)
-        m.rotation[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-        m.rotation[1, 2] = 2.0 * (y * z - w * x)
-        m.rotation[2, 0] = 2.0 * (x * z - w * y)
-        m.rotation[2, 1] = 2.0 * (y * z + w * x)
-        m.rotation[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    if size > 3:
+        w, i, j, k = x.trial[3], x.trial[4], x.trial[5], x.trial[6]
+        m.rotation[0, 0] = 1.0 - 2.0 * (j * j + k * k)
+        m.rotation[0, 1] = 2.0 * (i * j - w * k)
+        m.rotation[0, 2] = 2.0 * (i * k + w * j)
+        m.rotation[1, 0] = 2.0 * (i * j + w * k)
+        m.rotation[1, 1] = 1.0 - 2.0 * (i * i + k * k)
+        m.rotation[1, 2] = 2.0 * (j * k - w * i)
+        m.rotation[2, 0] = 2.0 * (i * k - w * j)
+        m.rotation[2, 1] = 2.0 * (j * k + w * i)
+        m.rotation[2, 2] = 1.0 - 2.0 * (i * i + j * j)
     if not effects:
         return
-    if s.shape[0] > 10:
-        north, east, down = s[7] - winds[row, column, 0], s[8] - winds[row, column, 1], s[9] - winds[row, column, 2]
+    if size > 10:
+        north = x.trial[7] - winds[row, column, 0]
+        east = x.trial[8] - winds[row, column, 1]
+        down = x.trial[9] - winds[row, column, 2]
         for j in range(3):
             m.air_velocity[j] = m.rotation[0, j] * north + m.rotation[1, j] * east + m.rotation[2, j] * down
-        m.height = height_offset - s[12]
+        m.height = height_offset - x.trial[12]
+    a, b, c = m.air_velocity[0], m.air_velocity[1], m.air_velocity[2]
     total = 0.0
     for i in range(v.rotors):
-        x, y, z = v.hub[i, 0], v.hub[i, 1], v.hub[i, 2]
-        m.hub_velocity[i, 0] = m.air_velocity[0] + q * z - r * y
-        m.hub_velocity[i, 1] = m.air_velocity[1] + r * x - p * z
-        m.hub_velocity[i, 2] = m.air_velocity[2] + p * y - q * x
+        x_m, y_m, z_m = v.hub[i, 0], v.hub[i, 1], v.hub[i, 2]
+        m.hub_velocity[i, 0] = a + q * z_m - r * y_m
+        m.hub_velocity[i, 1] = b + r * x_m - p * z_m
+        m.hub_velocity[i, 2] = c + p * y_m - q * x_m
         m.thrust[i] = v.thrust_coefficient[i] * m.rotor_speed[i] * m.rotor_speed[i]
         total += m.rotor_speed[i]
     m.rotor_speed_sum = total
 
 
-@njit(cache=True, error_model="numpy")
-def _rates_of_change(m, v, s, x, slopes, stage):
-    """Time derivative of the rigid body's state into a row of `slopes`."""
-    p, q, r = s[0], s[1], s[2]
+@compiled(error_model="numpy")
+def _rates_of_change(m, v, x, size, stage):
+    """Time derivative of the rigid body's state that was tried, as the slope of a stage."""
+    p, q, r = x.trial[0], x.trial[1], x.trial[2]
     for j in range(3):
-        slopes[stage, j] = x.now[j]
-    if s.shape[0] < 7:
+        x.slopes[stage, j] = x.now[j]
+    if size < 7:
         return
-    a, b, c, d = s[3], s[4], s[5], s[6]
-    slopes[stage, 3] = -0.5 * (b * p + c * q + d * r)
-    slopes[stage, 4] = 0.5 * (a * p + c * r - d * q)
-    slopes[stage, 5] = 0.5 * (a * q + d * p - b * r)
-    slopes[stage, 6] = 0.5 * (a * r + b * q - c * p)
-    if s.shape[0] < 13:
+    w, i, j, k = x.trial[3], x.trial[4], x.trial[5], x.trial[6]
+    x.slopes[stage, 3] = -0.5 * (i * p + j * q + k * r)
+    x.slopes[stage, 4] = 0.5 * (w * p + j * r - k * q)
+    x.slopes[stage, 5] = 0.5 * (w * q + k * p - i * r)
+    x.slopes[stage, 6] = 0.5 * (w * r + i * q - j * p)
+    if size < 13:
         return
-    fx, fy, fz = x.now[3], x.now[4], x.now[5]
+    a, b, c = x.now[3], x.now[4], x.now[5]
     for j in range(3):
-        slopes[stage, 7 + j] = m.rotation[j, 0] * fx + m.rotation[j, 1] * fy + m.rotation[j, 2] * fz
-        slopes[stage, 10 + j] = s[7 + j]
-    slopes[stage, 9] += v.gravity
+        x.slopes[stage, 7 + j] = m.rotation[j, 0] * a + m.rotation[j, 1] * b + m.rotation[j, 2] * c
+        x.slopes[stage, 10 + j] = x.trial[7 + j]
+    x.slopes[stage, 9] += v.gravity
 
 
-@njit(cache=True, error_model="numpy")
-def _normalise(s):
-    length = np.sqrt(s[3] * s[3] + s[4] * s[4] + s[5] * s[5] + s[6] * s[6])
-    for i in range(3, 7):
-        s[i] /= length
+@compiled(error_model="numpy")
+def _begin(x, start, n, size):
+    """Put a vehicle at its start, nothing known of it."""
+    for i in range(size):
+        x.state[i] = start[n, i]
+    for i in range(6):
+        x.now[i] = 0.0
+    x.known = UNKNOWN
+    for i in range(3):
+        for j in range(3):
+            x.memory[i, j] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
-def _attitude_command(s, j, now_s, last_s, loop, v, reference, error_of_reading, more, memory, command):
-    """Rotor commands of the attitude controller at instant `j`; `memory` (3, 3) is integral, last error, slope."""
-    w, x, y, z = s[3], s[4], s[5], s[6]
-    angle = np.empty(3)
-    angle[0] = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    angle[1] = np.arcsin(min(max(2.0 * (w * y - x * z), -1.0), 1.0))
-    angle[2] = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    moment = np.empty(3)
-    for a in range(3):
-        error = reference[a] - (angle[a] + error_of_reading[a])
+@compiled(error_model="numpy")
+def _try(x, size, stage, step_s):
+    """The state at which a stage of Runge and Kutta's step is evaluated."""
+    if stage == 0:
+        x.known = min(x.known, FOUND)
+        for i in range(size):
+            x.trial[i] = x.state[i]
+        return
+    ahead = step_s if stage == 3 else 0.5 * step_s
+    for i in range(size):
+        x.trial[i] = x.state[i] + ahead * x.slopes[stage - 1, i]
+
+
+@compiled(error_model="numpy")
+def _advance(x, size, step_s):
+    """Go one step on by the slopes of its four stages; the quaternion stays of length 1."""
+    sixth = step_s / 6.0
+    for i in range(size):
+        x.state[i] += sixth * (x.slopes[0, i] + 2.0 * (x.slopes[1, i] + x.slopes[2, i]) + x.slopes[3, i])
+    if size > 3:
+        w, i, j, k = x.state[3], x.state[4], x.state[5], x.state[6]
+        length = np.sqrt(w * w + i * i + j * j + k * k)
+        for n in range(3, 7):
+            x.state[n] /= length
+
+
+@compiled(error_model="numpy")
+def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_errors, e, more):
+    """Rotor commands `x.command` of the attitude controller at instant `j`.
+
+    `x.memory` (3, 3) is integral, last error, slope; `references[f]` and `reading_errors[e]` hold for all instants
+    where they have one row.
+    """
+    now, read = j if references.shape[1] > 1 else 0, j if reading_errors.shape[1] > 1 else 0
+    a, b, c, d = x.state[3], x.state[4], x.state[5], x.state[6]
+    x.angle[0] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c))
+    x.angle[1] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0))
+    x.angle[2] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
+    elapsed = now_s - last_s
+    keep = np.exp(-elapsed / loop.derivative_time) if loop.derivative_time > 0.0 else 0.0
+    for i in range(3):
+        error = references[f, now, i] - (x.angle[i] + reading_errors[e, read, i])
         error = (error + np.pi) % (2.0 * np.pi) - np.pi
         if j == 0:
-            moment[a] = loop.proportional[a] * error
+            x.wanted[i] = loop.proportional[i] * error
         else:
-            elapsed = now_s - last_s
-            raw = (error - memory[1, a]) / elapsed
-            keep = np.exp(-elapsed / loop.derivative_time) if loop.derivative_time > 0.0 else 0.0
-            memory[2, a] = keep * memory[2, a] + (1.0 - keep) * raw
-            integral = memory[0, a] + error * elapsed
-            wanted = loop.proportional[a] * error + loop.integral[a] * integral + loop.derivative[a] * memory[2, a]
-            held = min(max(wanted, -loop.limit[a]), loop.limit[a])
+            raw = (error - x.memory[1, i]) / elapsed
+            x.memory[2, i] = keep * x.memory[2, i] + (1.0 - keep) * raw
+            integral = x.memory[0, i] + error * elapsed
+            wanted = loop.proportional[i] * error + loop.integral[i] * integral + loop.derivative[i] * x.memory[2, i]
+            held = min(max(wanted, -loop.limit[i]), loop.limit[i])
             if not (held != wanted and np.sign(error) == np.sign(wanted)):
-                memory[0, a] = integral
-            moment[a] = held
-        memory[1, a] = error
-    for i in range(v.rotors):
-        square = loop.allocation[i, 0] * reference[3]
-        for a in range(3):
-            square += loop.allocation[i, 1 + a] * moment[a]
+                x.memory[0, i] = integral
+            x.wanted[i] = held
+        x.memory[1, i] = error
+    for n in range(v.rotors):
+        square = loop.allocation[n, 0] * references[f, now, 3]
+        for i in range(3):
+            square += loop.allocation[n, 1 + i] * x.wanted[i]
         square = max(square, 0.0)
         if more.shape[0] > 0:
-            square = max(square + more[j, i], 0.0)
-        command[i] = min(max(np.sqrt(square), loop.lowest), loop.highest)
+            square = max(square + more[j, n], 0.0)
+        x.command[n] = min(max(np.sqrt(square), loop.lowest), loop.highest)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled(error_model="numpy", nogil=True)
 def fly(
     body,
     start,
@@ -298,6 +396,7 @@ def fly(
     explicit,
     offsets,
     values,
+    stride,
     instant,
     added,
     scratch,
@@ -310,94 +409,83 @@ def fly(
     `body` (n,) BODY; `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
     `closed` whether `loops` (LOOP) command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
     else `commands` (., steps + 1, k) with their accelerations `following` (0 for none); `reading_errors`
-    (., steps + 1, 3) rad; `pushes` (., steps + 1, 6); `winds` (., 1, 3); `ground_z` (n,); `values` (., p). Each
-    `every`-th instant is kept in `states`, `accelerations_out` (angular, specific force) and `commands_out`.
+    (., steps + 1, 3) rad; `pushes` (., steps + 1, 6); `winds` (., 1, 3); `ground_z` (n,); `values` (n p,) those of a
+    vehicle beginning `stride` after the last one's (0: all have the same). Each `every`-th instant is kept in `states`,
+    `accelerations_out` (angular, specific force) and `commands_out`. Vehicles fly in blocks of as many as there are
+    records `instant`, `added` and `scratch`.
     """
     size = start.shape[1]
     k = size - 13
-    slopes = np.zeros((4, size))
-    trial, command, memory = np.empty(size), np.empty(k), np.empty((3, 3))
-    m, w, x = instant[0], added[0], scratch[0]
+    most = instant.shape[0]
     effects = addresses.shape[0] > 0
-    for n in range(start.shape[0]):
-        v = body[n]
-        s = start[n].copy()
-        up, down = lags[n, 0], lags[n, 1]
-        at_once = up == 0.0
-        own_values = values[n if values.shape[0] > 1 else 0]
-        air = n if winds.shape[0] > 1 else 0
-        p = n if pushes.shape[0] > 1 else 0
-        c = n if commands.shape[0] > 1 else 0
-        f = n if following.shape[0] > 1 else 0
-        loop = loops[n if loops.shape[0] > 1 else 0]
-        reference = references[n if references.shape[0] > 1 else 0]
-        reading_error = reading_errors[n if reading_errors.shape[0] > 1 else 0]
-        for i in range(6):
-            x.now[i] = 0.0
-        memory[:] = 0.0
-        known = False
+    for first in range(0, start.shape[0], most):
+        count = min(most, start.shape[0] - first)
+        for c in range(count):
+            _begin(scratch[c], start, first + c, size)
         kept = 0
         for j in range(steps + 1):
             now_s = j * step_s
-            if closed:
-                _attitude_command(
-                    s,
-                    j,
-                    now_s,
-                    (j - 1) * step_s,
-                    loop,
-                    v,
-                    reference[j if reference.shape[0] > 1 else 0],
-                    reading_error[j if reading_error.shape[0] > 1 else 0],
-                    more,
-                    memory,
-                    command,
-                )
-            else:
+            for c in range(count):
+                n, m, x = first + c, instant[c], scratch[c]
+                if closed:
+                    loop = loops[n if loops.shape[0] > 1 else 0]
+                    f, e = n if references.shape[0] > 1 else 0, n if reading_errors.shape[0] > 1 else 0
+                    last_s = (j - 1) * step_s
+                    _attitude_command(x, j, now_s, last_s, loop, body[n], references, f, reading_errors, e, more)
+                else:
+                    own = n if commands.shape[0] > 1 else 0
+                    for i in range(k):
+                        x.command[i] = commands[own, j, i]
+                f = n if following.shape[0] > 1 else 0
                 for i in range(k):
-                    command[i] = commands[c, j, i]
-            for i in range(k):
-                command[i] = min(max(command[i], limits[n, 0]), limits[n, 1])
-                if at_once and j > 0:
-                    s[13 + i] = command[i]
-                if at_once:
-                    m.rotor_acceleration[i] = following[f, j, i] if following.shape[0] > 0 else 0.0
+                    x.command[i] = min(max(x.command[i], limits[n, 0]), limits[n, 1])
+                    if lags[n, 0] == 0.0:
+                        if j > 0:
+                            x.state[13 + i] = x.command[i]
+                        m.rotor_acceleration[i] = following[f, j, i] if following.shape[0] > 0 else 0.0
             for stage in range(4):
                 share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-                m.time_s = now_s + share * step_s
-                for i in range(size):
-                    trial[i] = s[i] if stage == 0 else s[i] + share * step_s * slopes[stage - 1, i]
-                for i in range(k):
-                    m.rotor_speed[i] = trial[13 + i]
-                    if at_once:
-                        slopes[stage, 13 + i] = 0.0
-                    else:
-                        gap = command[i] - trial[13 + i]
-                        m.rotor_acceleration[i] = gap * (up if gap > 0.0 else down)
-                        slopes[stage, 13 + i] = m.rotor_acceleration[i]
-                _enter(m, v, trial, True, effects, winds, air, 0, ground_z[n])
-                row = j if pushes.shape[1] > 1 else 0
-                _accelerate(m, v, w, x, pushes, p, row, addresses, explicit, offsets, own_values, known)
-                known = True
+                for c in range(count):
+                    n, m, x = first + c, instant[c], scratch[c]
+                    v = body[n]
+                    m.time_s = now_s + share * step_s
+                    _try(x, size, stage, step_s)
+                    up, down = lags[n, 0], lags[n, 1]
+                    for i in range(k):
+                        speed = x.trial[13 + i]
+                        m.rotor_speed[i] = speed
+                        if up == 0.0:
+                            x.slopes[stage, 13 + i] = 0.0
+                        else:
+                            gap = x.command[i] - speed
+                            m.rotor_acceleration[i] = gap * (up if gap > 0.0 else down)
+                            x.slopes[stage, 13 + i] = m.rotor_acceleration[i]
+                    _enter(m, v, x, size, effects, winds, n if winds.shape[0] > 1 else 0, 0, ground_z[n])
+                    _base(m, v, x, pushes, n if pushes.shape[0] > 1 else 0, j if pushes.shape[1] > 1 else 0)
+                _accelerate(
+                    count, first, 1, instant, body, added, scratch, addresses, explicit, offsets, values, stride
+                )
                 if stage == 0:
                     if j == kept * every:
-                        for i in range(size):
-                            states[n, kept, i] = s[i]
-                        for i in range(6):
-                            accelerations_out[n, kept, i] = x.now[i]
-                        for i in range(k):
-                            commands_out[n, kept, i] = command[i]
+                        for c in range(count):
+                            x = scratch[c]
+                            for i in range(size):
+                                states[first + c, kept, i] = x.state[i]
+                            for i in range(6):
+                                accelerations_out[first + c, kept, i] = x.now[i]
+                            for i in range(k):
+                                commands_out[first + c, kept, i] = x.command[i]
                         kept += 1
                     if j == steps:
                         break
-                _rates_of_change(m, v, trial, x, slopes, stage)
+                for c in range(count):
+                    _rates_of_change(instant[c], body[first + c], scratch[c], size, stage)
             if j < steps:
-                for i in range(size):
-                    s[i] += step_s / 6.0 * (slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i])
-                _normalise(s)
+                for c in range(count):
+                    _advance(scratch[c], size, step_s)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled(error_model="numpy", nogil=True)
 def fly_windows(
     body,
     start,
@@ -423,56 +511,56 @@ def fly_windows(
     """States (w, m, 3, 7 or 13) of w windows from their `start`, driven by recorded inputs.
 
     Inputs are (w, m, ...) at the samples `time_s` (w, m), and `_between` (w, m - 1, ...) half way between them; of
-    `acceleration`, `wind` and `push` an axis of windows of length 0 stands for none. `height_offset` (w,).
+    `acceleration`, `wind` and `push` an axis of windows of length 0 stands for none. `height_offset` (w,). Windows fly
+    in blocks of as many as there are records.
     """
     size = start.shape[1]
     k = speed.shape[2]
-    slopes, trial = np.zeros((4, size)), np.empty(size)
+    most = instant.shape[0]
     still, none = np.zeros((1, 1, 3)), np.zeros((1, 1, 6))
-    m, w, x = instant[0], added[0], scratch[0]
     v = body[0]
     effects = addresses.shape[0] > 0
-    for i in range(3):
-        for j in range(3):
-            m.rotation[i, j] = 1.0 if i == j else 0.0
-    for n in range(start.shape[0]):
-        s = start[n].copy()
-        out[n, 0] = s
-        for i in range(6):
-            x.now[i] = 0.0
-        known = False
+    for c in range(most):
+        for i in range(3):
+            for j in range(3):
+                instant[c].rotation[i, j] = 1.0 if i == j else 0.0
+    for first in range(0, start.shape[0], most):
+        count = min(most, start.shape[0] - first)
+        for c in range(count):
+            _begin(scratch[c], start, first + c, size)
+            for i in range(size):
+                out[first + c, 0, i] = start[first + c, i]
         for j in range(time_s.shape[1] - 1):
-            step_s = time_s[n, j + 1] - time_s[n, j]
             for stage in range(4):
                 share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
                 between = stage == 1 or stage == 2
                 at = j + 1 if stage == 3 else j
-                m.time_s = time_s[n, j] + share * step_s
-                if stage == 0:
-                    trial[:] = s
-                else:
-                    for i in range(size):
-                        trial[i] = s[i] + share * step_s * slopes[stage - 1, i]
-                for i in range(k):
-                    m.rotor_speed[i] = speed_between[n, j, i] if between else speed[n, at, i]
-                    if acceleration.shape[0] > 0:
-                        m.rotor_acceleration[i] = acceleration_between[n, j, i] if between else acceleration[n, at, i]
-                if wind.shape[0] == 0:
-                    _enter(m, v, trial, size > 3, effects, still, 0, 0, height_offset[n])
-                elif between:
-                    _enter(m, v, trial, size > 3, effects, wind_between, n, j, height_offset[n])
-                else:
-                    _enter(m, v, trial, size > 3, effects, wind, n, at, height_offset[n])
-                if push.shape[0] == 0:
-                    _accelerate(m, v, w, x, none, 0, 0, addresses, explicit, offsets, values, known)
-                elif between:
-                    _accelerate(m, v, w, x, push_between, n, j, addresses, explicit, offsets, values, known)
-                else:
-                    _accelerate(m, v, w, x, push, n, at, addresses, explicit, offsets, values, known)
-                known = True
-                _rates_of_change(m, v, trial, x, slopes, stage)
-            for i in range(size):
-                s[i] += step_s / 6.0 * (slopes[0, i] + 2.0 * (slopes[1, i] + slopes[2, i]) + slopes[3, i])
-            if size > 3:
-                _normalise(s)
-            out[n, j + 1] = s
+                for c in range(count):
+                    n, m, x = first + c, instant[c], scratch[c]
+                    step_s = time_s[n, j + 1] - time_s[n, j]
+                    m.time_s = time_s[n, j] + share * step_s
+                    _try(x, size, stage, step_s)
+                    for i in range(k):
+                        m.rotor_speed[i] = speed_between[n, j, i] if between else speed[n, at, i]
+                        if acceleration.shape[0] > 0:
+                            told = acceleration_between[n, j, i] if between else acceleration[n, at, i]
+                            m.rotor_acceleration[i] = told
+                    if wind.shape[0] == 0:
+                        _enter(m, v, x, size, effects, still, 0, 0, height_offset[n])
+                    elif between:
+                        _enter(m, v, x, size, effects, wind_between, n, j, height_offset[n])
+                    else:
+                        _enter(m, v, x, size, effects, wind, n, at, height_offset[n])
+                    if push.shape[0] == 0:
+                        _base(m, v, x, none, 0, 0)
+                    elif between:
+                        _base(m, v, x, push_between, n, j)
+                    else:
+                        _base(m, v, x, push, n, at)
+                _accelerate(count, first, 0, instant, body, added, scratch, addresses, explicit, offsets, values, 0)
+                for c in range(count):
+                    _rates_of_change(instant[c], v, scratch[c], size, stage)
+            for c in range(count):
+                _advance(scratch[c], size, time_s[first + c, j + 1] - time_s[first + c, j])
+                for i in range(size):
+                    out[first + c, j + 1, i] = scratch[c].state[i]

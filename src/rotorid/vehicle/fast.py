@@ -28,6 +28,8 @@ LOOP = np.dtype(
 
 LEAST_PER_THREAD = 16
 """Vehicles below which a further thread is not worth its start."""
+BLOCK = 8
+"""Vehicles that fly together; their records fill half of a processor's first cache."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def fly(
         pushes=np.zeros((1, 1, 6)) if pushes is None else np.ascontiguousarray(pushes),
         winds=np.atleast_2d(np.ascontiguousarray(wind, float))[:, None],
         ground_z=np.full(n, np.nan if ground_z_m is None else ground_z_m),
-        values=np.atleast_2d(kernels.values if values is None else np.ascontiguousarray(values, float)),
+        values=np.atleast_2d(kernels.values if values is None else values).astype(float, order="C", copy=False),
         states=np.empty((n, kept, 13 + k)),
         accelerations_out=np.empty((n, kept, 6)),
         commands_out=np.empty((n, kept, k)),
@@ -149,9 +151,8 @@ def fly(
 
     def part(first: int, last: int) -> None:
         mine = {name: a[first:last] if len(a) == n else a for name, a in own.items()}
-        given = (
-            fixed | mine | dict(instant=np.zeros(1, INSTANT), added=np.zeros(1, ADDED), scratch=np.zeros(1, SCRATCH))
-        )
+        stride = mine["values"].shape[1] if len(mine["values"]) > 1 else 0
+        given = fixed | mine | _room(last - first) | dict(values=mine["values"].ravel(), stride=stride)
         compiled.fly(*(given[name] for name in _ORDER))
 
     _spread(part, n, threads)
@@ -180,14 +181,18 @@ def fly_windows(
             kernels.explicit,
             kernels.offsets,
             kernels.values,
-            np.zeros(1, INSTANT),
-            np.zeros(1, ADDED),
-            np.zeros(1, SCRATCH),
+            *_room(last - first).values(),
             out[first:last],
         )
 
     _spread(part, len(start), 1)
     return out
+
+
+def _room(vehicles: int) -> dict[str, np.ndarray]:
+    """Records of a block."""
+    count = min(BLOCK, vehicles)
+    return dict(instant=np.zeros(count, INSTANT), added=np.zeros(count, ADDED), scratch=np.zeros(count, SCRATCH))
 
 
 def _spread(part, n: int, threads: int | None) -> None:

@@ -69,12 +69,17 @@ the largest distance of a hub from the body's z axis, m."""
 ADDED = np.dtype([("force", "f8", 3), ("moment", "f8", 3), ("hub_force", "f8", (MOST_ROTORS, 3))], align=True)
 """`w` of a kernel: force, N, moment about the believed centre of mass, N m, and a force at each hub, N, body axes."""
 
+STATE = 13 + MOST_ROTORS
 SCRATCH = np.dtype(
-    [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")] + [("matrix", "f8", (6, 6))],
+    [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")]
+    + [("matrix", "f8", (6, 6)), ("known", "i8"), ("open", "i8")]
+    + [("state", "f8", STATE), ("trial", "f8", STATE), ("slopes", "f8", (4, STATE))]
+    + [("angle", "f8", 3), ("wanted", "f8", 3), ("memory", "f8", (3, 3)), ("command", "f8", MOST_ROTORS)],
     align=True,
 )
-"""Room for forces with moments and for accelerations (angular, linear). In a record because a slice of an array costs
-two atomic counts of references, as long as a kernel."""
+"""Room for a vehicle in flight: forces with moments, accelerations (angular, linear) and how far they are solved for;
+its state, that at which a step is tried, and the slopes of a step's four stages; its controller. In a record because a
+slice of an array costs two atomic counts of references, as long as a kernel."""
 
 _SIGNATURE = types.void(from_dtype(INSTANT), from_dtype(BODY), types.CPointer(types.float64), from_dtype(ADDED))
 _ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerometer"})
@@ -83,7 +88,10 @@ _ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerom
 @cache
 def compiled(kernel: Kernel):
     """A kernel as a C function; keep it alive as long as its `address` is in use."""
-    return cfunc(_SIGNATURE, cache=True)(kernel)
+    try:
+        return cfunc(_SIGNATURE, cache=True)(kernel)
+    except RuntimeError:  # no folder for its cache that may be written
+        return cfunc(_SIGNATURE)(kernel)
 
 
 @intrinsic

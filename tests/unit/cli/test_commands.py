@@ -71,7 +71,7 @@ def test_a_verdict_has_the_bytes_of_the_workflow_and_a_mismatch_is_no_error(flig
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda p: None, "no such file"),
+        (lambda p: None, "file is missing"),
         (lambda p: p.mkdir(), "no vehicle.yaml and no log in it"),
         (lambda p: p.write_bytes(b""), "the file is empty"),
         (lambda p: p.write_bytes(b"\x7fELF\0\0\0\0" * 8), "not a log that rotorid knows"),
@@ -197,7 +197,7 @@ def test_the_bundled_example_is_what_its_module_makes_and_the_verdict_finds_what
         if path.suffix == ".yaml":
             assert (tmp_path / path.name).read_text() == path.read_text()
         else:
-            made, shipped = pd.read_parquet(tmp_path / path.name), pd.read_parquet(path)
+            made, shipped = pd.read_csv(tmp_path / path.name), pd.read_csv(path)
             pd.testing.assert_frame_equal(made, shipped, rtol=1e-5, atol=1e-6)
     done = run("verdict", tmp_path / "shipped", "-o", tmp_path / "answer", "--json", "--series", "-q")
     verdict = json.loads(done.stdout)
@@ -216,3 +216,17 @@ def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
     assert closer_template(lift, brushed, "crazyflie-2.1") == "crazyflie-2.1-brushless"
     assert closer_template(lift, brushless, "crazyflie-2.1-brushless") is None
     assert closer_template(10 * lift, brushed, "crazyflie-2.1") is None
+
+
+def test_names_of_times_and_commands_are_recognised_and_a_lacking_time_is_told() -> None:
+    from rotorid.importers.mapping import guess
+
+    rpm = np.linspace(8000, 9000, 50)
+    names = {f"cmd_rpm{i}": rpm for i in range(1, 5)} | {f"motor_speed_{i}": rpm / 10 for i in range(1, 5)}
+    for time, unit, scale in (("t_ms", "ms", 1e3), ("t [s]", "s", 1.0), ("t_us", "us", 1e6), ("time", "s", 1.0)):
+        mapping, doubts = guess(pd.DataFrame({time: np.arange(50) * 0.01 * scale} | names))
+        assert mapping.channels["time"].columns == (time,) and mapping.channels["time"].unit == unit
+        assert mapping.channels["rotor_command"].columns == tuple(f"cmd_rpm{i}" for i in range(1, 5))
+        assert mapping.channels["rotor_command"].unit == "rpm" and mapping.channels["rotor_speed"].unit == "rad/s"
+    _, doubts = guess(pd.DataFrame(names))
+    assert doubts[0].startswith("time: no column recognised")

@@ -47,8 +47,14 @@ def told(monkeypatch, tmp_path: Path) -> Path:
         page.write_text("page")
         improved.write_text("name: x\n")
 
+    def read(folder: Path) -> Path:
+        if folder.name == "g-torn":
+            raise OSError(5, "Input/output error", str(folder / "run.csv"))
+        return folder
+
     monkeypatch.setattr(judge, "deliver", analysed)
-    monkeypatch.setattr(judge, "read_set", lambda folder: folder)
+    monkeypatch.setattr(judge, "read_set", read)
+    monkeypatch.setattr(judge, "_load", lambda: None)
     return calls
 
 
@@ -72,17 +78,27 @@ def test_a_set_that_fails_costs_only_itself(sets: Path, told: Path, tmp_path: Pa
         assert json.loads(found[name]["failed.json"]) == {"reason": reason, "fault": fault}
 
 
+def test_a_set_that_cannot_be_read_fails_alone_and_is_read_again(sets: Path, told: Path, tmp_path: Path) -> None:
+    (sets / "g-torn").mkdir()
+    (sets / "g-torn" / "vehicle.yaml").write_text("name: g\n")
+    for _ in range(2):
+        found = judged(sets, tmp_path / "out")["g-torn"]
+        assert set(found) == {"failed.json"} and "run.csv" in found["failed.json"]
+    assert not (tmp_path / "memory" / "c0de" / judge.content_of(sets / "g-torn")).exists()
+
+
 def test_nothing_is_judged_twice_but_what_changed(sets: Path, told: Path, tmp_path: Path) -> None:
     first = judged(sets, tmp_path / "out")
     told.write_text("")
     assert judged(sets, tmp_path / "again") == first
-    assert told.read_text() == ""
+    assert told.read_text() == "d-killed\n"  # what killed it may be gone
+    told.write_text("")
     (sets / "e-sound" / "run.csv").write_text("time_s\n0\n")
     left = tmp_path / "memory" / "c0de" / f".{judge.content_of(sets / 'e-sound')}.1.part"
     left.mkdir()  # by a process that was killed
     judged(sets, tmp_path / "third")
     assert not left.exists()
-    assert told.read_text() == "e-sound\n"
+    assert told.read_text() == "d-killed\ne-sound\n"
     told.write_text("")
     judged(sets, tmp_path / "fourth", code="0ther")
     assert len(told.read_text().splitlines()) == 5
@@ -97,7 +113,7 @@ def test_a_full_disk_is_no_verdict_and_loses_nothing(sets: Path, told: Path, tmp
     told.write_text("")
     with pytest.raises(OSError, match="No space left"):
         judged(sets, tmp_path / "out")
-    assert told.read_text() == "f-full\n"  # the five before it were remembered
+    assert told.read_text() == "d-killed\nf-full\n"  # the others before it were remembered
     assert not [p for p in (tmp_path / "memory").rglob("*.part")]
 
 

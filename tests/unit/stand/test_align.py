@@ -35,7 +35,7 @@ def pair(seed: int, sine: bool, offset_s: float = OFFSET_S) -> align.Pair:
     felt = np.arange(0.0, 15.9, 0.01)
     lift = np.interp(felt, fine, speed**2) + rng.normal(0, 0.1, len(felt))
     wrench = pd.DataFrame({"time_s": felt, "host_s": felt + offset_s, "force_z_n": 6.4 - lift})
-    return align.Pair(f"exp-{seed:02d}", sine, quadrotor, wrench, (1.0, 1.0))
+    return align.Pair(f"mine, try {seed}", seed, sine, quadrotor, wrench, (1.0, 1.0))
 
 
 def test_offsets_come_back_within_their_errors() -> None:
