@@ -45,7 +45,7 @@ def made(*targets: str) -> None:
 
 
 def started(command: list[str]) -> subprocess.Popen:
-    """Start a program that may have been linked a moment ago: some file systems hold it as being written a little on."""
+    """Start a program that may have been linked a moment ago: some file systems still hold it as being written."""
     deadline = time.monotonic() + 5
     while True:
         try:
