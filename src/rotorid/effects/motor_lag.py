@@ -5,6 +5,9 @@ import numpy as np
 from rotorid.compiling import compiled
 from rotorid.effects.contract import Effect, Parameter, SpeedForm
 
+SLOWEST_S = 0.3
+"""Longest time constant: rotors of half a metre reach 0.1 s, and no attitude loop holds with motors three times slower."""
+
 
 @compiled()
 def _lag(command, up, down):
@@ -52,7 +55,7 @@ def on_thrust(path, values):
 
 
 def _tau(symbol):
-    return Parameter(symbol, "s", 0.0, 1.0, nonlinear=True, starts=(0.015, 0.05, 0.15), meaning="time constant")
+    return Parameter(symbol, "s", 0.0, SLOWEST_S, nonlinear=True, starts=(0.015, 0.05, 0.15), meaning="time constant")
 
 
 EFFECT = Effect(

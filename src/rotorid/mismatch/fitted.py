@@ -26,6 +26,7 @@ from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.speedpath import SpeedResult
 from rotorid.mismatch.unsure import without_unsure
+from rotorid.mismatch.within_trust import beyond_trust
 from rotorid.mismatch.wrench import (
     WrenchModel,
     after_residual,
@@ -45,7 +46,7 @@ RUN_SPREAD = 0.007
 RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
 
-ROUNDS = 4
+ROUNDS, CHAIN_ROUNDS = 4, 2
 MOVED = 0.3
 """Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict."""
 
@@ -98,16 +99,25 @@ def turning(prepared: Prepared, chain: Chain | None = None):
 def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
     """The chain and the model where rotor speeds are known from commands alone."""
     model = refined_model(prepared, *turning(prepared, chain))
-    if model.selection.active:
-        # The wrench effects found change what the commands must explain: once more with them known.
-        chain = speed_path(prepared, chosen(model))
+    known, trusted = bool(model.selection.active), strains(model)
+    for _ in range(CHAIN_ROUNDS if known or trusted else 0):
+        # The wrench effects found change what the commands must explain, and what values beyond their trust made room
+        # for is not delivered: once more with the effects known and such values as believed.
+        chain = speed_path(prepared, chosen(model), trusted=trusted)
         model = refined_model(prepared, *turning(prepared, chain))
+        if trusted or not (trusted := strains(model)):
+            break
     if rules.MERE_SCALE(only_scales(chain[0])):
         result, *full = speed_path(prepared, chosen(model), ("throttle_curve",))
         reason = Reason("mere_scale", "another thrust coefficient explains as much")
         chain = replace(result, dropped={**result.dropped, "throttle_curve": reason}), *full
         model = refined_model(prepared, *turning(prepared, chain))
     return chain, model
+
+
+def strains(model: WrenchModel) -> bool:
+    """Whether the recordings ask a value that is not called wrong to move beyond its trust."""
+    return beyond_trust(model, values_called_wrong(model, ()), model.selection.active)
 
 
 def only_scales(result: SpeedResult) -> bool:

@@ -33,7 +33,7 @@ from rotorid.mismatch.rows import (
     measured_moment as moment_of,
 )
 from rotorid.mismatch.split import HELD_OUT_SHARE, split_runs
-from rotorid.mismatch.unknowns import UNKNOWNS, can_show
+from rotorid.mismatch.unknowns import UNKNOWNS, empirical_effects
 from rotorid.mismatch.voltmeter import without_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
@@ -203,9 +203,7 @@ def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[
     for key in OFFSETS:
         if partner[key] in groups:
             terms.append(Term(key, "nuisance", prior_sd=(0.5 * longest_sample,)))
-    attitudes = [s.motion.rotation for s in segments]
-    empirical = [e for e in UNKNOWNS.values() if can_show(e.id, attitudes)]
-    for effect in (*catalogue().values(), *empirical):
+    for effect in (*catalogue().values(), *empirical_effects([s.motion for s in segments])):
         found, why = [], None
         for form in effect.forms(vehicle):
             reason = next((r for s in segments if (r := not_testable_reason(form, s.motion, vehicle))), None)

@@ -28,9 +28,10 @@ COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
 LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
-LIFT = (0.5, 2.0)
-"""Bounds of mean thrust over mean weight: who flies is carried by his rotors, and no believed value is off by more. The
-noise of a hover says little of its mean, so a curve without any thrust would explain moments that do not respond."""
+LIFT_SD = 0.02
+"""One-sigma of mean thrust over mean weight with the values as fitted: who flies is carried by his rotors. Whitened
+residuals of a hover say little of their mean, so a curve of too little thrust would explain moments that do not respond;
+two percent are an accelerometer's scale."""
 CURVE_STAGE, LIMIT_STAGE = 0, 2
 LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
 MOST_LIMITED = 0.5
@@ -126,8 +127,12 @@ class SpeedProblem:
 
     def whitened(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
         """Whitened residual of every segment, (n, channels), and after them what priors add to the squares."""
+        return self.white(self.raw(chain, values, shift_s))
+
+    def white(self, parts: list[np.ndarray]) -> list[np.ndarray]:
+        """Residuals of every segment, (n, channels), whitened by the noise learnt."""
         out = []
-        for part in self.raw(chain, values, shift_s):
+        for part in parts:
             if self.filters is None:
                 out.append(part / self.scale)
                 continue
@@ -225,14 +230,12 @@ class WrenchOnly(SpeedProblem):
         self.columns = [residual_of(s, s.command, True)[1] for s in segments]
         rows = np.concatenate([residual_of(s, s.command, False)[0] for s in segments])
         self.scale = np.maximum(rows.std(axis=0), 1e-12)
+        self.lift_sd_n = None if force_z is None else LIFT_SD * self.weight_n()
 
-    def lift(self, fit: SpeedFit) -> float:
-        """Mean thrust over mean weight, both along the rotors' axis, with the believed mass and C_F."""
-        if self.force_z is None:
-            return 1.0
+    def weight_n(self) -> float:
+        """Mean force along the rotors' axis that is left where no rotor turns, N."""
         still = np.concatenate([self.residual_of(s, 0.0 * s.command, False)[0] for s in self.segments])
-        turning = np.concatenate(self.raw(fit.chain, fit.values, fit.shift_s))
-        return 1.0 - float(turning[:, self.force_z].mean() / still[:, self.force_z].mean())
+        return abs(float(still[:, self.force_z].mean()))
 
     def refresh(self, fit: SpeedFit) -> None:
         """Recompute the believed values' columns at the path found."""
@@ -244,8 +247,12 @@ class WrenchOnly(SpeedProblem):
         return [self.residual_of(s, self.path(s, chain, values, shift_s), False)[0] for s in self.segments]
 
     def whitened(self, chain, values, shift_s):
-        rows = super().whitened(chain, values, shift_s)
-        columns = self._white_columns()
+        parts = self.raw(chain, values, shift_s)
+        rows, columns = self.white(parts), self._white_columns()
+        if self.lift_sd_n:
+            rows = [*rows, np.concatenate(parts)[:, self.force_z].mean(keepdims=True)[:, None] / self.lift_sd_n]
+            own = np.concatenate(self.columns)[:, self.force_z].mean(axis=0) / self.lift_sd_n
+            columns = [*columns, own[None, None, :]]
         size = columns[0].shape[-1]
         gram = sum(np.einsum("ncp,ncq->pq", c, c) for c in columns) + np.diag(self.precision)
         cross = sum(np.einsum("ncp,nc->p", c, r) for c, r in zip(columns, rows, strict=True))
@@ -406,15 +413,16 @@ class SpeedSearch:
                 if size < SMALLEST_SIZE:
                     dropped[key] = f"its size is {size:.2g} of the noise"
                     continue
-                current, grown = fit, True
+                grown = True
+                refitted = self._with_new_columns(self._better_forms(fit))
+                if self.responds(refitted):
+                    current = refitted
+                else:
+                    dropped[key] = "rotors would hardly follow their commands with it"
+                    self._with_new_columns(current)
                 break
             if not grown:
                 break
-            current = self._better_forms(current)
-            if isinstance(self.problem, WrenchOnly):
-                self.problem.refresh(current)
-                current = self.problem.fit(current.chain, current.values, current.shift_s)
-                current = self.problem.with_covariance(current)
         current = self._pruned(current, dropped)
         if current.covariance is None:
             current = self.problem.with_covariance(current)
@@ -432,6 +440,13 @@ class SpeedSearch:
         lag = self._lag_alone(current)
         return SpeedResult(current, p_values, alternatives, sizes, dropped, noise, lag, fewer)
 
+    def _with_new_columns(self, fit: SpeedFit) -> SpeedFit:
+        """The chain fitted anew with the believed values' columns at the speeds that it makes."""
+        if not isinstance(self.problem, WrenchOnly):
+            return fit
+        self.problem.refresh(fit)
+        return self.problem.with_covariance(self.problem.fit(fit.chain, fit.values, fit.shift_s))
+
     def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
         """A lag of one constant and nothing beside it: what most publications fit."""
         if not {"motor_lag"} < {k for k, _ in fit.chain} & {"motor_lag", "delay", "throttle_curve"}:
@@ -441,11 +456,8 @@ class SpeedSearch:
         return self.problem.with_covariance(self.problem.fit((("motor_lag", form),), np.array([start])))
 
     def responds(self, fit: SpeedFit) -> bool:
-        """Whether rotors still follow their commands and carry the vehicle: a flat curve would explain any difference
-        between them, one without thrust any moment that does not respond."""
+        """Whether rotors still follow their commands: a flat curve would explain any difference between them."""
         if any(at_its_bounds(form, fit.values[fit.slice_of(key)]) for key, form in fit.chain):
-            return False
-        if isinstance(self.problem, WrenchOnly) and not LIFT[0] <= self.problem.lift(fit) <= LIFT[1]:
             return False
         low = min(float(s.command.min()) for s in self.problem.segments)
         high = max(float(s.command.max()) for s in self.problem.segments)
@@ -535,14 +547,15 @@ class SpeedSearch:
 
 
 def at_its_bounds(form: SpeedForm, values: np.ndarray) -> bool:
-    """Whether a curve or a limit of the command has a parameter at the edge of what is physical: that is no estimate,
-    it would go on."""
-    if form.stage not in (CURVE_STAGE, LIMIT_STAGE):
-        return False
-    near = [
-        min(v - p.low, p.high - v) < AT_BOUND * (p.high - p.low) for p, v in zip(form.parameters, values, strict=True)
-    ]
-    return any(near)
+    """Whether a parameter is at the edge of what is physical: that is no estimate, it would go on.
+
+    An edge at which a parameter does nothing (a lag of no time) is none.
+    """
+    for value, own, neutral in zip(values, form.parameters, form.neutral, strict=True):
+        reach = AT_BOUND * (own.high - own.low)
+        if any(abs(value - edge) < reach < abs(neutral - edge) for edge in (own.low, own.high)):
+            return True
+    return False
 
 
 def smoothed_acceleration(speed: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:

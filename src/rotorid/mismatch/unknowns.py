@@ -7,10 +7,14 @@ with what it depends on and how much of the mismatch it carries.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter
 from rotorid.effects.loading import AXES, on_channels
 
 SWING_DAMPING = 0.05
@@ -21,19 +25,16 @@ def _to_body(motion, world):
     return np.einsum("nji,nj->ni", motion.rotation, world)
 
 
-def place(motion, vehicle, values):
-    """F = Rᵀ (k_h (x, y), k_z z), world position: a spring or a cable to a fixed point."""
+def place(motion, vehicle, values, middle=0.0):
+    """F = Rᵀ (k_h (x, y), k_z z), position in the world from `middle` (3,), m: a spring or a cable to a fixed point."""
     k_h, k_z, north, east = values
-    world = np.stack(
-        [k_h * motion.position[:, 0] + north, k_h * motion.position[:, 1] + east, k_z * motion.position[:, 2]], axis=1
-    )
+    world = (motion.position - middle) * [k_h, k_h, k_z] + [north, east, 0.0]
     return Contribution(force=_to_body(motion, world))
 
 
-def height_only(motion, vehicle, values):
-    """F = Rᵀ (0, 0, k_z z)."""
-    world = np.zeros((motion.size, 3))
-    world[:, 2] = values[0] * motion.position[:, 2]
+def height_only(motion, vehicle, values, middle=0.0):
+    """F = Rᵀ (0, 0, k_z z), position in the world from `middle` (3,), m."""
+    world = (motion.position - middle) * [0.0, 0.0, values[0]]
     return Contribution(force=_to_body(motion, world))
 
 
@@ -180,6 +181,23 @@ DEPENDS_ON = {
 LEAST_TURN_RAD = 0.25
 """Spread of the heading (one sigma) from which a moment that keeps its direction in the world differs from one that
 turns with the vehicle: 14 degrees move a quarter of it elsewhere."""
+
+
+def empirical_effects(motions: Sequence[Motion]) -> list[Effect]:
+    """The empirical effects that these flights could tell from named ones.
+
+    Places are counted from the mean place: from a far origin a force that follows the height would be a second weight.
+    """
+    kept = [e for e in UNKNOWNS.values() if can_show(e.id, [m.rotation for m in motions])]
+    if any(m.position is None for m in motions):
+        return kept
+    middle = np.nanmean(np.concatenate([m.position for m in motions]), axis=0)
+
+    def about_middle(vehicle):
+        forms = _place_forms(vehicle)
+        return tuple(replace(form, contribution=partial(form.contribution, middle=middle)) for form in forms)
+
+    return [replace(e, forms=about_middle) if e is PLACE else e for e in kept]
 
 
 def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:

@@ -140,17 +140,13 @@ def told_of_commands(findings: list[Finding], values: Values) -> Values:
 
 
 def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
-    """Values without a thrust per mass that the slope of a throttle curve would make up for within its own interval.
+    """Values without a thrust per mass beside a throttle curve that has a scale of its own.
 
-    Where rotor speeds are known from commands alone, a thrust coefficient larger by x is a slope larger by x/2.
+    Where rotor speeds are known from commands alone, a thrust coefficient larger by x is a scale larger by x/2.
     """
     curve = next((f for f in findings if f.id == "throttle_curve" and f.status in ("established", "ambiguous")), None)
-    slope = next((p for p in curve.parameters if p.symbol == SLOPE), None) if curve else None
-    if slope is None:
-        return values
-    (thrust, _), (mass, _) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "mass"))
-    reach = (slope.high - slope.low) / 2 / max(1.0 + slope.value, 1e-3)
-    return without_common_scale(values) if abs((1 + thrust) / (1 + mass) - 1) / 2 < reach else values
+    has_scale = curve is not None and SLOPE in [p.symbol for p in curve.parameters]
+    return without_common_scale(values) if has_scale else values
 
 
 def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:

@@ -43,6 +43,8 @@ from rotorid.recordings import Vehicle
 from rotorid.signal.kernels import causal
 
 LONGEST_BLOCKS = 400
+TRUSTED_SD = 1e-4
+"""Relative one-sigma of a believed value that is not to move."""
 MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 SAME_WRENCH = 0.004
@@ -353,9 +355,14 @@ def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full
     return out
 
 
-def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None = None, refused: Sequence[str] = ()):
+def speed_path(
+    prepared: Prepared,
+    known: list[tuple[Form, np.ndarray]] | None = None,
+    refused: Sequence[str] = (),
+    trusted: bool = False,
+):
     """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
-    nothing can show it."""
+    nothing can show it. Where only commands are recorded believed values are free beside it unless `trusted`."""
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
     if not segments or any(s.command is None for s in segments):
         return None
@@ -372,7 +379,10 @@ def speed_path(prepared: Prepared, known: list[tuple[Form, np.ndarray]] | None =
             return None
         # The chain has a bounded shift of its own; a free time offset of the rotors would swallow any lag.
         terms = [t for t in prepared.terms if t.kind != "effect" and not t.key.startswith("offset:rotors")]
-        precision = np.concatenate([1 / np.square(np.array(t.prior_sd)) for t in terms])
+        sure = TRUSTED_SD if trusted else np.inf
+        precision = np.concatenate(
+            [1 / np.square(np.minimum(t.prior_sd, sure if t.kind == "value" else np.inf)) for t in terms]
+        )
         keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
 
         def residual_of(segment: Segment, speed: np.ndarray, columns: bool):

@@ -11,8 +11,8 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import SpeedPath
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.speedpath import (
+    LIFT_SD,
     MeasuredSpeed,
-    SpeedFit,
     SpeedSearch,
     WrenchOnly,
     at_its_bounds,
@@ -175,7 +175,7 @@ def test_a_curve_at_the_edge_of_what_is_physical_is_no_estimate():
     assert not at_its_bounds(lag, np.array([lag.parameters[0].low]))
 
 
-def test_a_curve_without_thrust_does_not_carry_the_vehicle():
+def test_a_curve_without_thrust_costs_as_much_as_the_weight_is_sure():
     """Weight 6.06 N, carried at the commanded 900 and 1100 rad/s: at half the speed a quarter of it is."""
     segment = replace(recorded(2), command=np.repeat([[900.0] * 4, [1100.0] * 4], 200, axis=0))
 
@@ -187,6 +187,5 @@ def test_a_curve_without_thrust_does_not_carry_the_vehicle():
     problem = WrenchOnly([segment], FULL, None, RATE_HZ, residual_of, np.ones(1), 2)
     curve = form("throttle_curve", "affine")
     for slope, lift in ((0.0, 1.0), (-0.5, 0.25), (0.2, 1.44)):
-        fit = SpeedFit((("throttle_curve", curve),), np.array([0.0, slope]), 0.0, 0.0)
-        assert problem.lift(fit) == pytest.approx(lift, abs=1e-3)
-        assert SpeedSearch(problem, []).responds(fit) is (lift > 0.5)
+        priors = problem.whitened((("throttle_curve", curve),), np.array([0.0, slope]), 0.0)[len(problem.segments) :]
+        assert sum(float((p**2).sum()) for p in priors) == pytest.approx(((1.0 - lift) / LIFT_SD) ** 2, rel=1e-3, abs=0.01)
