@@ -6,7 +6,7 @@ from rotorid.compiling import compiled
 from rotorid.effects.contract import Effect, Parameter, SpeedForm
 
 SLOWEST_S = 0.3
-"""Longest time constant: rotors of half a metre reach 0.1 s, and no attitude loop holds with motors three times slower."""
+"""Longest time constant: rotors of half a metre reach 0.1 s; no attitude loop holds with motors three times slower."""
 
 
 @compiled()

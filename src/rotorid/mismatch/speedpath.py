@@ -30,8 +30,8 @@ LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
 LIFT_SD = 0.02
 """One-sigma of mean thrust over mean weight with the values as fitted: who flies is carried by his rotors. Whitened
-residuals of a hover say little of their mean, so a curve of too little thrust would explain moments that do not respond;
-two percent are an accelerometer's scale."""
+residuals of a hover say little of their mean, and a curve of too little thrust would explain moments that do not
+respond. Two percent are an accelerometer's scale."""
 CURVE_STAGE, LIMIT_STAGE = 0, 2
 LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
 MOST_LIMITED = 0.5

@@ -188,4 +188,5 @@ def test_a_curve_without_thrust_costs_as_much_as_the_weight_is_sure():
     curve = form("throttle_curve", "affine")
     for slope, lift in ((0.0, 1.0), (-0.5, 0.25), (0.2, 1.44)):
         priors = problem.whitened((("throttle_curve", curve),), np.array([0.0, slope]), 0.0)[len(problem.segments) :]
-        assert sum(float((p**2).sum()) for p in priors) == pytest.approx(((1.0 - lift) / LIFT_SD) ** 2, rel=1e-3, abs=0.01)
+        cost = sum(float((p**2).sum()) for p in priors)
+        assert cost == pytest.approx(((1.0 - lift) / LIFT_SD) ** 2, rel=1e-3, abs=0.01)
