@@ -21,7 +21,7 @@ from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
-from rotorid.mismatch.leave_one_out import without_each, without_each_value
+from rotorid.mismatch.leave_one_out import without_each, without_values
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
@@ -136,7 +136,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         not_testable=not_testable(prepared, found.chain, findings),
         traces=traces,
         without=without_each(found, seen, values, fit, findings, traces),
-        without_values=without_each_value(model, seen, values, moved, names_of(told), traces),
+        without_values=without_values(model, seen, values, moved, names_of(told), traces),
         noise_floor=noise_floors(prepared, found),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(seen.segments, seen.prepared),

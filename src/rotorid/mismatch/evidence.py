@@ -8,7 +8,7 @@ runs held out lower a word, nothing else.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,8 +98,11 @@ def weighed(analysis: Analysis) -> Analysis:
     shares = effect_shares(analysis, held)
     whole = evidence(analysis, tuple(t.before for t in analysis.traces), held)
     findings = tuple(judged(f, analysis, held, shares.get(f.id, 0.0), whole) for f in analysis.findings)
-    found = {n: evidence(analysis, left, held) for n, left in analysis.without_values.items()}
-    against = {n: e.contradiction or e.undone_by(whole) for n, e in found.items()}
+    against: dict[str, str] = {}
+    for names, left in analysis.without_values.items():
+        found = evidence(analysis, left, held)
+        if why := found.contradiction or found.undone_by(whole):
+            against |= {n: why for n in names if n not in against}
     doubtful = {n: (analysis.values[n], why) for n, why in against.items() if why}
     values = {n: v for n, v in analysis.values.items() if n not in doubtful}
     return replace(analysis, findings=findings, shares=shares, values=values, suggested_values=doubtful)
@@ -135,10 +138,11 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: 
     if finding.status not in CLAIMED or finding.id not in analysis.without:
         return finding
     without = analysis.without[finding.id]
-    found = evidence(analysis, without, held)
+    found = evidence(analysis, without, held, finding.channels)
     if finding.windows and not found.ratios:
         # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
-        found = evidence(analysis, without, [in_windows(t, finding.windows) for t in analysis.traces])
+        windows = [in_windows(t, finding.windows) for t in analysis.traces]
+        found = evidence(analysis, without, windows, finding.channels)
     nothing = rules.MAY_BE_NOTHING(not away_from_nothing(finding))
     reason = found.objection or found.undone_by(whole) or ("every number of it may be nothing" if nothing else "")
     slight = found.ratios and found.ratios[0].value > PLAIN_RATIO
@@ -158,8 +162,14 @@ def in_windows(trace: Trace, windows: tuple[tuple[str, float, float], ...]) -> n
     return inside
 
 
-def evidence(analysis: Analysis, without: tuple[np.ndarray, ...], held: list[np.ndarray]) -> Evidence:
-    """What rows held out (masks of the traces) say of an effect, given what is left of the traces without it."""
+def evidence(
+    analysis: Analysis, without: tuple[np.ndarray, ...], held: list[np.ndarray], acts_on: Collection[str] = ()
+) -> Evidence:
+    """What rows held out (masks of the traces) say of an effect, given what is left of the traces without it.
+
+    Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
+    without it; where none of them is compared (an accelerometer's error), those that differ most.
+    """
     size: dict[str, list[float]] = {}
     for trace, left, mask in zip(analysis.traces, without, held, strict=True):
         added = (left - trace.after) ** 2
@@ -172,7 +182,7 @@ def evidence(analysis: Analysis, without: tuple[np.ndarray, ...], held: list[np.
     strongest = max(here.values(), default=0.0)
     if strongest <= LEAST_EXCITED * max(there.values(), default=0.0):
         return Evidence()
-    acting = [c for c in here if here[c] > ACTS * strongest]
+    acting = [c for c in here if c in acts_on] or [c for c in here if here[c] > ACTS * strongest]
     ratios = [r for r in (ratio_of(analysis, without, held, c) for c in acting) if r is not None]
     beyond = any(here[c] * noise[c] > leftover_rms(analysis, held, c) for c in acting)
     return Evidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)

@@ -107,7 +107,7 @@ class Analysis:
     """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
     without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
     """To the id of a stated effect what is left of every trace without it, all else fitted anew."""
-    without_values: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
+    without_values: Mapping[tuple[str, ...], tuple[np.ndarray, ...]] = field(default_factory=dict)
     """To the name of a wrong value what is left of every trace with it as believed, all else fitted anew."""
     suggested_values: Mapping[str, tuple[tuple[float, float, float, float], str]] = field(default_factory=dict)
     """Values that the runs held out do not bear out: as in `values`, and why."""

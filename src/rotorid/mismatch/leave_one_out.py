@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -62,15 +63,17 @@ def without_each(
     return out
 
 
-def without_each_value(
+def without_values(
     model: FittedModel,
     seen: FittedModel,
     values: Values,
     moved: Values,
     names: Mapping[str, Sequence[str]],
     traces: Sequence[Trace],
-) -> dict[str, tuple[np.ndarray, ...]]:
-    """To the name of every wrong value the residual (n,) of every trace with it as believed, in the traces' order.
+) -> dict[tuple[str, ...], tuple[np.ndarray, ...]]:
+    """To the names of every wrong value, and of every two, the residual (n,) of every trace with them as believed.
+
+    Two that make up for each other (a torque and the inertia that it turns) each look needed beside the other.
 
     Parameters
     ----------
@@ -84,11 +87,12 @@ def without_each_value(
         Those of the analysis.
     """
     out = {}
-    for name, keys in names.items():
+    for gone in [*combinations(names, 1), *combinations(names, 2)]:
+        keys = {k for name in gone for k in names[name]}
         others = {k: v for k, v in values.items() if k not in keys}
         fit = delivered_fit(model, [*others, *moved, *model.selection.active], others)[1]
         left = residuals_of(seen, scaled_by_run(seen, fit))
-        out[name] = on_traces(traces, seen.rows, left)
+        out[gone] = on_traces(traces, seen.rows, left)
     return out
 
 

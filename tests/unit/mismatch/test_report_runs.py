@@ -14,7 +14,7 @@ import pytest
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.mismatch.deliver import verdict_of
-from rotorid.mismatch.evidence import ratio_of
+from rotorid.mismatch.evidence import evidence, ratio_of, weighed
 from rotorid.mismatch.findings import Trace
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.ledger import ledger, text_of
@@ -103,6 +103,28 @@ def test_established_effects_better_a_channel_and_come_in_the_order_of_their_sha
     assert stated and all(e["held_out_gain"]["interval_95"][1] < 1.0 for e in stated)
     shares = [e["share"] for e in stated]
     assert shares == sorted(shares, reverse=True) and shares[0] > 0.5
+
+
+def test_an_effect_is_judged_in_the_channels_that_it_acts_on():
+    analysis = analysed(0.0)
+    held = [np.full(len(t.time_s), t.run == HELD) for t in analysis.traces]
+    without = analysis.without["rotor_drag"]
+    assert {r.channel for r in evidence(analysis, without, held, ("force_x",)).ratios} == {"force_x"}
+    assert {r.channel for r in evidence(analysis, without, held).ratios} > {"force_x"}
+
+
+def test_two_values_that_make_up_for_each_other_are_not_called_wrong():
+    """Each alone is missed, both together are not."""
+    analysis = analysed(0.0)
+    after, missed = (tuple(getattr(t, stage) for t in analysis.traces) for stage in ("after", "before"))
+    values = {"torque_coefficient_n_m_s2": (1.0, 0.9, 0.8, 1.0), "inertia_zz_kg_m2": (1.0, 0.9, 0.8, 1.0)}
+    alone = {(name,): missed for name in values}
+    told = weighed(replace(analysis, values=values, without_values=alone))
+    assert told.values == values
+    draw = np.random.default_rng(0)
+    alike = tuple(x + 1e-3 * x.std() * draw.standard_normal(len(x)) for x in after)
+    told = weighed(replace(analysis, values=values, without_values={**alone, tuple(values): alike}))
+    assert not told.values and set(told.suggested_values) == set(values)
 
 
 def test_a_single_run_is_cut_in_two_with_a_gap():

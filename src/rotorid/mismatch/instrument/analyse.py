@@ -39,7 +39,7 @@ from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.leave_one_out import first_s, on_traces, without_each_value
+from rotorid.mismatch.leave_one_out import first_s, on_traces, without_values
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Term
@@ -180,7 +180,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         notes=(*remarks, *notes_of(setup)),
         put_right=in_words(moved_values, VALUE_NAMES),
         without=without_each(model, seen, values, chain if measured else None, findings, traces),
-        without_values=without_each_value(model, seen, values, moved_values, names_of(told, VALUE_NAMES), traces),
+        without_values=without_values(model, seen, values, moved_values, names_of(told, VALUE_NAMES), traces),
     )
     return weighed(analysis)
 
