@@ -52,6 +52,9 @@ from rotorid.recordings import RecordingSet
 UNITS = {"force": "N", "moment": "N m"}
 SURELY_HEAVIER = 2.0
 """Standard errors by which a vehicle must be heavier than believed to carry a payload."""
+TIMING_FLOOR = 0.05
+"""One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
+recorded."""
 NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 
 
@@ -266,7 +269,8 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
     for key, form in result.fit.chain:
         where = result.fit.slice_of(key)
         values = result.fit.values[where]
-        sd = np.sqrt(np.diag(result.fit.covariance)[where])
+        least = [TIMING_FLOOR / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
+        sd = np.hypot(np.sqrt(np.diag(result.fit.covariance)[where]), least)
         parameters = tuple(
             Estimate(p.symbol, float(v), p.unit, float(v - 1.96 * s), float(v + 1.96 * s))
             for p, v, s in zip(form.parameters, values, sd, strict=True)
