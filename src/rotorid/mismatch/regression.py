@@ -459,7 +459,7 @@ class Regression:
             variances.append(np.where(silent, np.inf, np.maximum(np.diag(robust), np.diag(inverse))))
         if len(estimates) < 2:
             return np.zeros(len(cols)), 1.0
-        b, v = np.array(estimates), np.maximum(np.array(variances), 1e-300)
+        b, v = np.array(estimates), np.maximum(np.array(variances), 1e-100)
         w = 1.0 / v
         mean = (w * b).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-300)
         q = (w * (b - mean) ** 2).sum(axis=0)
