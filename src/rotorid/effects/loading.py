@@ -112,9 +112,6 @@ class Loading:
     def dt_s(self) -> float:
         return float(self.time_s[1] - self.time_s[0])
 
-    def with_load(self, load: np.ndarray) -> Loading:
-        return replace(self, load=load)
-
 
 def rotation_of(roll: np.ndarray, pitch: np.ndarray) -> np.ndarray:
     """Body vectors into level axes for roll and pitch (n,), rad, shape (n, 3, 3): R_y(pitch) R_x(roll)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
@@ -96,6 +97,51 @@ def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: n
     return [int(c) for c in order if size[c] > 0.33 * size[order[0]]]
 
 
+class Told(NamedTuple):
+    """What is told of a term at work."""
+
+    values: np.ndarray
+    parameters: tuple[Estimate, ...]
+    channels: tuple[str, ...]
+    alternatives: Collection[str]
+
+
+def findings_of(search: Search, selection: Selection, told: Callable[[str], Told]) -> list[Finding]:
+    """A finding for every term that entered, and for those that looked like something and did not survive.
+
+    Terms without a name are told as unexplained instead.
+    """
+    effects, findings = catalogue(), []
+    for key in selection.active:
+        term = search.terms[key]
+        if term.effect in UNKNOWNS:
+            continue
+        own = told(key)
+        findings.append(
+            Finding(
+                id=term.effect,
+                status="ambiguous" if own.alternatives else "established",
+                form=term.form,
+                values=tuple(float(v) for v in own.values),
+                equation=term.form.equation,
+                sentence=effects[term.effect].sentence,
+                parameters=own.parameters,
+                p_value=selection.p_values[key],
+                channels=own.channels,
+                alternatives=tuple(sorted({term.effect, *own.alternatives})) if own.alternatives else (),
+                windows=(term.window,) if term.window else (),
+            )
+        )
+    named = {i for f in findings for i in f.alternatives}
+    for effect_id, reason in selection.not_established.items():
+        if effect_id in named or effect_id in UNKNOWNS:
+            continue
+        text = f"{effects[effect_id].name} did not hold: {reason}"
+        rule = getattr(reason, "rule", "")
+        findings.append(Finding(id=effect_id, status="not_established", sentence=text, rule=rule))
+    return findings
+
+
 def wrench_findings(
     contributions: Contributions,
     regression: Regression,
@@ -104,24 +150,16 @@ def wrench_findings(
     noise: np.ndarray,
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
 ) -> list[Finding]:
-    """A finding for every term that entered, and for those that looked like something and did not survive."""
-    effects, rows = catalogue(), contributions.rows
-    findings = []
+    """Findings of the terms of a flight; `nonlinear` holds values and one-sigma of those with nonlinear parameters."""
     beside = suggested(search, selection.active)
-    for key in selection.active:
+
+    def told(key: str) -> Told:
         term = search.terms[key]
-        if term.effect in UNKNOWNS:
-            continue  # told as unexplained
-        effect = effects[term.effect]
         beta, _ = coefficients(regression, selection.fit, key)
-        channels = main_channels(rows, regression.columns([key]), beta, noise)
-        alternatives = search.alternatives(key, selection.active)
-        status = "ambiguous" if alternatives else "established"
-        values = np.array(term.values, float)
+        channels = main_channels(contributions.rows, regression.columns([key]), beta, noise)
+        values, parameters = np.array(term.values, float), ()
         if term.form.linear:
             values[list(term.form.linear)] = term.form.stated(beta)
-        parameters = ()
-        if term.form.linear:
             stated = estimates(regression, selection.fit, search, key, beside)
             # What nothing in the recordings shows (columns that are noise alone) is not stated.
             parameters = tuple(p for p, shown in zip(stated, regression.shown(key), strict=True) if shown)
@@ -131,34 +169,10 @@ def wrench_findings(
                 Estimate(p.symbol, float(v), p.unit, float(v - 1.96 * s), float(v + 1.96 * s))
                 for p, v, s in zip(term.form.parameters, values, sd, strict=True)
             )
-        findings.append(
-            Finding(
-                id=term.effect,
-                status=status,
-                form=term.form,
-                values=tuple(float(v) for v in values),
-                equation=term.form.equation,
-                sentence=effect.sentence,
-                parameters=parameters,
-                p_value=selection.p_values[key],
-                channels=tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels),
-                alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
-                windows=(term.window,) if term.window else (),
-            )
-        )
-    for effect_id, reason in selection.not_established.items():
-        if effect_id in UNKNOWNS:
-            continue
-        effect = effects[effect_id]
-        findings.append(
-            Finding(
-                id=effect_id,
-                status="not_established",
-                sentence=f"{effect.name} did not hold: {reason}",
-                rule=getattr(reason, "rule", ""),
-            )
-        )
-    return findings
+        names = tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels)
+        return Told(values, parameters, names, search.alternatives(key, selection.active))
+
+    return findings_of(search, selection, told)
 
 
 def fails_elsewhere(

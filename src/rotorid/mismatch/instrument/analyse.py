@@ -32,7 +32,7 @@ from rotorid.mismatch.instrument.chain import (
 )
 from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
 from rotorid.mismatch.instrument.curved_gain import curved_gains
-from rotorid.mismatch.instrument.decide import findings_of, with_plainer_forms
+from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
@@ -121,7 +121,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
-    found = [one_load(f, setup) for f in findings_of(model, leftovers)]
+    found = [one_load(f, setup) for f in reading_findings(model, leftovers)]
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:

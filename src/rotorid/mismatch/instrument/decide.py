@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch import rules
-from rotorid.mismatch.decide import estimates
+from rotorid.mismatch.decide import Told, estimates, findings_of
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.instrument.approximate import LeftOfForm
 from rotorid.mismatch.instrument.model import (
@@ -25,7 +24,6 @@ from rotorid.mismatch.unknowns import UNKNOWNS
 SHOWS = 0.33
 """A channel counts where the contribution is at least this share of its strongest, in units of the noise."""
 REACH = 1.96
-ALIKE = {("tare_offset", "mass")}
 
 
 def main_channels(model: ReadingModel, key: str) -> list[int]:
@@ -38,44 +36,20 @@ def main_channels(model: ReadingModel, key: str) -> list[int]:
     return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]
 
 
-def findings_of(model: ReadingModel, leftovers: tuple[LeftOfForm, ...] = ()) -> list[Finding]:
-    """A finding for every term that entered, and for those that looked like something and did not survive.
+def reading_findings(model: ReadingModel, leftovers: tuple[LeftOfForm, ...] = ()) -> list[Finding]:
+    """Findings of the terms of a reading.
 
     `leftovers` are effects that only made up for the form of a term: one that in any form does as well as it is an
     alternative to it.
     """
-    effects, search, selection = catalogue(), model.search, model.selection
-    out = []
-    for key in selection.active:
-        if search.terms[key].effect in UNKNOWNS:
-            continue  # told as unexplained
-        term, effect = search.terms[key], effects[search.terms[key].effect]
-        channels = main_channels(model, key)
-        values, parameters = active_values(model, key), parameters_of(model, key)
+
+    def told(key: str) -> Told:
+        channels = tuple(CHANNELS[c] for c in main_channels(model, key))
         either = [c.effect for c in leftovers if c.stronger == key and c.either]
         alternatives = [*alternatives_of(model, key), *either]
-        out.append(
-            Finding(
-                id=term.effect,
-                status="ambiguous" if alternatives else "established",
-                form=term.form,
-                values=tuple(float(v) for v in values),
-                equation=term.form.equation,
-                sentence=effect.sentence,
-                parameters=parameters,
-                p_value=selection.p_values[key],
-                channels=tuple(CHANNELS[c] for c in channels),
-                alternatives=tuple(sorted({term.effect, *alternatives})) if alternatives else (),
-            )
-        )
-    named = {a for f in out for a in f.alternatives}
-    for effect_id, reason in selection.not_established.items():
-        if effect_id in named or effect_id in UNKNOWNS:
-            continue
-        name = effects[effect_id].name
-        text, rule = f"{name} did not hold: {reason}", getattr(reason, "rule", "")
-        out.append(Finding(id=effect_id, status="not_established", sentence=text, rule=rule))
-    return out
+        return Told(active_values(model, key), parameters_of(model, key), channels, alternatives)
+
+    return findings_of(model.search, model.selection, told)
 
 
 def parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
