@@ -337,6 +337,9 @@ def test_what_cannot_show_is_counted_apart_even_where_it_is_named() -> None:
     windy = named("steady_wind", shown_by=frozenset({"rotor_drag"}))
     assert score.score_truth(verdict(), verdict(), windy)["told"] == score.UNSEEN
     assert score.score_truth(verdict(), verdict(effect("rotor_drag")), windy)["told"] == score.NOT_TOLD
+    heavier = named("mass_kg", hidden_by=frozenset({"throttle_curve"}))
+    assert score.score_truth(verdict(), verdict(effect("throttle_curve")), heavier)["told"] == score.UNSEEN
+    assert score.score_truth(verdict(), verdict(effect("rotor_drag")), heavier)["told"] == score.NOT_TOLD
 
 
 def test_what_is_new_and_what_is_lost_beside_it() -> None:

@@ -52,6 +52,8 @@ class Truth:
     """Why the columns of this flight cannot show it at all; empty where they can."""
     shown_by: frozenset[str] = frozenset()
     """Ids of which the untouched flight must state one for the cause to show at all (wind shows through drag)."""
+    hidden_by: frozenset[str] = frozenset()
+    """Ids that make up for the cause where the untouched flight states one (a curve of the throttle for a mass)."""
     first_only: frozenset[str] = frozenset()
     """Ids beside which the true form is none of the catalogue's (two lags in series), so that no size is compared."""
 

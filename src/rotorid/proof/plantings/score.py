@@ -59,6 +59,8 @@ def score_truth(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth:
     before = set().union(*classes(untouched)) if classes(untouched) else set()
     if not unseen and truth.shown_by and not truth.shown_by & before:
         unseen = f"the untouched flight shows none of {', '.join(sorted(truth.shown_by))}"
+    if not unseen and (beside := truth.hidden_by & before):
+        unseen = f"the untouched flight shows {', '.join(sorted(beside))}, which make up for it"
     row: dict[str, Any] = {"told": NOT_TOLD, "unseen": unseen, "symbol": "", "true": None, "estimate": None}
     row |= {"low_95": None, "high_95": None, "covered": None}
     told = _told(verdict, untouched, truth)

@@ -27,7 +27,7 @@ def mass(recordings: RecordingSet, share: float, rng: np.random.Generator):
     """The believed mass times a factor; a flight shows C_F over mass."""
     f = _factor(share, rng)
     ratio = Ratio({C_F: 1.0, MASS: -1.0, FULL: 2.0}, np.log(f))
-    truth = named(MASS, fair=(C_F, FULL), ratio=ratio)
+    truth = named(MASS, fair=(C_F, FULL), ratio=ratio, hidden_by=_open_scale(recordings))
     return with_vehicle(recordings, mass_kg=recordings.vehicle.mass_kg * f), truth
 
 
@@ -36,7 +36,8 @@ def thrust(recordings: RecordingSet, share: float, rng: np.random.Generator):
     f = _factor(share, rng)
     ratio = Ratio({C_F: 1.0, MASS: -1.0, FULL: 2.0}, -np.log(f))
     new = _of(recordings.vehicle.thrust_coefficient_n_s2, f)
-    return with_vehicle(recordings, thrust_coefficient_n_s2=new), named(C_F, fair=(MASS, FULL), ratio=ratio)
+    truth = named(C_F, fair=(MASS, FULL), ratio=ratio, hidden_by=_open_scale(recordings))
+    return with_vehicle(recordings, thrust_coefficient_n_s2=new), truth
 
 
 def torque(recordings: RecordingSet, share: float, rng: np.random.Generator):
@@ -78,6 +79,11 @@ def arm(recordings: RecordingSet, share: float, rng: np.random.Generator):
 
 def _turning(recordings: RecordingSet) -> str:
     return slow_rotors(recordings) if has(recordings, "gyroscope") else NO_MOMENT
+
+
+def _open_scale(recordings: RecordingSet) -> frozenset[str]:
+    """Effects beside which only commands say how fast rotors turn, so that a thrust per mass shows no more."""
+    return frozenset() if has(recordings, "rotors") else frozenset({"throttle_curve", "battery_sag"})
 
 
 def _any(recordings: RecordingSet) -> bool:
