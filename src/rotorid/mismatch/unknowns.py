@@ -178,6 +178,9 @@ DEPENDS_ON = {
     "unknown_gain": ("load", "time_s"),
 }
 """Regime variables that each depends on, for the verdict."""
+LEAST_CLIMB = 0.25
+"""Spread of the height (one sigma) beside its mean from which a force that follows it differs from a weight: six
+percent of its energy are its own."""
 LEAST_TURN_RAD = 0.25
 """Spread of the heading (one sigma) from which a moment that keeps its direction in the world differs from one that
 turns with the vehicle: 14 degrees move a quarter of it elsewhere."""
@@ -186,12 +189,16 @@ turns with the vehicle: 14 degrees move a quarter of it elsewhere."""
 def empirical_effects(motions: Sequence[Motion]) -> list[Effect]:
     """The empirical effects that these flights could tell from named ones.
 
-    Places are counted from the mean place: from a far origin a force that follows the height would be a second weight.
+    Places are counted from the mean place where the height hardly varies beside its mean: a force that follows such a
+    height is a second weight.
     """
     kept = [e for e in UNKNOWNS.values() if can_show(e.id, [m.rotation for m in motions])]
     if any(m.position is None for m in motions):
         return kept
-    middle = np.nanmean(np.concatenate([m.position for m in motions]), axis=0)
+    places = np.concatenate([m.position for m in motions])
+    middle = np.nanmean(places, axis=0)
+    if np.nanstd(places[:, 2]) > LEAST_CLIMB * abs(middle[2]):
+        return kept
 
     def about_middle(vehicle):
         forms = _place_forms(vehicle)
