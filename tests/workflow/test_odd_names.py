@@ -143,4 +143,7 @@ def test_what_a_killed_job_left_is_not_taken_for_whole(project: Project, tmp_pat
     after = {name: (folder / name).read_bytes() for name in names}
     shutil.rmtree(folder)
     project.snakemake(target, "--config", recordings)
-    assert after == {name: (folder / name).read_bytes() for name in names}
+    for name in names:
+        one, other = after[name], (folder / name).read_bytes()
+        place = next((k for k, pair in enumerate(zip(one, other, strict=False)) if pair[0] != pair[1]), len(other))
+        assert one == other, (name, place, one[place - 100 : place + 100], other[place - 100 : place + 100])
