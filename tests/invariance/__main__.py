@@ -65,7 +65,7 @@ def summary(rows: list[dict[str, str]]) -> str:
     for change in [*CHANGES, ""]:
         own = [row for row in rows if change in ("", row["change"])]
         counts = (len(own), sum(bool(row["words"]) for row in own), sum(map(too_far, own)))
-        name = change.replace("_", " ") or f"all, {len({row['set'] for row in rows})} sets"
+        name = change.replace("_", " ") or f"all (sets: {len({row['set'] for row in rows})})"
         lines.append(f"| {name} | {' | '.join(map(str, counts))} |")
     return "\n".join(lines)
 
