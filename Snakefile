@@ -49,3 +49,8 @@ CODE.remember()
 onsuccess:
     # The answer is the last thing on the screen: Snakemake says where its log is after this.
     atexit.register(say_verdicts)
+
+
+onerror:
+    # So is the reason why it stopped.
+    atexit.register(say_refusals)

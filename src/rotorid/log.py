@@ -1,4 +1,4 @@
-"""One log file per job that holds everything: messages, warnings and the traceback of a failure."""
+"""One log file per job that holds everything: messages, warnings, a failure's traceback, the reason of a refusal."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from rotorid.errors import InputError
+
 FORMAT = "%(levelname)s %(name)s: %(message)s"
 
 
@@ -17,7 +19,8 @@ def to(path: str | Path) -> Iterator[None]:
     """Send `logging`, warnings and the traceback of an exception to `path` while the block runs.
 
     The file is made anew. Lines carry no time of day, so that two runs leave the same log. The exception is
-    raised again after it is written. Previous handlers, level and warning settings come back at the end.
+    raised again after it is written. Bad input is no fault of the code: it ends the process with its one sentence,
+    which is then the log's last line. Previous handlers, level and warning settings come back at the end.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -33,6 +36,12 @@ def to(path: str | Path) -> Iterator[None]:
         try:
             yield
             logging.getLogger("rotorid").info("done")
+        except InputError as error:
+            logging.getLogger("rotorid").error("%s", error)
+            raise SystemExit(f"rotorid: {error}") from None
+        except SystemExit as end:
+            logging.getLogger("rotorid").error("%s", str(end.code).removeprefix("rotorid: "))
+            raise
         except BaseException:
             logging.getLogger("rotorid").exception("failed")
             raise
@@ -41,6 +50,16 @@ def to(path: str | Path) -> Iterator[None]:
             root.removeHandler(handler)
             root.setLevel(level)
             handler.close()
+
+
+REFUSED = "ERROR rotorid: "
+"""How the last line of the log of a refused job begins."""
+
+
+def refusal(path: str | Path) -> str | None:
+    """The sentence that a job ended with, from its log; None where it ended otherwise."""
+    lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+    return lines[-1].removeprefix(REFUSED) if lines and lines[-1].startswith(REFUSED) else None
 
 
 def progress(text: str) -> None:

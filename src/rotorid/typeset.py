@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from rotorid.errors import InputError
@@ -24,6 +26,7 @@ def typst_source(
     out: str | Path,
     left_out: Sequence[str] = (),
     notice: str = "",
+    later: Mapping[str, int] | None = None,
 ) -> None:
     """Chapters to one typst document.
 
@@ -41,10 +44,87 @@ def typst_source(
         Names of chapters that are not in this report: a reference into one of them says so.
     notice
         What the title page says of the data.
+    later
+        By how many steps a figure or table (by its identifier) stands later than in its chapter's text.
     """
     template = Path(parts) / "report.typ"
     options = ["--to=typst", f"--template={template}", f"--output={out}"]
+    options.append("--metadata=later:" + ",".join(f"{name}={steps}" for name, steps in (later or {}).items()))
     _pandoc(chapters, title, subtitle, parts, options, left_out, notice)
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Empty space at the foot of a page since a figure or table did not fit there."""
+
+    identifier: str
+    chapter: int
+    """From 1, those without a number included."""
+    height_pt: float
+    """0 where it follows its text on the same page."""
+    movable: bool
+    """Whether whole sentences follow that could stand before it."""
+
+
+MOST_EMPTY_PT = 70.0
+"""A tenth of a page's text: a larger gap is filled with the text that follows, where some does."""
+MOST_STEPS = 4
+"""A figure stands no further from its place than this many paragraphs."""
+ROUNDS = 12
+
+
+def without_gaps(
+    chapters: Sequence[str | Path],
+    title: str,
+    subtitle: str,
+    parts: str | Path,
+    out: str | Path,
+    left_out: Sequence[str] = (),
+    notice: str = "",
+) -> None:
+    """`typst_source` with figures and tables put some paragraphs later where a page would end half empty.
+
+    Each chapter begins a page of its own, so that one figure of each is tried in every round; what fills most stays.
+    """
+    later: dict[str, int] = {}
+    seen: dict[str, dict[int, float]] = {}
+    settled: set[str] = set()
+    for _ in range(ROUNDS):
+        typst_source(chapters, title, subtitle, parts, out, left_out, notice, later)
+        tried: set[int] = set()
+        for gap in gaps(out):
+            name, steps = gap.identifier, later.get(gap.identifier, 0)
+            if name in settled or gap.chapter in tried:
+                continue
+            seen.setdefault(name, {})[steps] = gap.height_pt
+            if gap.height_pt <= MOST_EMPTY_PT:
+                settled |= {name} if steps else set()
+                continue
+            tried.add(gap.chapter)
+            if gap.movable and steps < MOST_STEPS:
+                later[name] = steps + 1
+            else:
+                later[name] = min(seen[name], key=lambda k: (seen[name][k], k))
+                settled.add(name)
+        if not tried:
+            return
+    typst_source(chapters, title, subtitle, parts, out, left_out, notice, later)
+
+
+def gaps(source: str | Path) -> list[Gap]:
+    """The gap before each figure and table that follows text, in reading order, from a typst source's own marks."""
+    import typst
+
+    try:
+        found = typst.query(str(source), "<places>", field="value", one=True, root=".", ignore_system_fonts=True)
+    except typst.TypstError as error:
+        raise TypesetError(f"{source}: typst says: {error}") from None
+    places = json.loads(found)
+    page_of = dict(places["shown"])
+    return [
+        Gap(name, chapter, places["bottom"] - below_pt if page_of[name] > page else 0.0, movable)
+        for (name, movable, chapter), page, below_pt in places["text"]
+    ]
 
 
 def pdf(source: str | Path, out: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""What the report says of C_Q: it is off by chance, not by what the sensor reads of other channels."""
+"""C_Q of the emulated campaign is off by chance, not by what the sensor reads of other channels."""
 
 from pathlib import Path
 

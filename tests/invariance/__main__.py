@@ -1,6 +1,7 @@
 """Judge sets and their changed copies, and write what differs as a table.
 
     python -m tests.invariance TABLE.tsv SET_FOLDER ... [--changes renamed,turned]
+    python -m tests.invariance TABLE.tsv              # only sums the table up
 
 What the table holds already is not judged again.
 """
@@ -13,19 +14,23 @@ from pathlib import Path
 from rotorid.errors import InputError
 from rotorid.mismatch.deliver import judge
 from rotorid.recordings import read_set
-from tests.invariance.changes import CHANGES
+from tests.invariance.changes import CHANGES, LESS_IS_KNOWN
 from tests.invariance.compare import difference
 
-COLUMNS = ("set", "change", "words", "hints", "moved", "which", "cpu_s")
+COLUMNS = ("set", "kind", "change", "words", "hints", "moved", "which", "cpu_s")
+MOST_MOVED = 0.05
+"""Share of its 95 % interval by which a number may differ."""
+MOST_MOVED_BY_LESS = 1.0
+"""The same where samples were left out: a value may not leave the interval's width."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("table", type=Path)
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="*")
     parser.add_argument("--changes", default=",".join(CHANGES))
     asked = parser.parse_args()
-    new = not asked.table.exists()
+    new = not asked.table.exists() or not asked.table.stat().st_size
     done = set()
     if not new:
         with asked.table.open(newline="") as file:
@@ -39,6 +44,30 @@ def main() -> None:
             if left:
                 for row in compared(folder, left):
                     rows.writerow(row)
+    print(summary(read(asked.table)))
+
+
+def read(table: Path) -> list[dict[str, str]]:
+    """Rows of a table."""
+    with table.open(newline="") as file:
+        return list(csv.DictReader(file, delimiter="\t"))
+
+
+def too_far(row: dict[str, str]) -> bool:
+    """Whether a number moved by more than it may."""
+    most = MOST_MOVED_BY_LESS if row["change"] in LESS_IS_KNOWN else MOST_MOVED
+    return bool(row["moved"]) and float(row["moved"]) > most
+
+
+def summary(rows: list[dict[str, str]]) -> str:
+    """A markdown table: of each change how many sets, in how many the words differ, in how many a number is too far."""
+    lines = ["| change | sets | words differ | a number too far |", "| --- | ---: | ---: | ---: |"]
+    for change in [*CHANGES, ""]:
+        own = [row for row in rows if change in ("", row["change"])]
+        counts = (len(own), sum(bool(row["words"]) for row in own), sum(map(too_far, own)))
+        name = change.replace("_", " ") or f"all (sets: {len({row['set'] for row in rows})})"
+        lines.append(f"| {name} | {' | '.join(map(str, counts))} |")
+    return "\n".join(lines)
 
 
 def compared(folder: Path, changes: list[str]):
@@ -47,7 +76,7 @@ def compared(folder: Path, changes: list[str]):
     own = judge(recordings)
     for name in changes:
         start = time.process_time()
-        row = {"set": folder.name, "change": name}
+        row = {"set": folder.name, "kind": recordings.vehicle.kind, "change": name}
         changed = CHANGES[name](recordings, own.runs.held_out)
         if changed is None:
             continue

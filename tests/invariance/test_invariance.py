@@ -16,14 +16,11 @@ from rotorid.mismatch.deliver import judge, verdict_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
 from tests.concealed import build, cases
+from tests.invariance.__main__ import MOST_MOVED, MOST_MOVED_BY_LESS, read, summary
 from tests.invariance.changes import CHANGES, LESS_IS_KNOWN, Changed
 from tests.invariance.compare import difference
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 
-MOST_MOVED = 0.05
-"""Share of its 95 % interval by which a number may differ."""
-MOST_MOVED_BY_LESS = 1.0
-"""The same where samples were left out: a value may not leave the interval's width."""
 OFTEN = ("single/rotor_drag/moderate/0", "single/unequal_rotors/moderate/0", "bench/single/crosstalk/moderate/0")
 OWN = os.environ.get("ROTORID_INVARIANCE_SETS")
 OWN_SETS = sorted(str(path.parent) for path in Path(OWN).glob("*/vehicle.yaml")) if OWN else []
@@ -61,6 +58,12 @@ def test_the_verdict_is_the_same(name: str, change: str, judged) -> None:
     assert found.words == ()
     most = MOST_MOVED_BY_LESS if change in LESS_IS_KNOWN else MOST_MOVED
     assert not found.moved > most, found.which
+
+
+def test_the_kept_table_is_what_the_page_says() -> None:
+    """The page's summary is of the rows beside it."""
+    kept = Path(__file__).parents[2] / "docs" / "proof"
+    assert summary(read(kept / "invariance.tsv")) in (kept / "README.md").read_text()
 
 
 def flight() -> RecordingSet:

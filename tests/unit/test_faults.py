@@ -24,10 +24,19 @@ PLAIN = {"PATH": os.environ["PATH"], "HOME": str(Path.home()), "LC_ALL": "C.UTF-
 
 
 def verdict(
-    folder: Path, out: Path, environment: dict[str, str] | None = None, cwd: Path | None = None, before: str = ""
+    folder: Path,
+    out: Path,
+    environment: dict[str, str] | None = None,
+    cwd: Path | None = None,
+    before: str = "",
+    program: str = "",
 ):
-    """`rotorid verdict` in a process of its own; with `before`, after these commands in a room of its own."""
-    command = [sys.executable, "-c", "from rotorid.cli import app; app()", "verdict", str(folder), "-o", str(out), "-q"]
+    """`rotorid verdict` in a process of its own; with `before`, after these commands in a room of its own.
+
+    `program` runs in the same Python first.
+    """
+    program += "from rotorid.cli import app; app()"
+    command = [sys.executable, "-c", program, "verdict", str(folder), "-o", str(out), "-q"]
     if before:
         command = ["unshare", "-m", "-n", "sh", "-ec", before + '\nexec "$@"', "sh", *command]
     environment = PLAIN | {"PYTHONPATH": str(SOURCE)} | (environment or {})
@@ -81,14 +90,29 @@ def conditions(threads: int, seed: int, locale: str, zone: str) -> dict[str, str
     return dict.fromkeys(counts, str(threads)) | {"PYTHONHASHSEED": str(seed), "LC_ALL": locale, "TZ": zone}
 
 
+@pytest.fixture(scope="module")
+def decimal_comma(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Variables of a German locale, made where the system can; else those of no system, which Python takes for C."""
+    place = tmp_path_factory.mktemp("locales")
+    if shutil.which("localedef"):
+        command = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(place / "de_DE.UTF-8")]
+        if subprocess.run(command, capture_output=True).returncode == 0:
+            return {"LOCPATH": str(place), "LC_ALL": "de_DE.UTF-8"}
+    return {"LC_ALL": "de_DE.UTF-8"}
+
+
+IN_FORCE = "import locale; locale.setlocale(locale.LC_ALL, ''); assert locale.str(0.5) == '0,5'; "
+"""What a program around rotorid may do: C's own functions then read and write decimal commas."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("which", ["bench", "flight"])
-def test_threads_hash_seed_locale_and_zone_change_no_byte(which: str, request, tmp_path: Path) -> None:
+def test_threads_hash_seed_locale_and_zone_change_no_byte(which: str, request, decimal_comma, tmp_path: Path) -> None:
     """Before: the improved vehicle differed in the twelfth digit with two threads."""
     folder, made = request.getfixturevalue(which), []
-    # A locale with a decimal comma where the system has one; else that of no system, which Python takes for C.
-    for k, place in enumerate([conditions(1, 0, "C", "UTC"), conditions(2, 4711, "de_DE.UTF-8", "Pacific/Chatham")]):
-        done = verdict(folder, tmp_path / str(k), place)
+    places = [conditions(1, 0, "C", "UTC"), conditions(2, 4711, "", "Pacific/Chatham") | decimal_comma]
+    for k, place in enumerate(places):
+        done = verdict(folder, tmp_path / str(k), place, program=IN_FORCE if "LOCPATH" in place else "")
         assert done.returncode == 0, done.stderr
         made.append({name: (tmp_path / str(k) / name).read_bytes() for name in FILES})
     assert [name for name in FILES if made[0][name] != made[1][name]] == []

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rotorid import log
+from rotorid.errors import InputError
 
 
 def test_messages_and_warnings_are_in_the_file(tmp_path: Path) -> None:
@@ -27,6 +28,27 @@ def test_the_traceback_is_in_the_file_and_the_error_goes_on(tmp_path: Path) -> N
     text = path.read_text()
     assert "Traceback (most recent call last)" in text
     assert "ZeroDivisionError: division by zero" in text
+
+
+def test_bad_input_ends_the_process_with_its_sentence_and_no_traceback(tmp_path: Path) -> None:
+    path = tmp_path / "job.log"
+    with pytest.raises(SystemExit) as end, log.to(path):
+        raise InputError("a.csv: column time_s is missing")
+    assert str(end.value) == "rotorid: a.csv: column time_s is missing"
+    assert "Traceback" not in path.read_text()
+    assert log.refusal(path) == "a.csv: column time_s is missing"
+
+
+@pytest.mark.parametrize("fails", [True, False])
+def test_a_fault_and_a_success_are_no_refusal(fails: bool, tmp_path: Path) -> None:
+    path = tmp_path / "job.log"
+    try:
+        with log.to(path):
+            if fails:
+                raise ZeroDivisionError("ERROR rotorid")
+    except ZeroDivisionError:
+        pass
+    assert log.refusal(path) is None
 
 
 def test_two_runs_leave_the_same_bytes_and_old_text_goes(tmp_path: Path) -> None:

@@ -1,9 +1,11 @@
-"""Names through Snakemake, and two workflows at once."""
+"""Names and bad input through Snakemake, two workflows at once, and a job that is killed."""
 
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -53,7 +55,22 @@ def test_names_that_snakemake_takes_for_its_own_are_refused(run: str, project: P
         "results/mismatch/one/verdict.json", "--config", f"recordings={tmp_path / 'sets'}", succeeds=False
     )
     wanted = "Snakemake takes braces and angle brackets in a name for its own; rename it without them"
-    assert f"{folder / run}.csv: {wanted}" in said and not (project.root / "results" / "mismatch").exists()
+    assert said.splitlines()[-1] == f"rotorid: {folder / run}.csv: {wanted}" and "Traceback" not in said
+    assert not (project.root / "results" / "mismatch").exists()
+    assert not any((project.root / ".snakemake" / "locks").glob("*"))
+
+
+@pytest.mark.slow
+def test_a_set_that_a_job_refuses_is_one_sentence_at_the_end(project: Project, tmp_path: Path) -> None:
+    """Before: Snakemake's own words came last, and the job's log held a traceback."""
+    folder = bench_set(tmp_path / "sets", "one", ("a", "b"))
+    (folder / "a.csv").write_text((folder / "a.csv").read_text().replace("time_s", "zeit", 1))
+    said = project.snakemake(
+        "results/mismatch/one/verdict.json", "--config", f"recordings={tmp_path / 'sets'}", succeeds=False
+    )
+    assert said.splitlines()[-1] == f"rotorid: {folder / 'a.csv'}: column time_s is missing"
+    assert "Traceback" not in said and "Traceback" not in (project.root / "results/logs/mismatch/one.log").read_text()
+    assert not any((project.root / "results" / "mismatch").rglob("*.*"))
 
 
 @pytest.mark.slow
@@ -63,7 +80,16 @@ def test_a_wrong_row_of_the_index_is_one_sentence(project: Project) -> None:
     lines = index.read_text().splitlines()
     index.write_text("\n".join([*lines[:3], "short\tline", *lines[3:]]) + "\n")
     said = project.snakemake("--dry-run", succeeds=False)
-    assert "sessions.tsv, line 4: has 2 cells, expected 22" in said and "Traceback" not in said
+    last = said.splitlines()[-1]
+    assert last.startswith("rotorid: ") and "sessions.tsv, line 4: has 2 cells, expected 22" in last
+    assert "Traceback" not in said
+
+
+@pytest.mark.slow
+def test_a_wrong_setting_is_one_sentence(project: Project) -> None:
+    said = project.snakemake("--dry-run", "--config", "bench={noise_n: -1}", succeeds=False)
+    last = said.splitlines()[-1]
+    assert last.startswith("rotorid: ") and "bench.noise_n" in last and "Traceback" not in said
 
 
 @pytest.mark.slow
@@ -84,3 +110,40 @@ def test_the_second_of_two_workflows_waits_for_nobody_and_spoils_nothing(project
     shutil.rmtree(project.root / "results" / "mismatch")
     project.snakemake(target, "--config", f"recordings={tmp_path / 'sets'}")
     assert (project.root / target).read_bytes() == whole
+
+
+@pytest.mark.slow
+def test_what_a_killed_job_left_is_not_taken_for_whole(project: Project, tmp_path: Path) -> None:
+    """Killed with no chance to tidy up, as by a loss of power; half of each file is there when the next run starts."""
+    bench_set(tmp_path / "sets", "one", ("a", "b", "c"))
+    target, recordings = "results/mismatch/one/verdict.json", f"recordings={tmp_path / 'sets'}"
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", target, "--configfile", "tests/configs/small.yaml"]
+    run = subprocess.Popen(
+        [*command, "--config", recordings],
+        cwd=project.root,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    log = project.root / "results/logs/mismatch/one.log"
+    while run.poll() is None and not log.exists():
+        time.sleep(0.05)
+    assert run.poll() is None, "the job ended before it could be killed"
+    os.killpg(run.pid, signal.SIGKILL)
+    run.wait()
+    folder = project.root / "results" / "mismatch" / "one"
+    names = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        (folder / name).write_text('{"set": "on')
+    said = project.snakemake(target, "--config", recordings, succeeds=False)
+    assert "--unlock" in said and "Traceback" not in said
+    project.snakemake(target, "--config", recordings, "--unlock")
+    project.snakemake(target, "--config", recordings)
+    after = {name: (folder / name).read_bytes() for name in names}
+    shutil.rmtree(folder)
+    project.snakemake(target, "--config", recordings)
+    for name in names:
+        one, other = after[name], (folder / name).read_bytes()
+        place = next((k for k, pair in enumerate(zip(one, other, strict=False)) if pair[0] != pair[1]), len(other))
+        assert one == other, (name, place, one[place - 100 : place + 100], other[place - 100 : place + 100])

@@ -112,6 +112,52 @@ def test_a_figure_that_moves_stands_still_in_print(chapters: list[str]) -> None:
     assert base64.b64encode(Path("moving.svg").read_bytes()).decode() in page or "circle" in page
 
 
+TALL = FIGURE.replace('height="30"', 'height="60"')
+SAID = "Some words of a sentence that goes on for a while and says little of anything. " * 8
+
+
+def a_chapter(after: list[str], before: int = 4) -> list[str]:
+    """One chapter: paragraphs, a figure that does not fit below them, and what follows it."""
+    Path("tall.svg").write_text(TALL)
+    blocks = ["# Tall {#sec:tall}", *[SAID] * before, "![Tall.](tall.svg){#fig:tall width=100%}", *after]
+    Path("tall.md").write_text("\n\n".join(blocks) + "\n")
+    return ["tall.md"]
+
+
+def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> None:
+    """Before: a page ended half empty."""
+    texts = a_chapter([SAID] * 5)
+    typeset.typst_source(texts, "Title", "Subtitle", PARTS, "report.typ")
+    (gap,) = typeset.gaps("report.typ")
+    assert gap.identifier == "fig:tall" and gap.movable and gap.height_pt > 3 * typeset.MOST_EMPTY_PT
+    typeset.without_gaps(texts, "Title", "Subtitle", PARTS, "report.typ")
+    (gap,) = typeset.gaps("report.typ")
+    assert gap.height_pt < typeset.MOST_EMPTY_PT
+    source = Path("report.typ").read_text()
+    assert source.count("Some words") == 8 * 9 and source.index("#figure(") > source.index("Some words")
+
+
+def test_a_figure_right_after_another_is_looked_at_too(chapters: list[str]) -> None:
+    texts = a_chapter(["![Second.](tall.svg){#fig:tall-second width=100%}", SAID, SAID], before=1)
+    typeset.typst_source(texts, "Title", "Subtitle", PARTS, "report.typ")
+    first, second = typeset.gaps("report.typ")
+    assert first.height_pt == 0 and not first.movable
+    assert second.height_pt > 2 * typeset.MOST_EMPTY_PT and second.movable
+
+
+def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) -> None:
+    law = "The law, which is\n\n[$$ F = C_F\\,\\omega^2 , $$]{#eq:law}\n\nholds at all speeds."
+    typeset.typst_source(a_chapter([law, SAID]), "Title", "Subtitle", PARTS, "report.typ", later={"fig:tall": 1})
+    source = Path("report.typ").read_text()
+    assert source.index("holds at all speeds.") < source.index("#figure(") < source.rindex("Some words")
+    texts = a_chapter(["## Next {#sec:next}", SAID])
+    typeset.without_gaps(texts, "Title", "Subtitle", PARTS, "report.typ")
+    (gap,) = typeset.gaps("report.typ")
+    assert not gap.movable and gap.height_pt > typeset.MOST_EMPTY_PT
+    source = Path("report.typ").read_text()
+    assert source.index("#figure(") < source.index("<sec:next>")
+
+
 def test_nothing_is_fetched_and_no_script_runs_in_the_html(chapters: list[str]) -> None:
     typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
     page = Path("report.html").read_text()

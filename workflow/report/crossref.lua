@@ -39,7 +39,7 @@ end
 local function first_sentence(inlines)
   local out, started = pandoc.Inlines({}), false
   for position, inline in ipairs(inlines) do
-    if not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
+    if inline.t ~= "RawInline" and not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
       started = true
       out:insert(inline)
       if inline.t == "Str" and inline.text:match("[.;]$") and not inline.text:match("eqs?%.$") then
@@ -186,9 +186,75 @@ local lists = {
   end,
 }
 
+-- In print a figure or table that does not fit on the page may stand some sentences later, so that no page ends half
+-- empty: metadata `later` says how many steps (`fig:a=1,tbl:b=2`). A step never cuts a sentence or passes a heading or
+-- another figure. Marks say where the text before each one ends, and whether it may go further.
+local function shown(block)
+  return block ~= nil and (block.t == "Figure" or block.t == "Table")
+end
+
+local function step(blocks, place)
+  for after = place + 1, #blocks do
+    local block = blocks[after]
+    if block.t ~= "Para" and block.t ~= "BulletList" and block.t ~= "OrderedList" then
+      return nil
+    end
+    if block.t == "Para" and pandoc.utils.stringify(block):match("[.!?][)\u{201d}]?$") then
+      return after
+    end
+  end
+  return nil
+end
+
+-- The words that a block ends with: of a figure its caption, of an equation none.
+local function last_words(block)
+  if block.t == "Figure" then
+    return block.caption.long[1] and block.caption.long[1].content
+  end
+  return block.t == "Para" and block.content[#block.content].t ~= "Span" and block.content or nil
+end
+
+local function spread(blocks, later)
+  for at = #blocks, 1, -1 do -- from the last, so that places before it stay as they are
+    local block, from = blocks[at], at
+    for _ = 1, shown(block) and tonumber(later[block.identifier]) or 0 do
+      local to = step(blocks, from)
+      if to then
+        blocks:remove(from)
+        blocks:insert(to, block)
+        from = to
+      end
+    end
+  end
+  local number = 0
+  for position, block in ipairs(blocks) do
+    if block.t == "Header" and block.level == 1 then
+      number = number + 1
+    end
+    local before = position - 1
+    while before > 0 and blocks[before].t == "Header" and blocks[before].level > 1 do
+      before = before - 1
+    end
+    local words = before > 0 and last_words(blocks[before])
+    if shown(block) and block.identifier ~= "" and words then
+      local further = step(blocks, position) and "true" or "false"
+      local said = '#sym.wj#box[#metadata(("%s", %s, %d))<before>]'
+      words:insert(pandoc.RawInline("typst", said:format(block.identifier, further, number)))
+    end
+  end
+  return blocks
+end
+
 function Pandoc(document)
   for name in pandoc.utils.stringify(document.meta["left-out"] or ""):gmatch("[^,]+") do
     table.insert(left_out, name)
+  end
+  if is_typst then
+    local later = {}
+    for name, steps in pandoc.utils.stringify(document.meta.later or ""):gmatch("([^,=]+)=(%d+)") do
+      later[name] = steps
+    end
+    document.blocks = spread(document.blocks, later)
   end
   return document:walk(count):walk(lists):walk(resolve)
 end

@@ -1,20 +1,39 @@
 """What every stage uses: the checked configuration and the code of the library as a parameter."""
 
+import sys
+import time
 from functools import cache
 from pathlib import Path
 
-from snakemake.exceptions import WorkflowError
-
+from rotorid import log as logs
 from rotorid.codehash import Code
 from rotorid.config import ConfigError, check
 
+STARTED = time.time()
 ROOT = Path(workflow.basedir)
 CODE = Code(ROOT, memory=".snakemake/code.json")
+
+
+def refuse(sentence):
+    """End the run with one sentence, the last thing on the screen.
+
+    An exception that Snakemake catches is printed with the lines of the rule file below it. Nothing is locked yet
+    while files are being asked for, so that nothing is left behind.
+    """
+    sys.exit(f"rotorid: {sentence}")
+
+
+def say_refusals():
+    """Print the sentence of each job of this run that refused its input."""
+    for path in sorted(Path("results/logs").rglob("*.log")):
+        if path.stat().st_mtime >= STARTED and (sentence := logs.refusal(path)):
+            print(f"rotorid: {sentence}", file=sys.stderr)
+
 
 try:
     CONFIG = check(config)
 except ConfigError as error:
-    raise WorkflowError(str(error)) from None
+    refuse(error)
 
 
 def code_of(script):

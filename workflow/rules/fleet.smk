@@ -23,7 +23,7 @@ def folders_of_batch(wildcards):
     """Folders of a batch's sets."""
     found = fleet_batches()
     if wildcards.batch not in found:
-        raise WorkflowError(f"{CONFIG.recordings}: no sets for batch {wildcards.batch} of the fleet")
+        refuse(f"{CONFIG.recordings}: no sets for batch {wildcards.batch} of the fleet")
     return [f"{CONFIG.recordings}/{name}" for name in found[wildcards.batch]]
 
 
@@ -40,7 +40,7 @@ def files_of_batch(wildcards):
 def verdicts_of_fleet(wildcards):
     """Folders of verdicts, one a batch."""
     if not fleet_sets():
-        raise WorkflowError(f"{CONFIG.recordings}: no recording sets (folders with vehicle.yaml) in it")
+        refuse(f"{CONFIG.recordings}: no recording sets (folders with vehicle.yaml) in it")
     return [f"results/fleet/verdicts/{batch}" for batch in fleet_batches()]
 
 

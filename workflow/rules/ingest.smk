@@ -13,7 +13,7 @@ def index_rows():
     try:
         return read_index(Path(CONFIG.raw))
     except InputError as error:
-        raise WorkflowError(str(error)) from None
+        refuse(error)
 
 
 # The index is read here and is no rule's input: a new row reruns only what its own kind of test feeds.
@@ -30,7 +30,7 @@ def logs_to_ingest(wildcards):
     """Raw logs and metadata behind one pair of tables."""
     found = logs_of(wildcards.kind, wildcards.instrument)
     if not found:
-        raise WorkflowError(
+        refuse(
             f"{INDEX}: lists no {wildcards.kind} recording of a {wildcards.instrument}; make campaign records them."
         )
     return found

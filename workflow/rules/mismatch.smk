@@ -1,10 +1,6 @@
 """Where a simulation and recordings part, why, and a better model: `results/mismatch/<set>/verdict.json`."""
 
 import json
-import sys
-import time
-
-STARTED = time.time()
 
 
 def set_folder(name):
@@ -23,10 +19,10 @@ def set_files(wildcards):
         return [folder]
     files = sorted(str(path) for path in Path(folder).glob("*") if path.is_file())
     if not files:
-        raise WorkflowError(f"{folder}: no such recording set (a folder with vehicle.yaml and runs)")
+        refuse(f"{folder}: no such recording set (a folder with vehicle.yaml and runs)")
     for path in files:
         if set(path) & set("{}<>"):
-            raise WorkflowError(
+            refuse(
                 f"{path}: Snakemake takes braces and angle brackets in a name for its own; rename it without them"
             )
     return files

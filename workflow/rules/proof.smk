@@ -12,7 +12,7 @@ CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
 try:
     plan.check_families(CASES, CONFIG.proof.seeds)
 except InputError as error:
-    raise WorkflowError(str(error)) from None
+    refuse(error)
 CHOSEN = plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases)
 RELEASED = plan.choose(plan.released(CASES, CONFIG.proof.release), CONFIG.proof.released, CONFIG.proof.cases)
 BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)

@@ -5,9 +5,7 @@ PARTS = "workflow/report"
 
 for name in CONFIG.report.chapters:
     if not (ROOT / f"notebooks/{name}.md").is_file():
-        raise WorkflowError(
-            f"config.yaml: report.chapters names {name}, but there is no notebooks/{name}.md."
-        )
+        refuse(f"config.yaml: report.chapters names {name}, but there is no notebooks/{name}.md.")
 
 # Kinds of recordings that a chapter is made of: where the index lists none of one, a sentence stands in its place.
 ALL_KINDS = ["calibration", "static", "combined", "dynamic", "tensile", "thrust", "torque", "dynamics"]

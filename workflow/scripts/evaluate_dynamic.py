@@ -35,6 +35,7 @@ def main(
     coefficients = np.array([[cell["a0_gf"], cell["a1_gf_per_10uv"]] for cell in cells])
     distances = read_geometry(geometry)
     parts = []
+    sets = dynamic.sets_of(pd.concat([read_sessions(tables[1]) for tables in (bench, jr3)], ignore_index=True))
     for tables in (bench, jr3):
         prepared, sessions = pd.read_parquet(tables[0]), read_sessions(tables[1])
         force_z = {
@@ -42,7 +43,7 @@ def main(
             for name, table in by_recording(prepared).items()
             for kind in KINDS
         }
-        parts.append(dynamic.flights(force_z, prepared, sessions))
+        parts.append(dynamic.flights(force_z, prepared, sessions, sets))
     flown = pd.concat(parts, ignore_index=True)
     flown.to_parquet(flights, index=False)
     dynamic.figures(flown).to_csv(figures, index=False, float_format="%.9g")

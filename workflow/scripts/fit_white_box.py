@@ -1,12 +1,14 @@
 """White box: rotor coefficients from the rotor tests, mass properties from the component table.
 
 - Steady points of the thrust and torque tests; a coefficient whose tests were not recorded is left out.
-- C_F and C_Q through the origin (thesis eqs 4.25, 4.26) with intervals, and with the noise of the speed considered.
+- C_F and C_Q through the origin (thesis eqs 4.25, 4.26) with intervals, and with the noise of the speed considered,
+  and how often these intervals hold the truth on simulated tests whose noise grows as that of the tests does.
 - Mass, centre of mass and inertia from the components by parallel axes.
 """
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from scipy.stats import t as student_t
 from rotorid import log, thesis
 from rotorid.io.tables import read_sessions
 from rotorid.rotor.campaign import COLUMNS, thrust_points, torque_points
-from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
+from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient, simulated_coverage
 from rotorid.vehicle.mass_properties import compose, read_components
 
 LEAST_TORQUE_SD_N_M = 1e-6
@@ -31,6 +33,7 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
     relative = float(np.median(points["speed_sd_rad_s"] / np.sqrt(points["samples"]) / points["speed_rad_s"]))
     noisy = fit_coefficient(run, offset=False, speed_noise_relative=relative, least_sd=least_sd)
     offset = fit_coefficient(run, offset=True)
+    coverage = simulated_coverage(run[0])
     return {
         "value": plain.value,
         "interval_95": plain.interval_95,
@@ -47,6 +50,10 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "standard_errors_off": (plain.value - believed) / plain.standard_error,
         "p_value": float(2 * student_t.sf(abs(plain.value - believed) / plain.standard_error, plain.freedom)),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
+        "coverage": asdict(coverage),
+        "thesis_inside_equal_noise": coverage.interval_equal_noise_95[0]
+        <= believed
+        <= coverage.interval_equal_noise_95[1],
     }
 
 

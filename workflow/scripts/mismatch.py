@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 from rotorid import log
-from rotorid.errors import InputError
 from rotorid.mismatch.deliver import deliver
 from rotorid.recordings import read_set
 
@@ -29,8 +28,6 @@ if __name__ == "__main__":
                 improved=snakemake.output.improved,
                 off=snakemake.params.off,
             )
-        except InputError as error:
-            sys.exit(f"rotorid: {error}")
         except OSError as error:
             what = f"{error.filename}: {error.strerror}" if error.filename else str(error)
             sys.exit(f"rotorid: {what}; nothing was written")

@@ -17,7 +17,7 @@ def main(
     notice: str,
 ) -> None:
     """Write the typst document `source` and the PDF made of it."""
-    typeset.typst_source(chapters, title, subtitle, parts, source, left_out, notice)
+    typeset.without_gaps(chapters, title, subtitle, parts, source, left_out, notice)
     typeset.pdf(source, pdf)
 
 

@@ -23,11 +23,37 @@ MARGIN_S = 0.25
 """Left off both ends of a held stretch before platforms are compared: the pilot's timing differs by that much."""
 
 
-def flights(force_z_n: dict[str, np.ndarray], prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
+def sets_of(sessions: pd.DataFrame) -> dict[str, int]:
+    """To the id of each recording, of all platforms, the number of its set: one plan, flown once on each platform.
+
+    A set is numbered by its recordings' `repeat`. Where a platform has flown that number already, the recordings of
+    the later group are a set of their own, with the next number that is free: two flights are never taken for one.
+
+    Raises InputError for a group that holds a platform twice.
+    """
+    platforms: dict[int, set[str]] = {}
+    numbers: dict[str, int] = {}
+    for group, flown in sorted(sessions.groupby("group"), key=lambda part: (part[1]["started"].min(), part[0])):
+        for number, part in flown.groupby(flown["repeat"].astype(int)):
+            twice = part[part["platform"].duplicated(keep=False)]
+            if len(twice):
+                ids = ", ".join(twice["id"])
+                raise InputError(f"{ids}: group {group} holds the same platform and repeat twice; give each its own")
+            here = set(part["platform"])
+            if here & platforms.get(number, set()):
+                number = max(platforms) + 1
+            platforms.setdefault(number, set()).update(here)
+            numbers |= dict.fromkeys(part["id"], number)
+    return numbers
+
+
+def flights(
+    force_z_n: dict[str, np.ndarray], prepared: pd.DataFrame, sessions: pd.DataFrame, sets: dict[str, int]
+) -> pd.DataFrame:
     """Thrust (−F_z) over time since `read_start`, columns `platform set time_s thrust_n low_pass_n zero_phase_n`.
 
     `force_z_n` gives F_z of each prepared recording for the three kinds of signal, keyed by id and kind
-    (`<id>`, `<id>_low_pass`, `<id>_zero_phase`).
+    (`<id>`, `<id>_low_pass`, `<id>_zero_phase`); `sets` is of `sets_of`.
     """
     parts = by_recording(prepared)
     out = []
@@ -37,7 +63,7 @@ def flights(force_z_n: dict[str, np.ndarray], prepared: pd.DataFrame, sessions: 
         if not kept.any():
             raise InputError(f"{session.id}: nothing between its marks read_start and read_stop")
         time_s = table["time_s"].to_numpy()[kept]
-        flight = {"platform": session.platform, "set": int(session.repeat), "time_s": time_s - time_s[0]}
+        flight = {"platform": session.platform, "set": sets[session.id], "time_s": time_s - time_s[0]}
         for column, kind in (("thrust_n", ""), ("low_pass_n", "_low_pass"), ("zero_phase_n", "_zero_phase")):
             flight[column] = -force_z_n[f"{session.id}{kind}"][kept]
         out.append(pd.DataFrame(flight))
@@ -68,11 +94,13 @@ def agreement(flown: pd.DataFrame, base: str = "al") -> pd.DataFrame:
 
     The plan of a set is the same on all platforms; a margin at both ends allows for the pilot's timing. Columns
     `set stretch start_s stop_s platform thrust_n error_n` (standard error of the mean from the samples' scatter,
-    neighbours' correlation included).
+    neighbours' correlation included). A set that `base` did not fly compares nothing.
     """
     rows = []
     for number, flights_of_set in flown.groupby("set"):
         steady = flights_of_set[flights_of_set["platform"] == base]
+        if steady.empty:
+            continue
         stretches = held(steady["time_s"].to_numpy(), steady["zero_phase_n"].to_numpy())
         for place, (start, stop) in enumerate(stretches, start=1):
             if stop - start <= 2 * MARGIN_S:
@@ -91,7 +119,7 @@ def agreement(flown: pd.DataFrame, base: str = "al") -> pd.DataFrame:
                         "error_n": error,
                     }
                 )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=["set", "stretch", "start_s", "stop_s", "platform", "thrust_n", "error_n"])
 
 
 def ratios(levels: pd.DataFrame, base: str = "al") -> list[dict]:

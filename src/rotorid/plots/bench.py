@@ -160,9 +160,11 @@ def _units(axis: str) -> np.ndarray:
 
 
 def dynamic(flights: pd.DataFrame) -> Figure:
-    """Thrust over time of the three sets on the three platforms (fig. 2.47)."""
-    fig, axes = style.figure(4.8, 3, 1, sharex=True)
-    for number, axis in enumerate(axes, start=1):
+    """Thrust over time of each set on the three platforms (fig. 2.47)."""
+    numbers = sorted(flights["set"].unique())
+    fig, axes = style.figure(1.6 * len(numbers), len(numbers), 1, sharex=True, squeeze=False)
+    axes = axes[:, 0]
+    for number, axis in zip(numbers, axes, strict=True):
         for platform in ("jr3", "pla", "al"):
             flight = flights[(flights["set"] == number) & (flights["platform"] == platform)]
             values = flight["zero_phase_n"].to_numpy()
@@ -176,8 +178,8 @@ def dynamic(flights: pd.DataFrame) -> Figure:
             )
         axis.set_ylabel(f"set {number}: thrust (N)")
     axes[-1].set_xlabel("time (s)")
-    handles, labels = axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=3)
+    named = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=3)
     return fig
 
 

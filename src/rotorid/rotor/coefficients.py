@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, nnls
 from scipy.stats import t as student_t
 
 from rotorid.errors import InputError
@@ -213,6 +213,54 @@ def fit_coefficient(
         residual_rms_n=float(np.sqrt(np.mean((thrust - columns @ values) ** 2))),
         points=len(speed),
         freedom=float(freedoms[0]),
+    )
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How often 95 % intervals of a coefficient through the origin hold the truth, where noise grows with speed."""
+
+    equal_noise: float
+    """Of the usual formula, which takes all points as equally noisy; share of the draws."""
+    own_noise: float
+    """Of the one used here, which allows each point a variance of its own."""
+    interval_equal_noise_95: tuple[float, float]
+    """The usual formula's interval on the points themselves."""
+    noise_growth: float
+    """Noise of the fastest point over that of the slowest."""
+    draws: int
+
+
+def simulated_coverage(run: Points, draws: int = 4000, seed: int = 0) -> Coverage:
+    """Both intervals on points that obey the parabola, with noise as large as the residuals show at each speed.
+
+    The noise is a + b ω² with a, b ≥ 0 from the residuals' sizes: its mean absolute value is sqrt(2/π) of it.
+    """
+    kept = usable(run.speed_rad_s, run.thrust_n)
+    square, thrust = run.speed_rad_s[kept] ** 2, run.thrust_n[kept]
+    total = square @ square
+    value = square @ thrust / total
+    residual = thrust - value * square
+    growing = np.column_stack([np.ones_like(square), square / square.max()])
+    noise = np.sqrt(np.pi / 2) * growing @ nnls(growing, np.abs(residual))[0]
+    columns, inverse = square[:, None], np.array([[1 / total]])
+    _, freedom = _each_its_own_noise(columns, inverse, residual)
+    drawn = np.random.default_rng(seed).standard_normal((draws, len(square))) * noise
+    errors = drawn @ square / total
+    left = drawn - errors[:, None] * square
+
+    def equal(left: np.ndarray) -> np.ndarray:
+        """Half widths by the usual formula."""
+        return student_t.ppf(0.975, len(square) - 1) * np.sqrt(np.sum(left**2, axis=-1) / (len(square) - 1) / total)
+
+    own = np.sqrt(left**2 @ ((square / total) ** 2 / (1 - square**2 / total)))
+    half = float(equal(residual))
+    return Coverage(
+        equal_noise=float(np.mean(np.abs(errors) <= equal(left))),
+        own_noise=float(np.mean(np.abs(errors) <= student_t.ppf(0.975, freedom[0]) * own)),
+        interval_equal_noise_95=(float(value - half), float(value + half)),
+        noise_growth=float(noise[np.argmax(square)] / noise[np.argmin(square)]),
+        draws=draws,
     )
 
 
