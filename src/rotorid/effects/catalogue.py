@@ -19,3 +19,9 @@ def catalogue() -> dict[str, Effect]:
         if effect is not None:
             found[effect.id] = effect
     return dict(sorted(found.items()))
+
+
+@cache
+def before_the_rotors() -> tuple[str, ...]:
+    """Ids of effects that act between command and rotor speed and nowhere else: without commands nothing shows them."""
+    return tuple(e.id for e in catalogue().values() if e.speed_forms and e.reading_forms is None)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
 from rotorid.mismatch.absorbed import absorbed_findings
@@ -55,7 +55,6 @@ SURELY_HEAVIER = 2.0
 TIMING_FLOOR = 0.05
 """One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
 recorded."""
-NEEDS_COMMAND = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 
 
 def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
@@ -190,7 +189,7 @@ def not_testable(prepared: Prepared, chain: Chain | None, findings: list[Finding
     """Reasons why ids cannot be tested on this set, those aside that were found all the same."""
     reasons = dict(prepared.not_testable)
     if chain is None:
-        reasons.update({k: "no rotor commands recorded" for k in NEEDS_COMMAND})
+        reasons.update({k: "no rotor commands recorded" for k in before_the_rotors()})
     elif chain[2] is None:
         reasons.setdefault("battery_sag", "no battery voltage")
     known = {f.id for f in findings if f.status in CLAIMED}

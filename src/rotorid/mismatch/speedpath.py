@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import SpeedForm, SpeedPath
 from rotorid.effects.delay import shifted
 from rotorid.mismatch.motion import Segment
@@ -340,7 +340,7 @@ class SpeedSearch:
         """Learn the noise from the richest chain: one form of every id, in two rounds."""
         rich = {}
         for key, form in self.forms:
-            if key in ("motor_lag", "throttle_curve", "battery_sag") and key not in rich:
+            if key in before_the_rotors() and form.stage != LIMIT_STAGE and key not in rich:
                 rich[key] = form
         fit = self.problem.fit((), np.zeros(0))
         for key, form in rich.items():

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.loading import CHANNELS, UNITS
 from rotorid.mismatch import rules
 from rotorid.mismatch.absorbed import absorbed_findings
@@ -30,7 +30,7 @@ from rotorid.mismatch.instrument.chain import (
     supply_reason,
     without_id,
 )
-from rotorid.mismatch.instrument.columns import NO_ROTORS, SPEED_IDS, VALUE_NAMES, make_terms
+from rotorid.mismatch.instrument.columns import NO_ROTORS, VALUE_NAMES, make_terms
 from rotorid.mismatch.instrument.curved_gain import curved_gains
 from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.mistakes import find_mistakes
@@ -111,7 +111,9 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     model, leftovers = without_leftovers_of_forms(model)
     values_of = partial(values_in, model)
     if chain is None:
-        reasons.update({k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in SPEED_IDS})
+        reasons.update(
+            {k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in before_the_rotors()}
+        )
     else:
         findings += chain.findings
         why = supply_reason(setup)

@@ -24,7 +24,8 @@ from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
 from rotorid.signal.kernels import causal
 
-IDS = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation", "delay")
+TAKES_TIME_STAGE = 3
+"""Stage of a speed form from which it shows only while commands change: delays and lags."""
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
@@ -371,10 +372,10 @@ def largest_command(setup: Setup) -> float:
 def candidates(setup: Setup) -> list[tuple[str, SpeedForm]]:
     """Forms that these recordings can test."""
     out = []
-    for key in IDS:
-        if setup.steady_points and key in ("motor_lag", "delay"):
-            continue
-        for form in catalogue()[key].speed_forms:
+    for key, effect in catalogue().items():
+        for form in effect.speed_forms:
+            if setup.steady_points and form.stage >= TAKES_TIME_STAGE:
+                continue
             if "voltage" in form.requires and any(x.motion.voltage is None for x in setup.loadings):
                 continue
             if form.name == "drift in time" and all(x.motion.voltage is not None for x in setup.loadings):

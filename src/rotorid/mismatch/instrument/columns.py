@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import Contribution, Form, not_testable_reason
 from rotorid.effects.loading import Loading, at_sensor, forms_of, weight
 from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
@@ -32,7 +32,6 @@ QUICK = ("clock_skew", "delay", "amplifier_filter", "structural_resonance")
 """Ids that show only in the moments after a change of load."""
 STILL = "the vehicle does not move on a stand"
 NO_ROTORS = "a bench has no rotors"
-SPEED_IDS = ("motor_lag", "throttle_curve", "battery_sag", "command_saturation")
 MISTAKES = ("axis_sign", "unit_error", "rotor_order", "spin_direction", "sensor_dropout")
 OFFSET = "offset:load-reading"
 AtWork = Sequence[tuple[Form, np.ndarray]]
@@ -72,7 +71,7 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
         terms.append(Term(OFFSET, "nuisance", prior_sd=(0.5 / setup.instrument.rate_hz,)))
     empirical = [e for e in UNKNOWNS.values() if e.reading_forms]
     for effect in (*catalogue().values(), *empirical):
-        if effect.id in SPEED_IDS or effect.id in MISTAKES or effect.id == "quantisation":
+        if effect.id in before_the_rotors() or effect.id in MISTAKES or effect.id == "quantisation":
             continue
         if setup.instrument.by_hand and effect.id in QUICK:
             reasons[effect.id] = "loads were put on by hand: their first moments are not known"
