@@ -33,6 +33,8 @@ class Limits(BaseModel):
     """In the air, all told; what the battery allows."""
     attitude_bandwidth_rad_s: float = Field(9.0, gt=0.5, le=100)
     """Natural frequency of the vehicle's attitude loop: faster changes are not followed."""
+    position_bandwidth_rad_s: float | None = Field(None, gt=0.1, le=50)
+    """Natural frequency of its position loop; a fifth of the attitude loop's where not stated."""
     target_sigma: float = Field(6.0, gt=0, le=100)
     """Separation, in standard errors, at which a question counts as settled."""
 
@@ -49,6 +51,12 @@ class Limits(BaseModel):
             raise ValueError("x_m and y_m are from the place of the start and must hold 0")
         if self.height_m[0] < 0:
             raise ValueError(f"height_m starts at {self.height_m[0]:g} m, below the ground")
+        slow = self.position_bandwidth_rad_s
+        if slow is not None and slow > self.attitude_bandwidth_rad_s / 2:
+            raise ValueError(
+                f"position_bandwidth_rad_s {slow:g} is more than half of attitude_bandwidth_rad_s "
+                f"{self.attitude_bandwidth_rad_s:g}: such a loop does not hold"
+            )
         if min(self.room_m) <= 0:
             raise ValueError(f"wall_margin_m {self.wall_margin_m:g} leaves no room to fly in")
         return self

@@ -19,11 +19,12 @@ from rotorid.experiment.plan import Plan
 from rotorid.experiment.separation import Separation
 from rotorid.writing import all_or_none, rounded
 
-FILE_HZ = 50.0
+FILE_HZ = 100.0
 PIECES_AT_ONCE = 31
 """Pieces that the trajectory memory of a Crazyflie (4096 bytes, 132 a piece) holds."""
-COARSEST_S, FINEST_S = 2.0, 0.25
-WORST_FIT_M = 0.01
+COARSEST_S, FINEST_S = 2.0, 0.1
+WORST_FIT_M, WORST_FIT_M_S2 = 0.01, 0.4
+"""Quick motions are millimetres large: that the path is met does not say that the acceleration is."""
 FLIP = np.array([1.0, -1.0, -1.0])
 """North-east-down to forward-left-up."""
 
@@ -76,7 +77,7 @@ def polynomial(start: np.ndarray, stop: np.ndarray, seconds: float) -> np.ndarra
 def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
     """Polynomial pieces (`duration`, `x^0` … `yaw^7`) and the largest distance to the reference, m.
 
-    Pieces are as long as the fit allows (WORST_FIT_M), between FINEST_S and COARSEST_S.
+    Pieces are as long as the fit allows (WORST_FIT_M, WORST_FIT_M_S2), between FINEST_S and COARSEST_S.
     """
     reference, middle = plan.reference, plan.limits.middle_m
     t, step = reference.time_s, reference.time_s[1] - reference.time_s[0]
@@ -93,9 +94,11 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
             end = min(at + length, len(t) - 1)
             seconds = t[end] - t[at]
             fitted = polynomial(states[at], states[end], seconds)
-            made = np.power(t[at : end + 1, None] - t[at], np.arange(8)) @ fitted
-            off = float(np.linalg.norm(made[:, :3] - every[at : end + 1, :3], axis=1).max())
-            if off <= WORST_FIT_M or length <= FINEST_S / step:
+            powers = np.power(t[at : end + 1, None] - t[at], np.arange(8))
+            off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
+            bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])
+            pushed = float(np.linalg.norm((bend - states[at : end + 1, 2])[:, :3], axis=1).max())
+            if (off <= WORST_FIT_M and pushed <= WORST_FIT_M_S2) or length <= FINEST_S / step:
                 break
             length //= 2
         worst, at = max(worst, off), end
