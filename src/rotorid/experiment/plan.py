@@ -36,7 +36,7 @@ from rotorid.experiment.simulate import Flown
 from rotorid.recordings import Vehicle
 
 YAW_SHARE = 0.2
-"""Share of the torque of hovering rotors that a planned turn may ask for: controllers keep the rest for roll and pitch."""
+"""Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch."""
 SIZES = (1.0, 0.75, 0.5)
 """Sizes of a manoeuvre that are tried, the largest that keeps the limits is taken."""
 QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")

@@ -229,7 +229,7 @@ def rivals_left(known: Known, question: Question, true: Hypothesis, rival: str, 
 
 
 def against(known: Known, question: Question, true: Hypothesis, rival: str, information: Information):
-    """λ of a true model against the best form of a rival, the matrix S of that form, and of which coefficients it is."""
+    """λ of a true model against the best form of a rival, S of that form, and of which coefficients it is."""
     forms = rivals_left(known, question, true, rival, information)
     if not forms:
         return None
@@ -252,13 +252,13 @@ def separations(known: Known, question: Question, before: Information, after: In
             if rival == true.id:
                 continue
             forms = rivals_left(known, question, true, rival, after)
-            then = against(known, question, true, rival, before)
-            if forms and then is not None:
-                found.append((min(size_of(true.beta, *f) for f in forms), rival, forms, float(np.sqrt(then[0]))))
+            if forms:
+                found.append((min(size_of(true.beta, *f) for f in forms), rival, forms))
         if not found:
             continue
-        _, rival, _, so_far = min(found, key=lambda f: f[0])
-        sigma, interval_95 = spread(true, [f for _, _, forms, _ in found for f in forms])
+        _, rival, _ = min(found, key=lambda f: f[0])
+        sigma, interval_95 = spread(true, [f for _, _, forms in found for f in forms])
+        so_far, _ = spread(true, rivals_left(known, question, true, rival, before))
         out.append(Separation(true.id, rival, sigma, interval_95, so_far))
     return out
 

@@ -15,6 +15,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.experiment import mission
+from rotorid.experiment.by_hand import by_hand
 from rotorid.experiment.plan import Plan
 from rotorid.experiment.separation import Separation
 from rotorid.writing import all_or_none, rounded
@@ -155,6 +157,7 @@ def summary(plan: Plan) -> dict:
                 for w in plan.widths
             ],
             "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
             "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
             "limits": plan.limits.model_dump(mode="json"),
@@ -186,7 +189,18 @@ def text(plan: Plan) -> list[str]:
         out.append(f"No flight with these columns tells {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append("Nothing is open: no flight is needed to tell effects apart.")
-    return out
+    return out + in_words(plan)
+
+
+def open_ids(plan: Plan) -> list[tuple[str, ...]]:
+    """Ids of every class that is open, told by a flight or not."""
+    return [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
+
+
+def in_words(plan: Plan) -> list[str]:
+    """Manual steps, as sentences."""
+    steps = dict.fromkeys(step for ids in open_ids(plan) for step in by_hand(ids))
+    return [f"By hand: {step}." for step in steps]
 
 
 def steps(plan: Plan) -> list[str]:
@@ -213,6 +227,9 @@ def write(plan: Plan, folder: Path) -> list[Path]:
     names = ["plan.json"]
     if plan.pieces:
         names += ["trajectory.csv", "px4_offboard.csv", "crazyflie.csv", "plan.png"]
+    why = mission.not_a_mission(plan)
+    if plan.pieces and not why:
+        names.append("px4_mission.plan")
     paths = [folder / name for name in names]
     with all_or_none(*paths) as parts:
         content = summary(plan)
@@ -227,5 +244,8 @@ def write(plan: Plan, folder: Path) -> list[Path]:
             from rotorid.experiment.picture import draw
 
             draw(plan, parts[4])
+            content["px4_mission"] = why or "px4_mission.plan"
+            if not why:
+                parts[5].write_text(json.dumps(mission.mission(plan), indent=1) + "\n", encoding="utf-8")
         parts[0].write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return paths
