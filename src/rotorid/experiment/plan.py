@@ -163,8 +163,10 @@ def reached(known: Known, information: Information, target: float) -> float:
     return float(np.mean(found)) if found else 1.0
 
 
-def chosen_pieces(known: Known, limits: Limits, options: list[Tried]) -> tuple[list[Tried], list[Tried]]:
-    """The manoeuvres to fly, and all options with their progress."""
+def chosen_pieces(
+    known: Known, limits: Limits, options: list[Tried], most: int = MOST_PIECES
+) -> tuple[list[Tried], list[Tried]]:
+    """The manoeuvres to fly, `most` at most, and all options with their progress."""
     base = of_set(known)
     start = reached(known, base, limits.target_sigma)
     judged = [
@@ -182,7 +184,7 @@ def chosen_pieces(known: Known, limits: Limits, options: list[Tried]) -> tuple[l
     usable = [t for t in judged if t.information is not None]
     taken: list[Tried] = []
     now, share = base, start
-    while len(taken) < MOST_PIECES and share < 1.0 - 1e-9:
+    while len(taken) < most and share < 1.0 - 1e-9:
         left = limits.duration_s - BETWEEN_S - sum(t.flown_s for t in taken)
         offers = []
         for t in usable:

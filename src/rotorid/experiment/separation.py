@@ -23,7 +23,7 @@ from rotorid.experiment.questions import Hypothesis, Known, Question
 from rotorid.experiment.simulate import Flown, World, commands, fly, recorded
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import assemble_rows, prepare_like, training_rule
-from rotorid.mismatch.regression import Regression, autoregression, build, full_fit_residuals, ridge_inverse
+from rotorid.mismatch.regression import Regression, autoregression, build, ridge_inverse
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
 from rotorid.recordings import RecordingSet
@@ -172,26 +172,19 @@ def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) 
 def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
     """The set with its normal equations as the engine would have them once flights are joined to it.
 
-    Filters are learnt from what the whole catalogue leaves; of a calm set alone that is next to nothing in a channel
-    where the noise of the regressors explains the noise of the reading, and such filters would promise too much of a
-    quick flight. Beside the set's own rows stand those of the flights, with what the model leaves of the set added.
+    The engine learns its filters from what the whole catalogue leaves; of a calm set that is next to nothing in a
+    channel where the noise of the regressors explains the noise of the reading, and such filters would promise too
+    much of a quick flight, in which it cannot. What the model leaves of the set is what it will leave of the flight,
+    but no less than the share of the flight's own forces and moments below which the engine tells nothing apart.
     """
     model, prepared = known.fitted.model, known.prepared
     rate, regression = own_rate_hz(known), model.search.regression
-    segments = []
+    segments = list(model.segments)
     for number, (flight, world) in enumerate(flights):
         run = recorded(flight, world, columns_of(known), rate, f"planned {number}")
         segments += prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
-    if known.fitted.commanded:
-        segments = path_segments(segments, *known.fitted.chain, prepared.thinner.cutoff_hz)
-    effects = model.effects if model.effects is not None else chosen(model)
-    remains = np.concatenate(after_residual(model))
-    flown_rows = assemble_rows(prepared, model.terms, segments, effects)
-    flown_rows = [replace(r, y=r.y + np.resize(remains, r.y.shape)) for r in flown_rows]
-    precision = [1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in model.terms]
-    left, _ = full_fit_residuals([*model.rows, *flown_rows], np.concatenate(precision))
-    floor = channel_floor([*model.segments, *segments], prepared.vehicle)
-    filters = {c: autoregression([r[:, c] for r in left], floor[c]) for c in regression.filters}
+    floor, remains = channel_floor(segments, prepared.vehicle), after_residual(model)
+    filters = {c: autoregression([r[:, c] for r in remains], floor[c]) for c in regression.filters}
     rule, rate_hz = training_rule(prepared.split, model.segments), prepared.thinner.rate_hz
     again = build(
         model.rows, model.terms, filters, rule, block_seconds(model.rows, rate_hz), rate_hz, model.contributions.noisy

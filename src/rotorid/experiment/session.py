@@ -35,6 +35,7 @@ from rotorid.recordings import columns as c
 
 REST_S = 2.0
 """Unloaded before and after every step."""
+MOST_STEPS = 40
 STEP_S = 0.3
 """A change of the load from one level to the next takes this long."""
 
@@ -293,9 +294,9 @@ def plan_session(
         except InputError as error:
             tried.append(Tried(step, None, step.duration_s, str(error)))
         progress(f"computed: {step.name}")
-    taken, _ = chosen_pieces(known, limits, tried)
-    # What is mounted alike follows each other.
-    taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad))
+    taken, _ = chosen_pieces(known, limits, tried, MOST_STEPS)
+    # What is mounted alike, and what is done alike, follows each other.
+    taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
     before = of_set(known)
     after = before
     for t in taken:
