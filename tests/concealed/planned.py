@@ -77,13 +77,14 @@ def reference_of(trajectory: pd.DataFrame, step_s: float, rotors: int) -> manoeu
     def column(name):
         return np.interp(time_s, trajectory["time_s"], trajectory[name])
 
-    position = np.stack([column(f"position_{a}_m") for a in "xyz"], axis=1)
-    velocity = np.gradient(position, step_s, axis=0)
+    def columns(stem, unit):
+        return np.stack([column(f"{stem}_{a}_{unit}") for a in "xyz"], axis=1)
+
     return manoeuvres.Reference(
         time_s=time_s,
-        position_m=position,
-        velocity_m_s=velocity,
-        acceleration_m_s2=np.gradient(velocity, step_s, axis=0),
+        position_m=columns("position", "m"),
+        velocity_m_s=columns("velocity", "m_s"),
+        acceleration_m_s2=columns("acceleration", "m_s2"),
         yaw_rad=column("yaw_rad"),
         attitude_rad=np.zeros((len(time_s), 3)),
         speed_fraction=np.zeros((len(time_s), rotors)),

@@ -208,7 +208,15 @@ rule chapter_proof:
         state=f"{CONFIG.proof.tables}/state.json",
         real=f"{CONFIG.proof.tables}/real.csv",
         coefficients=f"{CONFIG.proof.tables}/coefficients.csv",
+        next_flight="docs/proof/next_flight.csv",
+        next_flight_summary="docs/proof/next_flight_summary.csv",
     output:
+        next_flight_figure=report(
+            "results/report/proof/next_flight.svg",
+            category="Proof",
+            caption="../report/captions/proof.rst",
+            labels={"figure": "next flight"},
+        ),
         targets=report(
             "results/report/proof/targets.svg",
             category="Proof",
@@ -245,6 +253,8 @@ rule chapter_proof:
         studies="results/report/proof/studies.csv",
         published="results/report/proof/published.csv",
         drawn="results/report/proof/drawn.csv",
+        flights="results/report/proof/flights.csv",
+        asked="results/report/proof/asked.csv",
     params:
         present=code_of("judge"),
         code=code_of_chapter("proof"),

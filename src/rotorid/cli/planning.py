@@ -18,7 +18,7 @@ def plan(
     recordings: Annotated[
         Path | None, typer.Option("--set", help="The recording set; by default the one beside the verdict.")
     ] = None,
-    limits: Annotated[Path | None, typer.Option(help="YAML file of what the flight may ask for.")] = None,
+    limits: Annotated[Path | None, typer.Option(help="YAML file of what the flight, or session, may ask for.")] = None,
     want: Annotated[
         list[str] | None, typer.Option(help="An interval to reach, as torque_coefficient_n_m_s2=1%.")
     ] = None,
@@ -27,44 +27,69 @@ def plan(
 ) -> None:
     """Find the flight that settles what a verdict left open, and write it for the vehicle.
 
-    Writes `plan.json`, `plan.png`, `trajectory.csv` (north-east-down), `px4_offboard.csv` and `crazyflie.csv`. Fly it,
-    record it as a set of its own, and judge both by `rotorid together`. The verdict's page shows the plan.
+    Writes `plan.json`, `plan.png`, `trajectory.csv` (north-east-down), `px4_offboard.csv`, `crazyflie.csv` and, where
+    it can be one, `px4_mission.plan`; of a stand or bench `session.csv`: loads, throttles, tilts and waiting times.
+    Fly it, record it as a set of its own, and judge both by `rotorid together`. The verdict's page shows the plan.
 
     Example: `rotorid plan flights-verdict --limits room.yaml`
     """
     with one_sentence():
-        from rotorid.experiment.limits import read_limits
+        from rotorid.experiment.limits import Limits, SessionLimits, read_limits
 
-        allowed, wishes = read_limits(limits), wished(want or [])
+        wishes = wished(want or [])
         folder, content = read_verdict(verdict)
+        flight = content["kind"] == "flight"
+        allowed = read_limits(limits, Limits if flight else SessionLimits)
+        if wishes and not flight:
+            raise InputError(f"--want: intervals are planned for flights; this verdict is of a {content['kind']}")
         source = recordings or set_of(folder, content)
-        from rotorid.experiment.plan import plan as make_plan
-        from rotorid.experiment.questions import known
-        from rotorid.experiment.write import text, write
-        from rotorid.recordings import read_set
-        from rotorid.recordings.sufficient import sufficient
-
-        suggested = [e["id"] for e in content["effects"] if e["status"] == "suggested"]
         with progress(None, quiet) as step, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             step(f"fitting {source.name} once more")
-            found = known(sufficient(read_set(source)), suggested)
-            made = make_plan(found, allowed, wishes, step)
-            files = write(made, out or folder / "plan")
-            onto_page(folder / "report.html", made, files[-1] if made.pieces else None)
-        for line in text(made):
+            if flight:
+                said, files, picture = flight_plan(source, content, allowed, wishes, out or folder / "plan", step)
+            else:
+                said, files, picture = session_plan(source, allowed, out or folder / "plan", step)
+            onto_page(folder / "report.html", source.name, said, picture)
+        for line in said:
             typer.echo(line)
         typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
 
 
-def onto_page(page: Path, made, picture: Path | None) -> None:
+def flight_plan(source: Path, content: dict, allowed, wishes: dict[str, float], folder: Path, step):
+    """Plan a flight and write it: sentences, files, and the picture where there is one."""
+    from rotorid.experiment.plan import plan as make_plan
+    from rotorid.experiment.questions import known
+    from rotorid.experiment.write import text, write
+    from rotorid.recordings import read_set
+    from rotorid.recordings.sufficient import sufficient
+
+    suggested = [e["id"] for e in content["effects"] if e["status"] == "suggested"]
+    made = make_plan(known(sufficient(read_set(source)), suggested), allowed, wishes, step)
+    files = write(made, folder)
+    return text(made), files, folder / "plan.png" if made.pieces else None
+
+
+def session_plan(source: Path, allowed, folder: Path, step):
+    """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
+    from rotorid.experiment.session import known_instrument, plan_session
+    from rotorid.experiment.write_session import text, write
+    from rotorid.recordings import read_set
+    from rotorid.recordings.sufficient import sufficient
+
+    made = plan_session(known_instrument(sufficient(read_set(source))), allowed, step)
+    files = write(made, folder)
+    return text(made), files, folder / "plan.png" if made.steps else None
+
+
+def onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
     """Put the plan on the verdict's page, where there is one."""
     from rotorid.experiment.page import with_plan
     from rotorid.writing import all_or_none
 
     if not page.is_file():
         return
-    content = with_plan(page.read_text(encoding="utf-8"), made, picture.read_bytes() if picture else None)
+    content = with_plan(page.read_text(encoding="utf-8"), name, said, picture.read_bytes() if picture else None)
     with all_or_none(page) as (part,):
         part.write_text(content, encoding="utf-8")
 

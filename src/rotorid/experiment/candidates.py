@@ -16,8 +16,9 @@ from rotorid.experiment.limits import Limits
 
 GRAVITY_M_S2 = 9.81
 RAMP_S = 2.0
-FASTEST_HZ = 2.0
-"""Fastest oscillation of a position reference; beyond it an attitude loop follows little."""
+BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0))
+"""Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
+makes of them turns the vehicle as hard as doublets do."""
 ROOM = 0.85
 """Share of the tilt allowed that a reference asks for: drag and the controller take some."""
 PIECE_S = 10.0
@@ -91,6 +92,16 @@ def largest(limits: Limits, room_m: float, share: float) -> tuple[float, float]:
     most = ROOM * GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
     amplitude = min(room_m, max(0.5, speed**2 / most * 1.2))
     return amplitude, min(speed / amplitude, np.sqrt(most / amplitude))
+
+
+def smaller(limits: Limits, share: float) -> Limits:
+    """Limits with a share of the room (about its middle), the speeds and the tilt, for motions of that size."""
+    middle, room = limits.middle_m, limits.room_m
+    low, high = ([m + sign * share * r for m, r in zip(middle, room, strict=True)] for sign in (-1, 1))
+    names = ("x_m", "y_m", "height_m")
+    ranges = {n: (a, b) for n, a, b in zip(names, low, high, strict=True)}
+    scaled = {n: share * getattr(limits, n) for n in ("speed_m_s", "climb_m_s", "tilt_deg", "yaw_rate_deg_s")}
+    return limits.model_copy(update=ranges | scaled | {"wall_margin_m": 0.0})
 
 
 def candidates(limits: Limits, yaw_acceleration_rad_s2: float) -> tuple[Piece, ...]:
@@ -239,7 +250,7 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
     }
     out = []
     for name, axes in families.items():
-        for low_hz, high_hz in ((0.3, 1.0), (0.8, FASTEST_HZ)):
+        for low_hz, high_hz in BANDS_HZ:
 
             def make(t, axes=axes, low_hz=low_hz, high_hz=high_hz):
                 inner = t[-1]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.experiment.candidates import Piece, Reference, candidates, joined
+from rotorid.experiment.candidates import Piece, Reference, candidates, joined, smaller
 from rotorid.experiment.intervals import Width, widths
 from rotorid.experiment.limits import Limits
 from rotorid.experiment.questions import Known
@@ -23,6 +23,7 @@ from rotorid.experiment.separation import (
     Separation,
     asked_terms,
     chain_separations,
+    expecting,
     flown,
     left_overs,
     of_flight,
@@ -34,8 +35,11 @@ from rotorid.experiment.separation import (
 from rotorid.experiment.simulate import Flown
 from rotorid.recordings import Vehicle
 
-YAW_SHARE = 0.35
-"""Share of the torque of hovering rotors that a planned turn may ask for."""
+YAW_SHARE = 0.2
+"""Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch."""
+SIZES = (1.0, 0.75, 0.5)
+"""Sizes of a manoeuvre that are tried, the largest that keeps the limits is taken."""
+QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")
 BETWEEN_S = 1.0
 """At rest between manoeuvres."""
 MOST_PIECES = 12
@@ -122,21 +126,32 @@ def broken(flight: Flown, limits: Limits, vehicle: Vehicle) -> str:
 
 
 def tried(known: Known, limits: Limits, progress: Callable[[str], None] = lambda text: None) -> list[Tried]:
-    """Every candidate flown in simulation by the model as fitted."""
+    """Every candidate flown in simulation by the model as fitted, as large as the limits allow it to be flown.
+
+    The controller makes some motions larger than they are asked for: where a limit would be broken a smaller size of
+    the same manoeuvre is tried.
+    """
     world, terms, step = world_of(known, None, None), asked_terms(known), step_of(known)
+    vehicle = known.prepared.vehicle
+    most = yaw_acceleration(vehicle)
+    sizes = [{p.name: p for p in candidates(smaller(limits, s), s * most)} for s in SIZES]
     out = []
-    for piece in candidates(limits, yaw_acceleration(known.prepared.vehicle)):
+    for name in sizes[0]:
+        for options in sizes:
+            if name not in options:
+                continue
+            piece, reason, flight = options[name], "", None
+            try:
+                flight = flown(known, world, joined([piece], step, BETWEEN_S), limits)
+                reason = broken(flight, limits, vehicle)
+            except InputError as error:
+                reason = str(error)
+            if not reason:
+                break
         seconds = piece.duration_s + BETWEEN_S
-        try:
-            flight = flown(known, world, joined([piece], step, BETWEEN_S), limits)
-        except InputError as error:
-            out.append(Tried(piece, None, seconds, str(error)))
-            continue
-        if reason := broken(flight, limits, known.prepared.vehicle):
-            out.append(Tried(piece, None, seconds, reason))
-            continue
-        out.append(Tried(piece, of_flight(known, flight, world, terms), seconds))
-        progress(f"flown in simulation: {piece.name}")
+        information = None if reason else of_flight(known, flight, world, terms)
+        out.append(Tried(piece, information, seconds, reason))
+        progress(f"flown in simulation: {name}")
     return out
 
 
@@ -148,8 +163,10 @@ def reached(known: Known, information: Information, target: float) -> float:
     return float(np.mean(found)) if found else 1.0
 
 
-def chosen_pieces(known: Known, limits: Limits, options: list[Tried]) -> tuple[list[Tried], list[Tried]]:
-    """The manoeuvres to fly, and all options with their progress."""
+def chosen_pieces(
+    known: Known, limits: Limits, options: list[Tried], most: int = MOST_PIECES
+) -> tuple[list[Tried], list[Tried]]:
+    """The manoeuvres to fly, `most` at most, and all options with their progress."""
     base = of_set(known)
     start = reached(known, base, limits.target_sigma)
     judged = [
@@ -167,7 +184,7 @@ def chosen_pieces(known: Known, limits: Limits, options: list[Tried]) -> tuple[l
     usable = [t for t in judged if t.information is not None]
     taken: list[Tried] = []
     now, share = base, start
-    while len(taken) < MOST_PIECES and share < 1.0 - 1e-9:
+    while len(taken) < most and share < 1.0 - 1e-9:
         left = limits.duration_s - BETWEEN_S - sum(t.flown_s for t in taken)
         offers = []
         for t in usable:
@@ -191,6 +208,21 @@ def chosen_pieces(known: Known, limits: Limits, options: list[Tried]) -> tuple[l
     return taken, judged
 
 
+def expecting_quick(known: Known, limits: Limits) -> Known:
+    """The set as the engine would whiten it beside a quick flight: the first of QUICK that the limits allow."""
+    world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
+    for share in SIZES:
+        options = {p.name: p for p in candidates(smaller(limits, share), share * yaw_acceleration(vehicle))}
+        for piece in (options[n] for n in QUICK if n in options):
+            try:
+                flight = flown(known, world, joined([piece], step, BETWEEN_S), limits)
+            except InputError:
+                continue
+            if not broken(flight, limits, vehicle):
+                return expecting(known, [(flight, world)])
+    return known
+
+
 def plan(
     known: Known,
     limits: Limits,
@@ -202,6 +234,7 @@ def plan(
     nothing = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
     if not known.questions and not known.chains and not wishes:
         return Plan(known.recordings.name, limits, (), nothing, None, (), (), (), known.unanswerable, reasons)
+    first, known = known, expecting_quick(known, limits)
     options = tried(known, limits, progress)
     progress("choosing")
     taken, judged = chosen_pieces(known, limits, options) if known.questions or known.chains else ([], options)
@@ -214,6 +247,8 @@ def plan(
     if pieces:
         world = world_of(known, None, None)
         flight = flown(known, world, reference, limits)
+        known = expecting(first, [(flight, world)])
+        base = of_set(known)
         after = base + of_flight(known, flight, world, asked_terms(known))
     for question in known.questions:
         progress(f"predicting {' or '.join(question.ids)}")
@@ -227,7 +262,7 @@ def plan(
                     own = base + of_flight(known, flight_h, world, asked_terms(known))
                 except InputError:
                     own = after
-            found += [s for s in separations(known, question, base, own) if s.true == hypothesis.id]
+            found += [s for s in separations(known, question, of_set(first), own) if s.true == hypothesis.id]
         questions.append((question.ids, tuple(found)))
     questions += chain_separations(known, after)
     return Plan(

@@ -16,7 +16,7 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.regression import Regression
 from rotorid.mismatch.rows import Term
-from rotorid.mismatch.select import COST_PER_PARAMETER
+from rotorid.mismatch.select import COST_PER_PARAMETER, SMALLEST_SIZE, Search
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet
 
@@ -61,11 +61,13 @@ class Known:
     """The same of what lies between command and rotor speed."""
     unanswerable: tuple[tuple[tuple[str, ...], str], ...]
     """Classes that no flight with these columns can tell apart, with what it takes."""
+    whitened: Regression | None = None
+    """The set's normal equations through the filters that the engine would learn from it and a flight together."""
 
     @property
     def regression(self) -> Regression:
         """The engine's normal equations of the set."""
-        return self.fitted.model.search.regression
+        return self.fitted.model.search.regression if self.whitened is None else self.whitened
 
 
 def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: float = 20.0) -> Known:
@@ -131,13 +133,7 @@ def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Questi
     for i in ids:
         choices = [(t.key,) for t in forms[i]]
         if i != finding.id:
-            # Another id may need a simpler form of the one in the model beside it.
-            choices += [
-                (t.key, s.key)
-                for t in forms[i]
-                for s in forms[finding.id]
-                if s.key != own and t.size + s.size <= search.terms[own].size
-            ]
+            choices += shared_class(search, own, rest, forms[i], forms[finding.id])
         if not choices:
             continue
         rivals[i] = tuple(choices)
@@ -149,6 +145,30 @@ def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Questi
     if len(hypotheses) < 2:
         return None
     return Question(tuple(h.id for h in hypotheses), tuple(hypotheses), shared, rivals)
+
+
+def shared_class(search: Search, own: str, rest: list[str], others: list[Term], same: list[Term]) -> list[tuple]:
+    """Another id beside a simpler form of the id in the model, where the engine takes the two for one of a class.
+
+    As in `Search.alternatives`: of ids that physics confuses, as many parameters together as the term has, and acting
+    in channels of their own; where both act alike the id is at work in any case.
+    """
+    out = []
+    for t in others:
+        if t.effect not in search.ask.confusers.get(search.terms[own].effect, ()):
+            continue
+        for s in same:
+            room = search.terms[own].size - t.size
+            if s.key == own or s.run or room < 1 or search.directions(s) > room:
+                continue
+            beside = search.regression.fit([*search.always, *rest, s.key, t.key])
+            seen = [
+                search.ask.sizes_of(k, beside.beta[beside.places(search.regression.columns([k]))]) > SMALLEST_SIZE
+                for k in (s.key, t.key)
+            ]
+            if not (seen[0] & seen[1]).any():
+                out.append((t.key, s.key))
+    return out
 
 
 def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[str, Term]) -> tuple[str, ...]:

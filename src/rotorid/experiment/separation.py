@@ -22,10 +22,10 @@ from rotorid.experiment.limits import Limits
 from rotorid.experiment.questions import Hypothesis, Known, Question
 from rotorid.experiment.simulate import Flown, World, commands, fly, recorded
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import assemble_rows, prepare_like
-from rotorid.mismatch.regression import Regression, build, ridge_inverse
+from rotorid.mismatch.prepare import assemble_rows, prepare_like, training_rule
+from rotorid.mismatch.regression import Regression, autoregression, build, ridge_inverse
 from rotorid.mismatch.rows import Term
-from rotorid.mismatch.wrench import block_seconds, chosen, path_segments
+from rotorid.mismatch.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
 from rotorid.recordings import RecordingSet
 
 DRAWS = 400
@@ -123,7 +123,7 @@ def full_speed_of(known: Known) -> float:
 
 def step_of(known: Known) -> float:
     """Step of the simulation, s: the recording's own, or a whole part of it."""
-    rate = 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
+    rate = own_rate_hz(known)
     return 1.0 / (rate * int(np.ceil(LEAST_RATE_HZ / rate)))
 
 
@@ -135,12 +135,12 @@ def columns_of(known: Known) -> tuple[str, ...]:
 
 def flown(known: Known, world: World, reference: Reference, limits: Limits) -> Flown:
     """A reference flown by a competing model."""
-    return fly(world, reference, limits.attitude_bandwidth_rad_s, limits.middle_m)
+    return fly(world, reference, limits.attitude_bandwidth_rad_s, limits.middle_m, limits.position_bandwidth_rad_s)
 
 
 def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) -> Information:
     """What a flight would hold, in the columns of the set's regression."""
-    rate = 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
+    rate = own_rate_hz(known)
     model, prepared = known.fitted.model, known.prepared
 
     def segments_of(flight: Flown) -> list[Segment]:
@@ -169,6 +169,34 @@ def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) 
     return Information(gram, np.array(apart) if apart else None)
 
 
+def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
+    """The set with its normal equations as the engine would have them once flights are joined to it.
+
+    The engine learns its filters from what the whole catalogue leaves; of a calm set that is next to nothing in a
+    channel where the noise of the regressors explains the noise of the reading, and such filters would promise too
+    much of a quick flight, in which it cannot. What the model leaves of the set is what it will leave of the flight,
+    but no less than the share of the flight's own forces and moments below which the engine tells nothing apart.
+    """
+    model, prepared = known.fitted.model, known.prepared
+    rate, regression = own_rate_hz(known), model.search.regression
+    segments = list(model.segments)
+    for number, (flight, world) in enumerate(flights):
+        run = recorded(flight, world, columns_of(known), rate, f"planned {number}")
+        segments += prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
+    floor, remains = channel_floor(segments, prepared.vehicle), after_residual(model)
+    filters = {c: autoregression([r[:, c] for r in remains], floor[c]) for c in regression.filters}
+    rule, rate_hz = training_rule(prepared.split, model.segments), prepared.thinner.rate_hz
+    again = build(
+        model.rows, model.terms, filters, rule, block_seconds(model.rows, rate_hz), rate_hz, model.contributions.noisy
+    )
+    return replace(known, whitened=again.without_winds())
+
+
+def own_rate_hz(known: Known) -> float:
+    """Rate of the recordings."""
+    return 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
+
+
 def left_over(
     regression: Regression, information: Information, own: Sequence[str], others: Sequence[str]
 ) -> np.ndarray:
@@ -181,55 +209,71 @@ def left_over(
     return (left + left.T) / 2
 
 
-def against(known: Known, question: Question, true: Hypothesis, rival: str, information: Information):
-    """√λ of a true model against the best form of a rival, and the matrix S of that form."""
-    best = None
+def rivals_left(known: Known, question: Question, true: Hypothesis, rival: str, information: Information):
+    """S of every form of a rival, and which of the true model's coefficients it is of."""
+    out = []
     for keys in question.rivals[rival]:
         own = [k for k in true.keys if k not in keys]
-        if not own:
-            continue
-        # Where the rival shares a term with the true model, only what is the true model's own counts.
-        at = np.concatenate(
-            [np.flatnonzero(np.isin(known.regression.columns(true.keys), known.regression.columns(own)))]
-        )
-        left = left_over(known.regression, information, own, [*question.shared, *keys])
-        beta = true.beta[at]
-        square = float(max(beta @ left @ beta, 0.0))
-        if best is None or square < best[0]:
-            best = (square, left, at)
-    return best
+        if own:
+            # Where the rival shares a term with the true model, only what is the true model's own counts.
+            at = np.flatnonzero(np.isin(known.regression.columns(true.keys), known.regression.columns(own)))
+            out.append((left_over(known.regression, information, own, [*question.shared, *keys]), at))
+    return out
+
+
+def against(known: Known, question: Question, true: Hypothesis, rival: str, information: Information):
+    """λ of a true model against the best form of a rival, S of that form, and of which coefficients it is."""
+    forms = rivals_left(known, question, true, rival, information)
+    if not forms:
+        return None
+    left, at = min(forms, key=lambda f: size_of(true.beta, *f))
+    return size_of(true.beta, left, at), left, at
 
 
 def separations(known: Known, question: Question, before: Information, after: Information) -> list[Separation]:
-    """Every model of a question against its nearest rival."""
+    """Every model of a question against its nearest rival.
+
+    Which rival is nearest hangs on the model's coefficients, of which the set knows no more than their interval: the
+    separation is the median over draws from it of the smallest over all rivals.
+    """
     out = []
     for true in question.hypotheses:
         if not true.keys:
             continue
         found = []
         for rival in question.ids:
-            if rival == true.id or (best := against(known, question, true, rival, after)) is None:
+            if rival == true.id:
                 continue
-            square, left, at = best
-            then = against(known, question, true, rival, before)
-            found.append((square, rival, left, at, np.sqrt(then[0])))
+            forms = rivals_left(known, question, true, rival, after)
+            if forms:
+                found.append((min(size_of(true.beta, *f) for f in forms), rival, forms))
         if not found:
             continue
-        square, rival, left, at, so_far = min(found, key=lambda f: f[0])
-        out.append(Separation(true.id, rival, float(np.sqrt(square)), interval(true, left, at), float(so_far)))
+        _, rival, _ = min(found, key=lambda f: f[0])
+        sigma, interval_95 = spread(true, [f for _, _, forms in found for f in forms])
+        so_far, _ = spread(true, rivals_left(known, question, true, rival, before))
+        out.append(Separation(true.id, rival, sigma, interval_95, so_far))
     return out
 
 
-def interval(true: Hypothesis, left: np.ndarray, at: np.ndarray) -> tuple[float, float]:
-    """95 % interval of the separation that will be found."""
+def size_of(beta: np.ndarray, left: np.ndarray, at: np.ndarray) -> float:
+    """λ of coefficients (k,)."""
+    return float(max(beta[at] @ left @ beta[at], 0.0))
+
+
+def spread(true: Hypothesis, forms: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, tuple[float, float]]:
+    """Median and 95 % interval of the separation that will be found, over the model's own doubt and the flight's noise.
+
+    `forms` hold S of every form of every rival, and which of the model's coefficients it is of.
+    """
     rng = np.random.default_rng(0)
-    beta, covariance = true.beta[at], true.covariance[np.ix_(at, at)]
-    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
-    draws = beta + (rng.standard_normal((DRAWS, len(beta))) * np.sqrt(np.maximum(values, 0))) @ vectors.T * unit
-    size = np.sqrt(np.maximum(np.einsum("dk,kl,dl->d", draws, left, draws), 0.0)) + rng.standard_normal(DRAWS)
-    low, high = np.quantile(np.maximum(size, 0.0), [0.025, 0.975])
-    return float(low), float(high)
+    unit = np.sqrt(np.maximum(np.diag(true.covariance), 1e-300))
+    values, vectors = np.linalg.eigh(true.covariance / np.outer(unit, unit))
+    draws = (rng.standard_normal((DRAWS, len(unit))) * np.sqrt(np.maximum(values, 0))) @ vectors.T * unit + true.beta
+    squares = [np.einsum("dk,kl,dl->d", draws[:, at], left, draws[:, at]) for left, at in forms]
+    size = np.sqrt(np.maximum(np.min(squares, axis=0), 0.0))
+    low, high = np.quantile(np.maximum(size + rng.standard_normal(DRAWS), 0.0), [0.025, 0.975])
+    return float(np.median(size)), (float(low), float(high))
 
 
 def left_overs(known: Known, question: Question, information: Information) -> list[float]:

@@ -1,7 +1,9 @@
 """A candidate flown: what the controller leaves of the reference, and what the set's sensors would record of it.
 
-The vehicle follows the reference as a loop of the stated bandwidth does (two second-order low-passes: the attitude
-loop, and rotors and filters three times as fast). For that motion the forces and moments are known, and the rotor
+The vehicle follows the reference as a cascade does: a position loop with the reference's velocity and acceleration fed
+forward, around an attitude loop of the stated bandwidth, around rotors and filters five times as fast. The attitude
+loop's lag leaves the position loop a resonance, so that motions near its bandwidth come out larger than asked and fast
+ones smaller. For that motion the forces and moments are known, and the rotor
 speeds that make them, with the effects of the competing model at work, follow by solving its equations for them: the
 controller finds them by feedback in the same way. Commands are what the chain between command and speed needs for these
 speeds. Sensors read the truth here: their noise enters where the comparison is predicted.
@@ -10,11 +12,11 @@ speeds. Sensors read the truth here: their noise enters where the comparison is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
-from scipy.signal import bilinear, lfilter
+from scipy.signal import bilinear_zpk, sosfilt, zpk2sos
 from scipy.spatial.transform import Rotation
 
 from rotorid.effects.contract import Form, Motion, SpeedPath
@@ -25,8 +27,12 @@ from rotorid.recordings import columns as c
 from rotorid.vehicle.mixer import allocation_matrix
 
 DAMPING = 0.8
-FASTER = 3.0
+FASTER = 5.0
 """Rotors and filters beside the attitude loop."""
+SLOWER = 0.2
+"""The position loop beside the attitude loop, where its bandwidth is not stated."""
+EDGE = 8
+"""Samples by which a flight is longer on both sides while its derivatives are taken."""
 ROUNDS = 6
 """Times that rotor speeds and attitude are solved for with the effects at their last values."""
 STEPS_BACK = 8
@@ -66,13 +72,35 @@ class Flown:
         return float(np.linalg.norm(self.world_velocity[:, :2], axis=1).max())
 
 
-def followed(signal: np.ndarray, bandwidth_rad_s: float, step_s: float) -> np.ndarray:
-    """What a loop of a bandwidth leaves of a reference (n, …), starting at rest at its first value."""
-    out = signal - signal[:1]
-    for natural in (bandwidth_rad_s, FASTER * bandwidth_rad_s):
-        b, a = bilinear([natural**2], [1.0, 2 * DAMPING * natural, natural**2], 1.0 / step_s)
-        out = lfilter(b, a, out, axis=0)
-    return out + signal[:1]
+def low_pass(natural_rad_s: float) -> np.ndarray:
+    """Denominator of a second-order low-pass of unit gain, highest power first."""
+    return np.array([1.0 / natural_rad_s**2, 2 * DAMPING / natural_rad_s, 1.0])
+
+
+def filtered(signal: np.ndarray, over: np.ndarray, under: np.ndarray, step_s: float) -> np.ndarray:
+    """A signal (n, …) through a transfer function `over` / `under` in s, at rest before; second-order sections, as
+    poles thousands of times slower than the step lose all digits in one polynomial."""
+    zeros, poles = np.roots(over), np.roots(under)
+    first = np.trim_zeros(over, "f")[0] / np.trim_zeros(under, "f")[0]
+    return sosfilt(zpk2sos(*bilinear_zpk(zeros, poles, first, 1.0 / step_s)), signal, axis=0)
+
+
+def followed(signal: np.ndarray, natural_rad_s: float, lag: np.ndarray, step_s: float) -> np.ndarray:
+    """What a loop leaves of a reference (n, …) whose derivatives are fed forward, starting at rest at its first value.
+
+    The loop asks for the acceleration a_r + 2 ζ ω (v_r - v) + ω² (p_r - p); the vehicle has it a lag later, whose
+    denominator is `lag`.
+    """
+    loop = np.array([2 * DAMPING * natural_rad_s, natural_rad_s**2])
+    asked = np.concatenate([[1.0], loop])
+    held = np.polyadd(np.polymul([1.0, 0.0, 0.0], lag), loop)
+    return filtered(signal - signal[:1], asked, held, step_s) + signal[:1]
+
+
+def turned(yaw_rad: np.ndarray, natural_rad_s: float, step_s: float) -> np.ndarray:
+    """What a yaw loop leaves of a yaw reference (n,), rad, whose rate is fed forward."""
+    own, lag = low_pass(natural_rad_s), low_pass(FASTER * natural_rad_s)
+    return filtered(yaw_rad - yaw_rad[:1], own[1:], np.polymul(own, lag), step_s) + yaw_rad[:1]
 
 
 def attitude(thrust_direction: np.ndarray, yaw: np.ndarray) -> np.ndarray:
@@ -90,26 +118,41 @@ def body_rates(rotation: np.ndarray, step_s: float) -> np.ndarray:
     return np.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
 
 
-def fly(world: World, reference: Reference, bandwidth_rad_s: float, place_m: Sequence[float]) -> Flown:
+def fly(
+    world: World,
+    reference: Reference,
+    bandwidth_rad_s: float,
+    place_m: Sequence[float],
+    position_rad_s: float | None = None,
+) -> Flown:
     """The flight of a reference whose zero lies at `place_m` (north, east, height above ground).
+
+    `bandwidth_rad_s` is of the attitude loop, `position_rad_s` of the position loop (a share of it where not stated).
 
     Raises
     ------
     InputError
         The rotors cannot do it: one would have to turn backwards.
     """
-    vehicle, t = world.vehicle, reference.time_s
-    step, gravity = float(t[1] - t[0]), np.array([0.0, 0.0, vehicle.gravity_m_s2])
+    vehicle, step = world.vehicle, float(reference.time_s[1] - reference.time_s[0])
+    gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), held_longer(reference, step)
+    t = reference.time_s
     ground = vehicle.ground_z_m or 0.0
     start = np.array([place_m[0], place_m[1], ground - place_m[2]])
-    position = followed(reference.position_m, bandwidth_rad_s, step) + start
-    yaw = followed(reference.yaw_rad, bandwidth_rad_s / 2, step)
+    outer = SLOWER * bandwidth_rad_s if position_rad_s is None else position_rad_s
+    rotors = low_pass(FASTER * bandwidth_rad_s)
+    level = followed(reference.position_m[:, :2], outer, np.polymul(low_pass(bandwidth_rad_s), rotors), step)
+    # The height needs no tilt.
+    height = followed(reference.position_m[:, 2:], outer, rotors, step)
+    position = np.concatenate([level, height], axis=1) + start
+    yaw = turned(reference.yaw_rad, bandwidth_rad_s / 2, step)
     velocity = np.gradient(position, step, axis=0)
     wanted = vehicle.mass_kg * (np.gradient(velocity, step, axis=0) - gravity)
     inertia, allocation = vehicle.inertia_kg_m2.matrix(), allocation_matrix(vehicle)
     force = moment = np.zeros((len(t), 3))
     hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum())
     speed = np.full((len(t), vehicle.rotor_count), hover)
+    inner = slice(EDGE, -EDGE)
     rotation = attitude(-wanted, yaw)
     for _ in range(ROUNDS if world.effects else 1):
         left = wanted - np.einsum("nij,nj->ni", rotation, force)
@@ -119,9 +162,9 @@ def fly(world: World, reference: Reference, bandwidth_rad_s: float, place_m: Seq
         asked = turning @ inertia + np.cross(rates, rates @ inertia) - moment
         thrust = np.linalg.norm(left, axis=1)
         square = np.column_stack([thrust, asked]) @ allocation.T
-        if not np.isfinite(square).all() or (square < 0).any():
+        if not np.isfinite(square).all() or (square[inner] < 0).any():
             raise InputError("the rotors cannot fly this: one would have to turn backwards")
-        speed = np.sqrt(square)
+        speed = np.sqrt(np.maximum(square, 0.0))
         motion = Motion(
             time_s=t,
             rotor_speed=speed,
@@ -138,7 +181,17 @@ def fly(world: World, reference: Reference, bandwidth_rad_s: float, place_m: Seq
         )
         motion = replace(motion, accelerometer=motion.specific_force, gyroscope=rates)
         force, moment = _wrench(world, motion)
-    return Flown(motion, commands(world, motion), velocity)
+    cut = {f.name: getattr(motion, f.name) for f in fields(motion)}
+    cut = {name: v[inner] for name, v in cut.items() if isinstance(v, np.ndarray) and len(v) == len(t)}
+    motion = replace(motion, **cut)
+    return Flown(motion, commands(world, motion), velocity[inner])
+
+
+def held_longer(reference: Reference, step_s: float) -> Reference:
+    """A reference held EDGE samples longer at both ends: derivatives at an end would be taken from one side."""
+    t = np.arange(-EDGE, len(reference.time_s) + EDGE) * step_s + reference.time_s[0]
+    ends = ((EDGE, EDGE), (0, 0))
+    return Reference(t, np.pad(reference.position_m, ends, "edge"), np.pad(reference.yaw_rad, EDGE, "edge"))
 
 
 def _wrench(world: World, motion: Motion) -> tuple[np.ndarray, np.ndarray]:

@@ -15,15 +15,18 @@ import numpy as np
 import pandas as pd
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.experiment import mission
+from rotorid.experiment.by_hand import by_hand
 from rotorid.experiment.plan import Plan
 from rotorid.experiment.separation import Separation
 from rotorid.writing import all_or_none, rounded
 
-FILE_HZ = 50.0
+FILE_HZ = 100.0
 PIECES_AT_ONCE = 31
 """Pieces that the trajectory memory of a Crazyflie (4096 bytes, 132 a piece) holds."""
-COARSEST_S, FINEST_S = 2.0, 0.25
-WORST_FIT_M = 0.01
+COARSEST_S, FINEST_S = 2.0, 0.1
+WORST_FIT_M, WORST_FIT_M_S2 = 0.01, 0.4
+"""Quick motions are millimetres large: that the path is met does not say that the acceleration is."""
 FLIP = np.array([1.0, -1.0, -1.0])
 """North-east-down to forward-left-up."""
 
@@ -76,7 +79,7 @@ def polynomial(start: np.ndarray, stop: np.ndarray, seconds: float) -> np.ndarra
 def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
     """Polynomial pieces (`duration`, `x^0` … `yaw^7`) and the largest distance to the reference, m.
 
-    Pieces are as long as the fit allows (WORST_FIT_M), between FINEST_S and COARSEST_S.
+    Pieces are as long as the fit allows (WORST_FIT_M, WORST_FIT_M_S2), between FINEST_S and COARSEST_S.
     """
     reference, middle = plan.reference, plan.limits.middle_m
     t, step = reference.time_s, reference.time_s[1] - reference.time_s[0]
@@ -93,9 +96,11 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
             end = min(at + length, len(t) - 1)
             seconds = t[end] - t[at]
             fitted = polynomial(states[at], states[end], seconds)
-            made = np.power(t[at : end + 1, None] - t[at], np.arange(8)) @ fitted
-            off = float(np.linalg.norm(made[:, :3] - every[at : end + 1, :3], axis=1).max())
-            if off <= WORST_FIT_M or length <= FINEST_S / step:
+            powers = np.power(t[at : end + 1, None] - t[at], np.arange(8))
+            off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
+            bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])
+            pushed = float(np.linalg.norm((bend - states[at : end + 1, 2])[:, :3], axis=1).max())
+            if (off <= WORST_FIT_M and pushed <= WORST_FIT_M_S2) or length <= FINEST_S / step:
                 break
             length //= 2
         worst, at = max(worst, off), end
@@ -152,6 +157,7 @@ def summary(plan: Plan) -> dict:
                 for w in plan.widths
             ],
             "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
             "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
             "limits": plan.limits.model_dump(mode="json"),
@@ -183,7 +189,18 @@ def text(plan: Plan) -> list[str]:
         out.append(f"No flight with these columns tells {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append("Nothing is open: no flight is needed to tell effects apart.")
-    return out
+    return out + in_words(plan)
+
+
+def open_ids(plan: Plan) -> list[tuple[str, ...]]:
+    """Ids of every class that is open, told by a flight or not."""
+    return [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
+
+
+def in_words(plan: Plan) -> list[str]:
+    """Manual steps, as sentences."""
+    steps = dict.fromkeys(step for ids in open_ids(plan) for step in by_hand(ids))
+    return [f"By hand: {step}." for step in steps]
 
 
 def steps(plan: Plan) -> list[str]:
@@ -210,6 +227,9 @@ def write(plan: Plan, folder: Path) -> list[Path]:
     names = ["plan.json"]
     if plan.pieces:
         names += ["trajectory.csv", "px4_offboard.csv", "crazyflie.csv", "plan.png"]
+    why = mission.not_a_mission(plan)
+    if plan.pieces and not why:
+        names.append("px4_mission.plan")
     paths = [folder / name for name in names]
     with all_or_none(*paths) as parts:
         content = summary(plan)
@@ -224,5 +244,8 @@ def write(plan: Plan, folder: Path) -> list[Path]:
             from rotorid.experiment.picture import draw
 
             draw(plan, parts[4])
+            content["px4_mission"] = why or "px4_mission.plan"
+            if not why:
+                parts[5].write_text(json.dumps(mission.mission(plan), indent=1) + "\n", encoding="utf-8")
         parts[0].write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return paths

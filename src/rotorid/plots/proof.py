@@ -1,4 +1,4 @@
-"""Figures of the proof: targets, confusion, power, held-out error against the oracle's."""
+"""Figures of the proof: targets, confusion, power, held-out error against the oracle's, the next flight."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.plots import style
+from rotorid.proof.next_flight import WITHIN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,6 +114,39 @@ def oracle(cases: pd.DataFrame) -> Figure:
     ax.set_xticks(range(len(families)), [plain(f) for f in families], rotation=45, ha="right")
     ax.set_ylabel("held-out error / true model's")
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.0, markerscale=3)
+    return fig
+
+
+def next_flight(rows: pd.DataFrame) -> Figure:
+    """Separation predicted by the plan against that found in both sets together, and what became of the question.
+
+    One point a set that was open and whose truth was among what was asked; bars: the interval that the plan stated.
+    """
+    number = {
+        n: rows[n].astype(float) for n in ("predicted_sigma", "predicted_low", "predicted_high", "measured_sigma")
+    }
+    rows = rows.assign(**number).dropna(subset=["predicted_sigma", "measured_sigma"])
+    if rows.empty:
+        return nothing("No planned flight in this proof.")
+    fig, ax = style.figure(3.2)
+    most = 1.3 * float(rows[["predicted_high", "measured_sigma"]].to_numpy().max())
+    line = np.geomspace(0.5, most, 50)
+    ax.fill_between(
+        line, line / WITHIN, line * WITHIN, color="#dcefe6", zorder=0, label=f"within a factor of {WITHIN:g}"
+    )
+    colours = {"right": style.COLOUR["after"], "wrong": style.COLOUR["before"], "open": style.GREY}
+    words = {"right": "settled rightly", "wrong": "settled wrongly", "open": "still open"}
+    for outcome, own in rows.groupby("outcome"):
+        at = own["predicted_sigma"].clip(lower=0.5), own["measured_sigma"].clip(lower=0.5)
+        low, high = own["predicted_low"].clip(lower=0.5, upper=at[0]), own["predicted_high"].clip(lower=at[0])
+        colour = colours.get(outcome, style.GREY)
+        ax.errorbar(
+            *at, xerr=[at[0] - low, high - at[0]], fmt="o", color=colour, lw=0.8, label=words.get(outcome, outcome)
+        )
+    ax.set(xscale="log", yscale="log", xlim=(0.5, most), ylim=(0.4, most))
+    ax.set_xlabel("predicted separation [standard errors]")
+    ax.set_ylabel("found [standard errors; 0.5: or less]")
+    ax.legend(loc="upper left")
     return fig
 
 

@@ -53,11 +53,12 @@ class Row:
 
 
 def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:
-    """`right`, `wrong` or `open`, and the sentence."""
+    """`right`, `wrong` (also where something untrue of the class is established beside) or `open`, and the sentence."""
     (answer,) = answers([ids], findings)
     if not answer.answer:
         return "open", answer.sentence
-    return ("right" if answer.answer in truth else "wrong"), answer.sentence
+    named = {f.id for f in findings if f.status == "established" and f.id in ids}
+    return ("right" if named <= truth else "wrong"), answer.sentence
 
 
 def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
@@ -67,25 +68,32 @@ def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation |
 
 
 def measured(joint: Known, question: Question | None, true: str) -> float:
-    """√ of the whitened squares that the true model explains more than its nearest rival in both sets together.
+    """√ of the whitened squares that the true model still explains beside its nearest rival, in both sets together.
 
-    Models are those of the question as it was asked of the first set, each in the form that fits both sets best. NaN
-    where truth is none of them, or is no term of forces and moments (between command and rotor speed).
+    This is what the engine asks before it names a class: is the term still needed with the other in its place? Of each
+    rival every form of the question as it was asked of the first set is tried; what as many coefficients explain of
+    noise alone is taken off. NaN where truth is none of the models, or is no term of forces and moments (between
+    command and rotor speed).
     """
     if question is None or true not in question.rivals:
         return float("nan")
     search, active = joint.fitted.model.search, joint.fitted.model.selection.active
     shared = [*search.always, *(k for k in active if search.terms[k].effect not in question.ids)]
-    explained = {}
-    for name, choices in question.rivals.items():
-        able = [keys for keys in choices if all(k in search.terms for k in keys)]
-        if able:
-            best = best_of(joint.regression, shared, able, search.terms)
-            explained[name] = joint.regression.explained([*shared, *best])
-    if true not in explained or len(explained) < 2:
+
+    def able(name: str) -> list[tuple[str, ...]]:
+        return [keys for keys in question.rivals[name] if all(k in search.terms for k in keys)]
+
+    if not able(true):
         return float("nan")
-    rival = max(value for name, value in explained.items() if name != true)
-    return float(np.sqrt(max(explained[true] - rival, 0.0)))
+    own = best_of(joint.regression, shared, able(true), search.terms)
+    left = []
+    for keys in (keys for name in question.rivals if name != true for keys in able(name)):
+        more = [k for k in own if k not in keys]
+        if more:
+            beside = [*shared, *keys]
+            gain = joint.regression.explained([*beside, *more]) - joint.regression.explained(beside)
+            left.append(gain - sum(search.terms[k].size for k in more))
+    return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
 
 
 def table(rows: list[Row]) -> pd.DataFrame:

@@ -71,6 +71,49 @@ def of_families(families: pd.DataFrame) -> pd.DataFrame:
     return out
 
 
+def asked_of_flights(rows: pd.DataFrame) -> pd.DataFrame:
+    """Sets of the next flight's proof that left something open: what was hidden, planned and came out, as text."""
+    asked = rows[rows["open"].fillna("") != ""]
+
+    def sigma(value) -> str:
+        return "" if pd.isna(value) else f"{float(value):.1f}"
+
+    return pd.DataFrame(
+        [
+            {
+                "case": row["case"],
+                "truth": words(row["truth"]),
+                "open": words(" or ".join(str(row["open"]).split())),
+                "planned_s": "" if pd.isna(row["planned_s"]) else f"{float(row['planned_s']):.0f}",
+                "predicted": sigma(row["predicted_sigma"]),
+                "found": sigma(row["measured_sigma"]),
+                "standard": sigma(row["standard_sigma"]),
+                "outcome": row["outcome"],
+                "code": "unknown" if row["judged_by"] == "unknown" else f"#{str(row['judged_by'])[:7]}",
+            }
+            for _, row in asked.iterrows()
+        ],
+        columns=["case", "truth", "open", "planned_s", "predicted", "found", "standard", "outcome", "code"],
+    )
+
+
+def of_next_flights(summary: pd.DataFrame) -> pd.DataFrame:
+    """`what`, `count`, `share` and its interval of the next flight's proof, as text; shares of nothing are left out."""
+    known = summary[summary["of"] > 0]
+    return pd.DataFrame(
+        [
+            {
+                "what": row["what"],
+                "count": f"{int(row['count'])} of {int(row['of'])}",
+                "share": f"{100 * row['share']:.0f} %",
+                "interval": f"{100 * row['low']:.0f} to {100 * row['high']:.0f} %",
+            }
+            for _, row in known.iterrows()
+        ],
+        columns=["what", "count", "share", "interval"],
+    )
+
+
 def number(key: str, value: float) -> str:
     """A share as percent, a ratio with two decimals, nothing as a dash."""
     if pd.isna(value):

@@ -6,11 +6,11 @@ import pytest
 from rotorid import templates
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.experiment import page, write
-from rotorid.experiment.candidates import Reference, candidates, joined
+from rotorid.experiment import mission, page, write
+from rotorid.experiment.candidates import Reference, candidates, joined, smaller
 from rotorid.experiment.limits import Limits
-from rotorid.experiment.plan import Plan, broken, yaw_acceleration
-from rotorid.experiment.simulate import World, commands, fly, recorded
+from rotorid.experiment.plan import SIZES, Plan, broken, yaw_acceleration
+from rotorid.experiment.simulate import World, commands, fly, followed, low_pass, recorded
 from rotorid.mismatch.motion import build_segments
 from rotorid.mismatch.rows import residual
 
@@ -50,15 +50,49 @@ def test_a_candidate_keeps_the_limits_or_says_which_it_does_not(piece) -> None:
     assert flight.motion.height.min() >= LIMITS.height_m[0] - 0.1
 
 
-def test_most_candidates_can_be_flown() -> None:
-    kept = 0
-    for piece in PIECES:
-        try:
-            flight = fly(World(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
-        except InputError:
-            continue
-        kept += not broken(flight, LIMITS, VEHICLE)
-    assert kept > 0.7 * len(PIECES)
+def test_every_manoeuvre_can_be_flown_in_some_size() -> None:
+    kept = set()
+    for share in SIZES:
+        for piece in candidates(smaller(LIMITS, share), share * yaw_acceleration(VEHICLE)):
+            try:
+                flight = fly(World(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
+            except InputError:
+                continue
+            kept |= set() if broken(flight, LIMITS, VEHICLE) else {piece.name}
+    assert kept == {p.name for p in PIECES}
+
+
+def test_smaller_limits_lie_within_the_others() -> None:
+    half = smaller(LIMITS, 0.5)
+    assert half.room_m == pytest.approx([0.5 * r for r in LIMITS.room_m])
+    assert half.middle_m == pytest.approx(LIMITS.middle_m)
+    assert (half.speed_m_s, half.tilt_deg) == (0.5 * LIMITS.speed_m_s, 0.5 * LIMITS.tilt_deg)
+
+
+@pytest.mark.parametrize(("hz", "attitude", "position"), [(0.2, 9.0, 2.2), (0.8, 9.0, 2.2), (2.0, 23.3, 2.55)])
+def test_a_cascade_follows_a_sine_as_its_equations_integrated_do(hz: float, attitude: float, position: float) -> None:
+    step = 1e-3
+    t = np.arange(0, 20, step)
+    asked = np.sin(2 * np.pi * hz * t) * np.clip(t / 5, 0, 1)
+    lag = np.polymul(low_pass(attitude), low_pass(5 * attitude))
+    path = followed(asked[:, None], position, lag, step)[:, 0]
+    # Step by step: a_asked = a_r + 2 ζ ω (v_r - v) + ω² (p_r - p), two second-order lags, two integrators.
+    rates = np.gradient(asked, step)
+    bends = np.gradient(rates, step)
+    p = v = 0.0
+    lags = np.zeros((2, 2))
+    out = []
+    for r, dr, ddr in zip(asked, rates, bends, strict=True):
+        wanted = ddr + 1.6 * position * (dr - v) + position**2 * (r - p)
+        for state, natural in zip(lags, (attitude, 5 * attitude), strict=True):
+            state[1] += step * (natural**2 * (wanted - state[0]) - 1.6 * natural * state[1])
+            state[0] += step * state[1]
+            wanted = state[0]
+        v += step * wanted
+        p += step * v
+        out.append(p)
+    late = t > 12
+    assert np.abs(path[late] - np.array(out)[late]).max() < 0.05 * np.abs(path[late]).max()
 
 
 def piece(name: str):
@@ -152,11 +186,46 @@ def test_a_plan_is_written_whole(a_plan: Plan, tmp_path) -> None:
 
 def test_the_page_shows_the_last_plan_once(a_plan: Plan) -> None:
     bare = '<h1>x</h1><section><h2>What to fly next</h2>\n<p class="next">Fly.</p></section><section>rest</section>'
-    once = page.with_plan(bare, a_plan, b"png")
+    said = write.text(a_plan)
+    once = page.with_plan(bare, "set", said, b"png")
     assert once.count("<img") == 1 and once.count("waves") == 0
     assert "Fly." in once and once.endswith("<section>rest</section>")
-    assert page.with_plan(once, a_plan) == page.with_plan(bare, a_plan)
-    assert page.with_plan("<p>another page</p>", a_plan) == "<p>another page</p>"
+    assert page.with_plan(once, "set", said) == page.with_plan(bare, "set", said)
+    assert page.with_plan("<p>another page</p>", "set", said) == "<p>another page</p>"
+
+
+def mission_of(names: tuple[str, ...], **limits) -> Plan:
+    allowed = LIMITS.model_copy(update=limits)
+    pieces = tuple(piece(n) for n in names)
+    return Plan("set", allowed, pieces, joined(pieces, 0.01), None, (), (), ())
+
+
+def test_a_mission_goes_to_where_the_reference_turns_round() -> None:
+    plan = mission_of(("pass 0 at 0.4", "ladder"), home_deg=(47.0, 8.0))
+    assert mission.not_a_mission(plan) == ""
+    items = mission.mission(plan)["mission"]["items"]
+    assert items[0]["command"] == mission.TAKE_OFF and items[-1]["command"] == mission.RETURN
+    assert [i["doJumpId"] for i in items] == list(range(1, len(items) + 1))
+    places = np.array([i["params"][4:] for i in items if i["command"] == mission.WAYPOINT])
+    north = np.radians(places[:, 0] - 47.0) * mission.EARTH_M
+    reference = plan.reference.position_m
+    assert north.max() == pytest.approx(reference[:, 0].max(), abs=0.05)
+    assert north.min() == pytest.approx(reference[:, 0].min(), abs=0.05)
+    assert np.allclose(places[:, 1], 8.0)
+    assert places[:, 2].max() == pytest.approx(LIMITS.height_m[1] - LIMITS.wall_margin_m, abs=0.05)
+    speeds = [i["params"][1] for i in items if i["command"] == mission.SPEED]
+    assert max(speeds) == pytest.approx(0.4 * LIMITS.speed_m_s, rel=0.05)
+
+
+def test_half_a_turn_is_two_waypoints_in_one_place() -> None:
+    items = mission.mission(mission_of(("face",), home_deg=(-30.0, 20.0)))["mission"]["items"]
+    yaws = [i["params"][3] for i in items if i["command"] == mission.WAYPOINT]
+    assert 180.0 in yaws and yaws[-1] == 0.0
+
+
+def test_what_is_no_mission_says_why() -> None:
+    assert "shake" in mission.not_a_mission(mission_of(("shake all to 2 Hz", "hover"), home_deg=(47.0, 8.0)))
+    assert "home_deg" in mission.not_a_mission(mission_of(("hover",)))
 
 
 def test_the_page_that_is_written_has_the_section() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.experiment.limits import Limits, read_limits
+from rotorid.experiment.limits import Limits, SessionLimits, read_limits
 
 
 def test_without_a_file_the_usual_ones_hold() -> None:
@@ -33,6 +33,16 @@ def test_a_file_is_read_and_what_it_leaves_out_is_as_usual(tmp_path: Path) -> No
         ("wall_margin_m: 5\n", "no room"),
         ("duration_s: 1\n", "duration_s"),
         ("- speed\n", "expected lines such as"),
+        ("", "found nothing"),
+        ("speed_m_s: yes\n", "found yes or no"),
+        ("height_m: 3\n", "height_m"),
+        ("height_m: [1, 2, 3]\n", "height_m"),
+        ("tilt_deg: 90\n", "tilt_deg"),
+        ("speed_m_s: .nan\n", "speed_m_s"),
+        ("position_bandwidth_rad_s: 8\n", "does not hold"),
+        ("home_deg: [120, 7]\n", "latitude and longitude"),
+        ("3: 4\n", "limit"),
+        ("speed_m_s: 3\nspeed_m_s\n", "no YAML"),
         ("speed_m_s: [1\n", "no YAML"),
     ],
 )
@@ -41,6 +51,23 @@ def test_a_wrong_limit_ends_in_one_sentence(tmp_path: Path, text: str, said: str
     file.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=said) as caught:
         read_limits(file)
+    assert "\n" not in str(caught.value) and str(file) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("speed_m_s: 3\n", "speed_m_s is no limit; known are duration_s"),
+        ("load_share: 3\n", "load_share"),
+        ("wait_s: no\n", "found yes or no"),
+        ("duration_s: -1\n", "duration_s"),
+    ],
+)
+def test_a_wrong_limit_of_a_session_ends_in_one_sentence(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "limits.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=said) as caught:
+        read_limits(file, SessionLimits)
     assert "\n" not in str(caught.value) and str(file) in str(caught.value)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorid.experiment.questions import Hypothesis, Question
-from rotorid.experiment.separation import Information, against, interval, left_over, separations
+from rotorid.experiment.separation import Information, against, left_over, separations, spread
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.rows import Rows, Term
 
@@ -86,8 +86,19 @@ def test_copies_cannot_be_told_apart() -> None:
 
 
 def test_a_doubt_about_the_size_widens_the_interval() -> None:
-    left, at = np.array([[400.0]]), np.array([0])
-    sure = interval(Hypothesis("a", ("a/form",), np.array([0.3]), np.array([[1e-8]])), left, at)
-    unsure = interval(Hypothesis("a", ("a/form",), np.array([0.3]), np.array([[0.01]])), left, at)
+    forms = [(np.array([[400.0]]), np.array([0]))]
+    _, sure = spread(Hypothesis("a", ("a/form",), np.array([0.3]), np.array([[1e-8]])), forms)
+    _, unsure = spread(Hypothesis("a", ("a/form",), np.array([0.3]), np.array([[0.01]])), forms)
     assert sure[1] - sure[0] == pytest.approx(2 * 1.96, rel=0.15)
     assert unsure[1] - unsure[0] > 1.5 * (sure[1] - sure[0])
+
+
+def test_the_nearest_of_several_rivals_counts_in_every_draw() -> None:
+    # Each rival takes one of two coefficients over: which one is nearer is not known from the set.
+    forms = [(np.array([[400.0]]), np.array([k])) for k in (0, 1)]
+    doubtful = Hypothesis("a", ("a/form",), np.array([0.3, 0.3]), 0.01 * np.eye(2))
+    alone, _ = spread(doubtful, forms[:1])
+    both, _ = spread(doubtful, forms)
+    assert alone == pytest.approx(6.0, rel=0.05)
+    # The smaller of two normal draws lies 0.54 of their deviation (2) below the mean, by the median.
+    assert both == pytest.approx(6.0 - 0.54 * 2.0, rel=0.06)

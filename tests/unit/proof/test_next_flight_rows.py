@@ -22,6 +22,12 @@ def test_an_outcome_is_what_is_established_of_the_class(finding: Finding, outcom
     assert outcome_of(IDS, (finding,), {"rotor_drag"})[0] == outcome
 
 
+def test_what_is_untrue_beside_what_is_true_is_wrong() -> None:
+    both = (Finding("rotor_drag", "established"), Finding("frame_drag", "established"))
+    assert outcome_of(IDS, both, {"rotor_drag"})[0] == "wrong"
+    assert outcome_of(IDS, both, {"rotor_drag", "frame_drag"})[0] == "right"
+
+
 def row(case: str, outcome: str, standard: str, predicted: float, measured: float, ids: str = "a b") -> Row:
     return Row(
         case=case,
