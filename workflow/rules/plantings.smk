@@ -110,7 +110,7 @@ rule plantings:
     message:
         "The plantings are in results/plantings: plantings_summary.csv first"
     input:
-        results_behind(*rules.tabulate_plantings.output),
+        lambda wildcards: results_behind(*rules.tabulate_plantings.output),
 
 
 rule search_mistakes:

@@ -260,7 +260,7 @@ rule proof:
     message:
         "The proof is in results/proof: summary.csv first"
     input:
-        results_behind(
+        lambda wildcards: results_behind(
             *rules.score_proof.output,
             *rules.draw_proof.output,
             *rules.tabulate_real.output,

@@ -185,7 +185,7 @@ rule report:
     message:
         "The report is up to date"
     input:
-        results_behind(
+        lambda wildcards: results_behind(
             rules.typeset_pdf.output.pdf,
             rules.build_html.output.html,
             rules.record_provenance.output.provenance,
