@@ -85,7 +85,7 @@ lock: $(READY) ## resolve the dependencies of pyproject.toml anew
 
 sbom: $(READY) ## what is installed as a CycloneDX bill of materials: results/sbom.json
 	@mkdir -p results
-	@$(BIN)/cyclonedx-py environment --output-reproducible --pyproject pyproject.toml --of JSON \
+	@$(BIN)/uv tool run --from cyclonedx-bom==7.5.0 cyclonedx-py environment --output-reproducible --pyproject pyproject.toml --of JSON \
 		--output-file results/sbom.json $(BIN)/python
 	@echo "The bill of materials: results/sbom.json"
 

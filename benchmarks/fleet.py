@@ -1,11 +1,12 @@
 """A fleet of made-up recording sets, judged through the workflow: times, and whether it says what each set says alone.
 
-    python benchmarks/fleet.py make DIR [--sets 1000]        short flights of 40 vehicles, some of the sets broken
+    python benchmarks/fleet.py make DIR [--sets 1000]        flights of 40 vehicles, benches and stands, some broken
     snakemake --cores 1 fleet --config recordings=DIR        (or through a cluster's profile)
     python benchmarks/fleet.py check DIR [--sample 20]       every set there; a sample judged alone, byte by byte
 
 A vehicle hides what its number says: nothing, a drag that grows from flight to flight, a payload, a motor lag, drag and
-lag, a centre of mass beside the believed one. Every fiftieth set is broken in one of four ways.
+lag, a centre of mass beside the believed one. Every 25th set is a bench or a stand of `tests/concealed`, one
+effect each or none. Every fiftieth flight is broken in one of four ways.
 """
 
 from __future__ import annotations
@@ -26,10 +27,14 @@ from rotorid.fleet.judge import FAILED, FILES
 from rotorid.mismatch.deliver import deliver
 from rotorid.recordings import read_set, write_set
 from rotorid.templates import read
+from tests.concealed import cases
+from tests.concealed.build import build
 
-VEHICLES, EVERY_BROKEN = 40, 50
+VEHICLES, EVERY_BROKEN, EVERY_INSTRUMENT = 40, 50, 25
 FIRST_DAY = datetime.date(2026, 1, 5)
-SECONDS, FLIGHTS, EVERY = 3.0, 2, 4
+SECONDS, FLIGHTS, EVERY = 5.0, 2, 5
+"""Two flights of 5 s, a sample every fifth step of 2 ms."""
+INSTRUMENTS = "bench/single/*,stand/single/*,bench/clean/*,stand/clean/*"
 VERDICTS = Path("results/fleet/verdicts")
 
 
@@ -43,7 +48,19 @@ def hidden(vehicle: int, day: int) -> list[dict]:
 
 
 def make(folder: Path, sets: int) -> None:
-    """Write the sets, each named by vehicle and day."""
+    """Write the sets, flights named by vehicle and day."""
+    flights = sets - sets // EVERY_INSTRUMENT
+    make_flights(folder, flights)
+    offered = cases.matching(INSTRUMENTS)
+    for k in range(sets - flights):
+        case = offered[k * len(offered) // (sets - flights)]
+        with tempfile.TemporaryDirectory() as answers:
+            if not (folder / case.set_name / "vehicle.yaml").exists():
+                build(case, folder, Path(answers))
+
+
+def make_flights(folder: Path, sets: int) -> None:
+    """Write the flights."""
     thesis = read("thesis")
     for number in range(sets):
         vehicle, day = number % VEHICLES, number // VEHICLES

@@ -265,3 +265,11 @@ def test_braille_curve_by_hand():
     (line,) = [braille([0.0, 1.0, 2.0, 3.0], width=2, height=1)[0].split()[0]]
     assert [ord(c) - 0x2800 for c in line] == [0x40 | 0x20, 0x02 | 0x08]
     assert braille([], 2, 1) == []
+
+
+def test_starting_imports_nothing_that_only_analysis_needs() -> None:
+    """A person at the bench waits for it at every command: numpy is a quarter of a second, pandas and scipy more."""
+    heavy = "('numpy', 'pandas', 'scipy', 'matplotlib', 'numba')"
+    code = f"import sys, rotorid.acquire.cli; print(*[m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

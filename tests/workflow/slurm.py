@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "squeue", "sinfo")
+PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "srun", "squeue", "sinfo")
 CONFIGURATION = """
 ClusterName=test
 SlurmctldHost={host}(127.0.0.1)
@@ -68,11 +68,13 @@ def running(folder: Path) -> Iterator[dict[str, str]]:
     names = dict(host=host, folder=folder, controller=controller, node=node, memory=int(0.9 * memory))
     configuration = folder / "slurm.conf"
     configuration.write_text(CONFIGURATION.format(**names))
-    # A job's environment is cleared of the submitter's; its own srun must find this configuration, too.
-    prolog = folder / "prolog.sh"
-    prolog.write_text(f"#!/bin/sh\necho export SLURM_CONF={configuration}\n")
-    prolog.chmod(0o755)
-    environment = {**os.environ, "SLURM_CONF": str(configuration), "PATH": _path()}
+    # Snakemake's executor takes SLURM_CONF out of the environment in which a job calls srun, so that srun looks where
+    # the system's configuration lies. In a job this one stands before it and says where ours lies.
+    real = shutil.which("srun", path=_path())
+    _write_program(folder / "bin" / "srun", f'SLURM_CONF={configuration} exec {real} "$@"')
+    path = f"{folder / 'bin'}:{_path()}"
+    _write_program(folder / "prolog.sh", f"echo export PATH={path}")
+    environment = {**os.environ, "SLURM_CONF": str(configuration), "PATH": path}
     munged = ["munged", "--foreground", "--force", f"--key-file={key}", f"--socket={folder}/munge.socket"]
     munged += [f"--{name}-file={folder}/munge.{name}" for name in ("pid", "log", "seed")]
     started = []
@@ -92,6 +94,12 @@ def running(folder: Path) -> Iterator[dict[str, str]]:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+def _write_program(file: Path, line: str) -> None:
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(f"#!/bin/sh\n{line}\n")
+    file.chmod(0o755)
 
 
 def _wait_until_idle(environment: dict[str, str], folder: Path, seconds: float = 120.0) -> None:

@@ -47,25 +47,29 @@ def code_of_chapter(name):
     return code_of("run_notebook") + code_of(f"notebooks/{name}.ipynb")
 
 
+@cache
 def producers_of(path):
-    """Rules known by now that make a file, each with the results that it needs for that."""
-    return remembered_producers(path, sum(1 for _ in workflow.rules))
+    """Rules that make a file, each with the results that it needs for that; asked when all rules are known."""
+    made_by = []
+    for producer in (known for known in workflow.rules if known.is_producer(path)):
+        made_by.append(
+            (producer.name, results_read(producer.name, tuple(producer.get_wildcards(path).items())))
+        )
+    return made_by
 
 
 @cache
-def remembered_producers(path, count):
-    """The same of so many rules: files are asked about many times, and Snakemake tries every rule's pattern on each."""
-    made_by = []
-    for producer in (known for known in workflow.rules if known.is_producer(path)):
-        inputs, *_ = producer.expand_input(producer.get_wildcards(path))
-        made_by.append((producer.name, [str(file) for file in inputs if str(file).startswith("results/")]))
-    return made_by
+def results_read(name, wildcards):
+    """Results that a rule reads, by its wildcards: most rules make several files of the same."""
+    inputs, *_ = workflow.get_rule(name).expand_input(dict(wildcards))
+    return [str(file) for file in inputs if str(file).startswith("results/")]
 
 
 def results_behind(*files):
     """The files and every result that they hang on, for a target to ask for by name.
 
-    Snakemake does not miss a deleted result while what was made of it is still there.
+    Snakemake does not miss a deleted result while what was made of it is still there. For functions of a rule's input
+    alone: then only what is asked for is looked up, and with every rule known.
     """
     found, waiting = set(), list(files)
     while waiting:

@@ -105,12 +105,17 @@ rule tabulate_plantings:
         "../scripts/tabulate_plantings.py"
 
 
+def results_of_plantings(wildcards):
+    """All results that the tables of plantings hang on."""
+    return results_behind(*rules.tabulate_plantings.output)
+
+
 rule plantings:
     """Plantings in real flights: tables under results/plantings."""
     message:
         "The plantings are in results/plantings: plantings_summary.csv first"
     input:
-        results_behind(*rules.tabulate_plantings.output),
+        results_of_plantings,
 
 
 rule search_mistakes:

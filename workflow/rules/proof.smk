@@ -265,14 +265,19 @@ rule chapter_proof:
         "../scripts/run_notebook.py"
 
 
+def results_of_proof(wildcards):
+    """All results that the proof hangs on."""
+    return results_behind(
+        *rules.score_proof.output,
+        *rules.draw_proof.output,
+        *rules.tabulate_real.output,
+        *rules.chapter_proof.output,
+    )
+
+
 rule proof:
     """The whole proof: tables and figures under results/proof, and its chapter."""
     message:
         "The proof is in results/proof: summary.csv first"
     input:
-        results_behind(
-            *rules.score_proof.output,
-            *rules.draw_proof.output,
-            *rules.tabulate_real.output,
-            *rules.chapter_proof.output,
-        ),
+        results_of_proof,

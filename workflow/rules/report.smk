@@ -178,13 +178,18 @@ rule record_provenance:
         "../scripts/record_provenance.py"
 
 
+def results_of_report(wildcards):
+    """All results that the report hangs on."""
+    return results_behind(
+        rules.typeset_pdf.output.pdf,
+        rules.build_html.output.html,
+        rules.record_provenance.output.provenance,
+    )
+
+
 rule report:
     """The report and where it came from."""
     message:
         "The report is up to date"
     input:
-        results_behind(
-            rules.typeset_pdf.output.pdf,
-            rules.build_html.output.html,
-            rules.record_provenance.output.provenance,
-        ),
+        results_of_report,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rotorid import log
 from rotorid.fleet.page import make_page
-from rotorid.fleet.summary import by_effect, collect
+from rotorid.fleet.summary import by_effect, by_vehicle, collect
 from rotorid.plots.fleet import draw_fleet
 
 
@@ -23,7 +23,8 @@ def main(batches: list[str], recordings: str, tables: dict[str, str], figure: st
     draw_fleet(counts, parameters, sets, Path(figure))
     beside = Path(page).parent
     links = {f.name: os.path.relpath(f / "report.html", beside) for f in folders if (f / "report.html").is_file()}
-    text = make_page(Path(recordings).resolve().name, sets, counts, links, Path(figure))
+    name, fleet = Path(recordings).resolve().name, by_vehicle(effects, sets)
+    text = make_page(name, sets, counts, fleet, links, Path(figure))
     Path(page).write_text(text, encoding="utf-8")
 
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+from itertools import pairwise
+from statistics import fmean
 
-import numpy as np
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from rotorid.acquire.geometry import body_forces, cell_forces
 from rotorid.acquire.recorder import Recorder, Status
 
 REFRESH_HZ = 5
@@ -69,7 +70,8 @@ class Plot:
     def render(self) -> Text:
         values = list(self._values)
         # By the differences of successive samples: a load that was put on meanwhile is no noise.
-        noise = f"   noise {np.sqrt(np.mean(np.diff(values) ** 2) / 2):.3g}" if len(values) > 1 else ""
+        steps = [later - earlier for earlier, later in pairwise(values)]
+        noise = f"   noise {math.sqrt(fmean(step**2 for step in steps) / 2):.3g}" if steps else ""
         return Text(f"{self.column}{noise}\n" + "\n".join(braille(values)))
 
 
@@ -134,6 +136,11 @@ def bench_forces(recorder: Recorder) -> Text | None:
     tare, values = recorder.session.tare, recorder.status().values
     if recorder.instrument.name != "bench" or not tare or not values:
         return None
+    # Here alone is numpy needed: it is a quarter of the time that every command takes to start.
+    import numpy as np
+
+    from rotorid.acquire.geometry import body_forces, cell_forces
+
     volts = np.array(values) - np.array([tare[column] for column in recorder.instrument.columns])
     forces = body_forces(cell_forces(volts))
     text = "   ".join(f"{name} {value:8.3f}" for name, value in zip("xyz", forces, strict=True))

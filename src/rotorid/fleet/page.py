@@ -16,37 +16,52 @@ body { font: 15px/1.45 system-ui, sans-serif; max-width: 70rem; margin: 2rem aut
 table { border-collapse: collapse; width: 100%; margin: .5rem 0 2rem; }
 th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #ddd; vertical-align: top; }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }
-svg { max-width: 100%; height: auto; }
+svg { max-width: 100%; height: auto; background: #fff; }
+.wide { overflow-x: auto; }
+summary { cursor: pointer; margin: .5rem 0; }
+td { overflow-wrap: break-word; }
+td:last-child:not(.number) { min-width: 9rem; }
 .failed, .unexplained { color: #a40000; }
 </style></head><body>
 <h1>Fleet: {{ name }}</h1>
 <p>{{ total }} sets of {{ vehicles }} vehicles: {{ words }}. <b>{{ people }}</b> need a person.</p>
 <h2>What shows</h2>
 {{ figure }}
-<table><tr><th>effect</th><th class="number">established</th><th class="number">ambiguous</th>
+<div class="wide"><table><tr><th>effect</th><th class="number">established</th><th class="number">ambiguous</th>
 <th class="number">suggested</th><th class="number">vehicles</th></tr>
 {% for row in counts %}<tr><td>{{ row.effect }}</td><td class="number">{{ row.established }}</td>
 <td class="number">{{ row.ambiguous }}</td><td class="number">{{ row.suggested }}</td>
 <td class="number">{{ row.vehicles }}</td></tr>
-{% endfor %}</table>
+{% endfor %}</table></div>
+<h2>Vehicles</h2>
+<div class="wide"><table><tr><th>vehicle</th><th class="number">sets</th><th class="number">failed</th>
+<th class="number">need a person</th><th>established, in how many sets</th><th>last verdict</th></tr>
+{% for row in fleet %}<tr><td>{{ row.vehicle }}</td><td class="number">{{ row.sets }}</td>
+<td class="number">{{ row.failed or "" }}</td><td class="number">{{ row.person or "" }}</td><td>{{ row.effects }}</td>
+<td class="{{ row.last }}">{{ row.last.replace("_", " ") }}</td></tr>
+{% endfor %}</table></div>
 <h2>Need a person</h2>
-{% if looked %}<table><tr><th>set</th><th>vehicle</th><th>verdict</th><th>why</th><th>what it says</th></tr>
+{% if looked %}<div class="wide"><table>
+<tr><th>set</th><th>vehicle</th><th>verdict</th><th>why</th><th>what it says</th></tr>
 {% for row in looked %}<tr><td>{% if row.verdict == "failed" %}{{ row.set }}{% else %}
 <a href="{{ row.link }}">{{ row.set }}</a>{% endif %}</td>
 <td>{{ row.vehicle }}</td><td class="{{ row.verdict }}">{{ row.verdict.replace("_", " ") }}</td>
 <td>{{ row.person }}</td>
 <td>{{ row.sentence }}</td></tr>
-{% endfor %}</table>{% else %}<p>None.</p>{% endif %}
+{% endfor %}</table></div>{% else %}<p>None.</p>{% endif %}
 <h2>Stand by themselves</h2>
-<table><tr><th>set</th><th>vehicle</th><th>verdict</th><th>effects</th></tr>
+{% if alone %}<details{% if alone|length <= 50 %} open{% endif %}><summary>{{ alone|length }} sets</summary>
+<div class="wide"><table><tr><th>set</th><th>vehicle</th><th>verdict</th><th>effects</th></tr>
 {% for row in alone %}<tr><td><a href="{{ row.link }}">{{ row.set }}</a></td><td>{{ row.vehicle }}</td>
 <td>{{ row.verdict.replace("_", " ") }}</td><td>{{ row.effects }}</td></tr>
-{% endfor %}</table>
+{% endfor %}</table></div></details>{% else %}<p>None.</p>{% endif %}
 </body></html>
 """
 
 
-def make_page(name: str, sets: pd.DataFrame, counts: pd.DataFrame, links: dict[str, str], figure: Path) -> str:
+def make_page(
+    name: str, sets: pd.DataFrame, counts: pd.DataFrame, fleet: pd.DataFrame, links: dict[str, str], figure: Path
+) -> str:
     """The page of a fleet from its tables (`rotorid.fleet.summary`); `links` lead to each set's own page."""
     rows = [{**row, "link": links.get(row["set"], "")} for row in sets.to_dict("records")]
     words = sets["verdict"].value_counts()
@@ -62,6 +77,7 @@ def make_page(name: str, sets: pd.DataFrame, counts: pd.DataFrame, links: dict[s
             people=int((sets["person"] != "").sum()),
             figure=Markup(drawn[drawn.index("<svg") :]),
             counts=counts.to_dict("records"),
+            fleet=fleet.to_dict("records"),
             looked=[row for row in rows if row["person"]],
             alone=[row for row in rows if not row["person"]],
         )

@@ -106,6 +106,27 @@ def by_effect(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
     return table.sort_values([*SHOWN, "effect"], ascending=[False] * 3 + [True], ignore_index=True)
 
 
+def by_vehicle(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
+    """One row a vehicle: `vehicle`, `sets`, `failed`, `person` (how many need one), `effects` (established, and in how
+    many sets, the most frequent first), `last` (verdict of its last set by day and name)."""
+    sure = effects[effects["status"] == "established"]
+    rows = []
+    for name, own in sets.sort_values(["day", "set"]).groupby("vehicle"):
+        counts = sure.loc[sure["vehicle"] == name, "effect"].value_counts()
+        ordered = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
+        rows.append(
+            {
+                "vehicle": name,
+                "sets": len(own),
+                "failed": int((own["verdict"] == "failed").sum()),
+                "person": int((own["person"] != "").sum()),
+                "effects": ", ".join(f"{effect} {count}" for effect, count in ordered),
+                "last": own["verdict"].iloc[-1],
+            }
+        )
+    return pd.DataFrame(rows, columns=["vehicle", "sets", "failed", "person", "effects", "last"])
+
+
 def day_of(name: str) -> str:
     """Day in the name of a set as YYYY-MM-DD, else empty."""
     found = DATE.search(name)

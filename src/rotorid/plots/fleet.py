@@ -11,13 +11,15 @@ from rotorid.plots import style
 
 MOST_EFFECTS = 15
 MOST_PARAMETERS = 4
+MOST_NAMED = 6
+"""Vehicles that still have a colour each."""
 WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
 
 
 def draw_fleet(counts: pd.DataFrame, parameters: pd.DataFrame, sets: pd.DataFrame, path: Path) -> None:
     """Bars of `counts` (`rotorid.fleet.summary.by_effect`), and below them the numbers most often established.
 
-    Each number stands at its set's place in the order of day and name, with its interval (95 %).
+    Each number stands at its set's day, or its place in the order of day and name, with its interval (95 %).
     """
     shown = counts.head(MOST_EFFECTS).iloc[::-1]
     numbers = most_frequent(parameters)
@@ -50,20 +52,34 @@ def bars(axis, shown: pd.DataFrame, sets: pd.DataFrame) -> None:
     judged = int((sets["verdict"] != "failed").sum())
     axis.set_xlabel(f"sets, of {judged} judged")
     if len(shown):
-        axis.legend(loc="lower right")
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     else:
         axis.text(0.5, 0.5, "no effect in any set", ha="center", transform=axis.transAxes)
         axis.set_yticks([])
 
 
 def over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> None:
-    """One number with its interval in each set that states it."""
-    place = own["set"].map(order).to_numpy()
-    value, low, high = (own[c].to_numpy(float) for c in ("value", "low_95", "high_95"))
-    axis.errorbar(
-        place, value, [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)], fmt=".", color=style.BLUE, lw=0.8
-    )
+    """One number with its interval in each set that states it, the sets of a vehicle joined by a line.
+
+    Over the day where every set has one, else over the place in the order of day and name. Vehicles have a colour and a
+    name each where they are few.
+    """
+    dated = bool((own["day"] != "").all()) and own["day"].nunique() > 1
+    vehicles = sorted(own["vehicle"].unique())
+    few = len(vehicles) <= MOST_NAMED
+    for number, vehicle in enumerate(vehicles):
+        part = own[own["vehicle"] == vehicle].sort_values(["day", "set"])
+        place = pd.to_datetime(part["day"]).to_numpy() if dated else part["set"].map(order).to_numpy()
+        value, low, high = (part[c].to_numpy(float) for c in ("value", "low_95", "high_95"))
+        colour = style.CYCLE[number] if few else style.BLUE
+        bars = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
+        axis.errorbar(place, value, bars, fmt=".-", ms=3, color=colour, lw=0.4, elinewidth=0.8, label=vehicle)
     unit = own["unit"].iloc[0]
     axis.set_ylabel(own["parameter"].iloc[0] + (f"\n({unit})" if unit and unit != "1" else ""))
-    axis.set_xlim(0.0, count + 1.0)
-    axis.set_xlabel("set, in order of day and name")
+    if dated:
+        axis.tick_params(axis="x", rotation=20)
+    else:
+        axis.set_xlim(0.0, count + 1.0)
+        axis.set_xlabel("set, in order of day and name")
+    if few and len(vehicles) > 1:
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rotorid.fleet.page import make_page
-from rotorid.fleet.summary import by_effect, collect, day_of
+from rotorid.fleet.summary import by_effect, by_vehicle, collect, day_of
 from rotorid.plots.fleet import draw_fleet
 
 
@@ -76,6 +76,15 @@ def test_effects_are_counted_and_numbers_listed_with_their_intervals(fleet) -> N
     assert parameters[parameters["parameter"] == "mass_kg"]["value"].tolist() == [1.1]
 
 
+def test_each_vehicle_with_what_its_sets_establish(fleet) -> None:
+    sets, effects, _ = collect(*fleet)
+    table = by_vehicle(effects, sets).set_index("vehicle")
+    assert table.loc["heron", ["sets", "failed", "person", "effects"]].tolist() == [2, 0, 0, "rotor_drag 2"]
+    assert table.loc["swift", ["sets", "person", "effects"]].tolist() == [3, 3, "axis_sign 1, rotor_drag 1"]
+    assert table.loc["swift", "last"] == "unexplained"
+    assert table.loc["broken", ["failed", "effects", "last"]].tolist() == [1, "", "failed"]
+
+
 @pytest.mark.parametrize(
     ("name", "day"),
     [("a-2026-11-03-b", "2026-11-03"), ("20261103", "2026-11-03"), ("run12026110399", ""), ("2026-13-01", "")],
@@ -90,7 +99,8 @@ def test_the_page_shows_everything_and_the_same_twice(fleet, tmp_path: Path) -> 
     for name in ("one", "two"):
         figure = tmp_path / f"{name}.svg"
         draw_fleet(by_effect(effects, sets), parameters, sets, figure)
-        pages.append(make_page("sets", sets, by_effect(effects, sets), {"swift_later": "there/report.html"}, figure))
+        tables = sets, by_effect(effects, sets), by_vehicle(effects, sets)
+        pages.append(make_page("sets", *tables, {"swift_later": "there/report.html"}, figure))
     assert pages[0] == pages[1]
     assert "6 sets of 3 vehicles" in pages[0] and "<b>4</b> need a person" in pages[0]
     assert "&lt;swift_20261102&gt;" in pages[0] and "<svg" in pages[0]
@@ -102,4 +112,6 @@ def test_a_fleet_without_any_verdict(tmp_path: Path) -> None:
     (tmp_path / "broken" / "failed.json").write_text(json.dumps({"reason": "empty", "fault": True}))
     sets, effects, parameters = collect([tmp_path / "broken"], tmp_path)
     draw_fleet(by_effect(effects, sets), parameters, sets, tmp_path / "f.svg")
-    assert "0 sets" not in make_page("x", sets, by_effect(effects, sets), {}, tmp_path / "f.svg")
+    assert "0 sets" not in make_page(
+        "x", sets, by_effect(effects, sets), by_vehicle(effects, sets), {}, tmp_path / "f.svg"
+    )
