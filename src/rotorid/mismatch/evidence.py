@@ -138,11 +138,13 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: 
     if finding.status not in CLAIMED or finding.id not in analysis.without:
         return finding
     without = analysis.without[finding.id]
-    found = evidence(analysis, without, held, finding.channels)
+    # What lies between command and speed moves every channel that the rotors act on.
+    acts_on = finding.channels if finding.form else ()
+    found = evidence(analysis, without, held, acts_on)
     if finding.windows and not found.ratios:
         # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
         windows = [in_windows(t, finding.windows) for t in analysis.traces]
-        found = evidence(analysis, without, windows, finding.channels)
+        found = evidence(analysis, without, windows, acts_on)
     nothing = rules.MAY_BE_NOTHING(not away_from_nothing(finding))
     reason = found.objection or found.undone_by(whole) or ("every number of it may be nothing" if nothing else "")
     slight = found.ratios and found.ratios[0].value > PLAIN_RATIO

@@ -19,10 +19,15 @@ from rotorid.mismatch.wrench import WrenchModel
 from rotorid.recordings import RecordingSet, Vehicle, columns
 
 IN_QUESTION = {
-    "payload": {"mass_kg", "thrust_coefficient_n_s2"},
+    "payload": {
+        "mass_kg",
+        "thrust_coefficient_n_s2",
+        "torque_coefficient_n_m_s2",
+        *(f"inertia_{axis}_kg_m2" for axis in ("xx", "yy", "zz")),
+    },
     "throttle_curve": {"thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s"},
 }
-"""Values that an id would change by itself; thrust in a payload's is its ratio to the mass."""
+"""Values that an id would change by itself; thrust and torque in a payload's are their ratios to mass and inertia."""
 
 
 def believed_value(vehicle: Vehicle, key: str) -> float:
