@@ -1,0 +1,46 @@
+"""A release proof goes into the kept tables once, beside what is there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from rotorid.errors import InputError
+from rotorid.proof.keep_release import keep
+
+DATE = "2026-11-26"
+
+
+def tables(folder: Path, dates: list[str], right: int) -> Path:
+    folder.mkdir()
+    pd.DataFrame({"family": ["gust"] * len(dates), "released": dates, "right": right}).to_csv(
+        folder / "families.csv", index=False
+    )
+    pd.DataFrame({"case": [f"multibody/gust/{d}/000" for d in dates], "released": dates}).to_csv(
+        folder / "cases.csv", index=False
+    )
+    ids = ["single_named", *(f"multibody_{d}_right" for d in dates if d)]
+    pd.DataFrame({"id": ids, "value": float(right)}).to_csv(folder / "summary.csv", index=False)
+    (folder / "state.json").write_text(json.dumps({"cases": 1, "released": []}))
+    return folder
+
+
+def test_rows_of_the_date_are_replaced_and_the_rest_stays(tmp_path):
+    kept = tables(tmp_path / "kept", [""], right=0)
+    for name, right in (("first", 1), ("second", 2)):
+        assert keep(tables(tmp_path / name, [DATE], right), kept, DATE) == 1
+    summary = pd.read_csv(kept / "summary.csv").set_index("id")["value"]
+    assert summary.to_dict() == {"single_named": 0.0, f"multibody_{DATE}_right": 2.0}
+    families = pd.read_csv(kept / "families.csv").fillna("")
+    assert families[["released", "right"]].to_numpy().tolist() == [["", 0], [DATE, 2]]
+    assert len(pd.read_csv(kept / "cases.csv")) == 2
+    assert json.loads((kept / "state.json").read_text()) == {"cases": 1, "released": [DATE]}
+
+
+def test_a_proof_without_the_date_is_refused(tmp_path):
+    kept = tables(tmp_path / "kept", [""], right=0)
+    with pytest.raises(InputError, match="no case is of the release 2026-11-27"):
+        keep(tables(tmp_path / "fresh", [DATE], 1), kept, "2026-11-27")
