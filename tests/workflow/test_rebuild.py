@@ -113,10 +113,10 @@ def test_a_chapter_that_is_not_there_is_named(project: Project) -> None:
     assert "report.chapters names introducton, but there is no notebooks/introducton.md" in said
 
 
-def test_a_failing_job_leaves_its_traceback_in_its_log(project: Project) -> None:
+def test_a_failing_job_leaves_its_one_sentence_in_its_log(project: Project) -> None:
     with edited(project.root / "notebooks/introduction.md", "## Axes", "{{ nowhere.value }}\n\n## Axes"):
         project.snakemake("results/report/chapters/introduction.md", succeeds=False)
     log = (project.root / "results/logs/render_chapter/introduction.log").read_text()
-    assert "Traceback" in log
+    assert "Traceback" not in log  # of what the user can mend; a fault of the code leaves one (test_log.py)
     assert "introduction.md, line " in log
     assert "'nowhere' is undefined" in log

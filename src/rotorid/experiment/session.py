@@ -22,7 +22,7 @@ from rotorid.experiment.questions import Question, question_of
 from rotorid.experiment.separation import Information, Separation, of_set, separations
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
-from rotorid.mismatch.instrument.decide import findings_of, with_plainer_forms
+from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, everything, fitted_model, whole_reading
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
@@ -121,7 +121,7 @@ def known_instrument(recordings: RecordingSet) -> KnownInstrument:
     model = with_plainer_forms(model, among)
     holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
-    for finding in (*findings_of(model), *(() if chain is None else chain.findings)):
+    for finding in (*reading_findings(model), *(() if chain is None else chain.findings)):
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if not ids or any(set(ids) == set(q.ids) for q in questions):
             continue
