@@ -1,6 +1,6 @@
 """A release proof into the tables that are kept: `python -m rotorid.proof.keep_release results/proof docs/proof DATE`.
 
-Rows of the date replace those that were kept of it; everything else stays. Counted in totals are only the kept cases.
+Rows of the date replace those that were kept of it; everything else stays. Targets are counted anew, cases are not.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.errors import InputError
+from rotorid.proof import table
 
 
 def merged(kept: pd.DataFrame, fresh: pd.DataFrame, of_date: Callable[[pd.DataFrame], pd.Series]) -> pd.DataFrame:
@@ -39,9 +40,17 @@ def keep(fresh: Path, kept: Path, date: str) -> int:
         merged(pd.read_csv(kept / name), tables[name], of_date).to_csv(kept / name, index=False, float_format="%.6g")
     path = kept / "state.json"
     state = json.loads(path.read_text(encoding="utf-8"))
-    state["released"] = sorted({*state["released"], date})
+    state |= {"released": sorted({*state["released"], date}), **targets(pd.read_csv(kept / "summary.csv"))}
     path.write_text(json.dumps(state, indent=1) + "\n", encoding="utf-8")
     return count
+
+
+def targets(summary: pd.DataFrame) -> dict[str, int | list[str]]:
+    """How many rows have a target, how many of these hold or are open, and what those are about that fail."""
+    holds = summary["holds"]
+    missed = summary.loc[holds == table.FAILS, "what"].tolist()
+    met, undecided = int((holds == table.HOLDS).sum()), int((holds == table.OPEN).sum())
+    return {"targets": int(holds.notna().sum()), "met": met, "open": undecided, "missed": missed}
 
 
 def main() -> int:

@@ -23,7 +23,8 @@ def tables(folder: Path, dates: list[str], right: int) -> Path:
         folder / "cases.csv", index=False
     )
     ids = ["single_named", *(f"multibody_{d}_right" for d in dates if d)]
-    pd.DataFrame({"id": ids, "value": float(right)}).to_csv(folder / "summary.csv", index=False)
+    rows = {"id": ids, "what": ids, "value": float(right), "holds": ["not refuted", *["fails"] * (len(ids) - 1)]}
+    pd.DataFrame(rows).to_csv(folder / "summary.csv", index=False)
     (folder / "state.json").write_text(json.dumps({"cases": 1, "released": []}))
     return folder
 
@@ -37,7 +38,8 @@ def test_rows_of_the_date_are_replaced_and_the_rest_stays(tmp_path):
     families = pd.read_csv(kept / "families.csv").fillna("")
     assert families[["released", "right"]].to_numpy().tolist() == [["", 0], [DATE, 2]]
     assert len(pd.read_csv(kept / "cases.csv")) == 2
-    assert json.loads((kept / "state.json").read_text()) == {"cases": 1, "released": [DATE]}
+    counted = {"targets": 2, "met": 0, "open": 1, "missed": [f"multibody_{DATE}_right"]}
+    assert json.loads((kept / "state.json").read_text()) == {"cases": 1, "released": [DATE], **counted}
 
 
 def test_a_proof_without_the_date_is_refused(tmp_path):
