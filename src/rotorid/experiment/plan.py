@@ -29,6 +29,7 @@ from rotorid.experiment.separation import (
     of_flight,
     of_set,
     separations,
+    smallest_separation,
     step_of,
     world_of,
 )
@@ -85,7 +86,7 @@ class Plan:
     @property
     def sigma(self) -> float:
         """Smallest separation expected over all questions; 0 without any."""
-        return min((s.sigma for _, found in self.questions for s in found), default=0.0)
+        return smallest_separation(self.questions)
 
     @property
     def settles(self) -> bool:

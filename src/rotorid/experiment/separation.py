@@ -299,3 +299,12 @@ def chain_separations(known: Known, information: Information) -> list[tuple[tupl
                 found[true.id] = Separation(true.id, rival.id, sigma, chain_interval(sigma, true.doubt), 0.0)
         out.append((question.ids, tuple(found.values())))
     return out
+
+
+Questions = tuple[tuple[tuple[str, ...], tuple[Separation, ...]], ...]
+"""Ids of each open question, and how far apart their models will be."""
+
+
+def smallest_separation(questions: Questions) -> float:
+    """Smallest separation expected over all questions; 0 without any."""
+    return min((s.sigma for _, found in questions for s in found), default=0.0)

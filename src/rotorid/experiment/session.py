@@ -19,7 +19,7 @@ from rotorid.errors import InputError
 from rotorid.experiment.limits import SessionLimits
 from rotorid.experiment.plan import Tried, chosen_pieces
 from rotorid.experiment.questions import Question, question_of
-from rotorid.experiment.separation import Information, Separation, of_set, separations
+from rotorid.experiment.separation import Information, Separation, of_set, separations, smallest_separation
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
 from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
@@ -94,7 +94,7 @@ class SessionPlan:
     @property
     def sigma(self) -> float:
         """Smallest separation expected over all questions; 0 without any."""
-        return min((s.sigma for _, found in self.questions for s in found), default=0.0)
+        return smallest_separation(self.questions)
 
     @property
     def settles(self) -> bool:

@@ -18,7 +18,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.experiment import mission
 from rotorid.experiment.by_hand import by_hand
 from rotorid.experiment.plan import Plan
-from rotorid.experiment.separation import Separation
+from rotorid.experiment.separation import Questions, Separation
 from rotorid.writing import all_or_none, rounded
 
 FILE_HZ = 100.0
@@ -125,6 +125,27 @@ def outcome(separation: Separation, target: float) -> str:
     )
 
 
+def questions_as_data(questions: Questions, target: float) -> list[dict]:
+    """Open questions with what each outcome would mean, for JSON; `target` is the separation that settles one."""
+    return [
+        {
+            "ids": list(ids),
+            "outcomes": [
+                {
+                    "true": s.true,
+                    "rival": s.rival,
+                    "sigma": s.sigma,
+                    "interval_95": list(s.interval_95),
+                    "so_far_sigma": s.so_far,
+                    "meaning": outcome(s, target),
+                }
+                for s in found
+            ],
+        }
+        for ids, found in questions
+    ]
+
+
 def summary(plan: Plan) -> dict:
     """The plan as data, for `plan.json` and for pages."""
     return rounded(
@@ -134,23 +155,7 @@ def summary(plan: Plan) -> dict:
             "duration_s": plan.duration_s,
             "predicted_separation_sigma": plan.sigma,
             "manoeuvres": [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in plan.pieces],
-            "questions": [
-                {
-                    "ids": list(ids),
-                    "outcomes": [
-                        {
-                            "true": s.true,
-                            "rival": s.rival,
-                            "sigma": s.sigma,
-                            "interval_95": list(s.interval_95),
-                            "so_far_sigma": s.so_far,
-                            "meaning": outcome(s, plan.limits.target_sigma),
-                        }
-                        for s in found
-                    ],
-                }
-                for ids, found in plan.questions
-            ],
+            "questions": questions_as_data(plan.questions, plan.limits.target_sigma),
             "intervals": [
                 {"name": w.name, "unit": w.unit, "half_width_before": w.before, "half_width_after": w.after}
                 | ({"wished": w.wished} if w.wished else {})

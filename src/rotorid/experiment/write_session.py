@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorid.experiment.by_hand import by_hand
 from rotorid.experiment.session import SessionPlan, words_of_steps
-from rotorid.experiment.write import outcome, words_of
+from rotorid.experiment.write import outcome, questions_as_data, words_of
 from rotorid.plots.style import BLUE, GREY, ORANGE, RED, figure, use
 from rotorid.recordings import columns as c
 from rotorid.writing import all_or_none, rounded
@@ -63,23 +63,7 @@ def summary(plan: SessionPlan) -> dict:
                 }
                 for i, s in enumerate(plan.steps)
             ],
-            "questions": [
-                {
-                    "ids": list(ids),
-                    "outcomes": [
-                        {
-                            "true": s.true,
-                            "rival": s.rival,
-                            "sigma": s.sigma,
-                            "interval_95": list(s.interval_95),
-                            "so_far_sigma": s.so_far,
-                            "meaning": outcome(s, plan.limits.target_sigma),
-                        }
-                        for s in found
-                    ],
-                }
-                for ids, found in plan.questions
-            ],
+            "questions": questions_as_data(plan.questions, plan.limits.target_sigma),
             "not_by_loading": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
             "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
             "limits": plan.limits.model_dump(mode="json"),

@@ -103,7 +103,7 @@ def weighed(analysis: Analysis) -> Analysis:
         found = evidence(analysis, left, held)
         if why := found.contradiction or found.undone_by(whole):
             against |= {n: why for n in names if n not in against}
-    doubtful = {n: (analysis.values[n], why) for n, why in against.items() if why}
+    doubtful = {n: (analysis.values[n], why) for n, why in against.items()}
     values = {n: v for n, v in analysis.values.items() if n not in doubtful}
     return replace(analysis, findings=findings, shares=shares, values=values, suggested_values=doubtful)
 

@@ -108,7 +108,7 @@ class Analysis:
     without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
     """To the id of a stated effect what is left of every trace without it, all else fitted anew."""
     without_values: Mapping[tuple[str, ...], tuple[np.ndarray, ...]] = field(default_factory=dict)
-    """To the name of a wrong value what is left of every trace with it as believed, all else fitted anew."""
+    """To the names of a wrong value, and of every two, what is left of every trace with them as believed."""
     suggested_values: Mapping[str, tuple[tuple[float, float, float, float], str]] = field(default_factory=dict)
     """Values that the runs held out do not bear out: as in `values`, and why."""
     shares: Mapping[str, float] = field(default_factory=dict)

@@ -8,6 +8,13 @@ from rotorid.errors import InputError
 from rotorid.experiment.limits import Limits, SessionLimits, read_limits
 
 
+def refused_in_one_sentence(file: Path, text: str, said: str, kind: type = Limits) -> None:
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=said) as caught:
+        read_limits(file, kind)
+    assert "\n" not in str(caught.value) and str(file) in str(caught.value)
+
+
 def test_without_a_file_the_usual_ones_hold() -> None:
     assert read_limits(None) == Limits()
 
@@ -47,11 +54,7 @@ def test_a_file_is_read_and_what_it_leaves_out_is_as_usual(tmp_path: Path) -> No
     ],
 )
 def test_a_wrong_limit_ends_in_one_sentence(tmp_path: Path, text: str, said: str) -> None:
-    file = tmp_path / "limits.yaml"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=said) as caught:
-        read_limits(file)
-    assert "\n" not in str(caught.value) and str(file) in str(caught.value)
+    refused_in_one_sentence(tmp_path / "limits.yaml", text, said)
 
 
 @pytest.mark.parametrize(
@@ -64,11 +67,7 @@ def test_a_wrong_limit_ends_in_one_sentence(tmp_path: Path, text: str, said: str
     ],
 )
 def test_a_wrong_limit_of_a_session_ends_in_one_sentence(tmp_path: Path, text: str, said: str) -> None:
-    file = tmp_path / "limits.yaml"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=said) as caught:
-        read_limits(file, SessionLimits)
-    assert "\n" not in str(caught.value) and str(file) in str(caught.value)
+    refused_in_one_sentence(tmp_path / "limits.yaml", text, said, SessionLimits)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
