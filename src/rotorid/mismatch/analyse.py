@@ -50,6 +50,7 @@ from rotorid.mismatch.wrench import WrenchModel, chosen, nonlinear_intervals
 from rotorid.recordings import RecordingSet
 
 UNITS = {"force": "N", "moment": "N m"}
+SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
 SURELY_HEAVIER = 2.0
 """Standard errors by which a vehicle must be heavier than believed to carry a payload."""
 TIMING_FLOOR = 0.05
@@ -126,7 +127,9 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         delivered if strained else None,
         claimed,
     )
-    traces = make_traces(seen, found, residuals_of(seen, plain_fit), delivered)
+    refitted_left = residuals_of(seen, plain_fit)
+    traces = make_traces(seen, found, refitted_left, delivered)
+    between = sensor_traces(seen, refitted_left, delivered)
     analysis = Analysis(
         recordings=recordings,
         split=split,
@@ -137,8 +140,9 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         values={**contract_values(prepared.vehicle, told), **scale},
         not_testable=not_testable(prepared, found.chain, findings),
         traces=traces,
-        without=without_each(found, seen, values, fit, findings, traces),
-        without_values=without_values(model, seen, values, moved, names_of(told), traces),
+        between_sensors=between,
+        without=without_each(found, seen, values, fit, findings, (*traces, *between)),
+        without_values=without_values(model, seen, values, moved, names_of(told), (*traces, *between)),
         noise_floor=noise_floors(prepared, found),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(seen.segments, seen.prepared),
@@ -351,6 +355,19 @@ def make_traces(
     return tuple(out)
 
 
+def sensor_traces(model: WrenchModel, refitted: list[np.ndarray], delivered: list[np.ndarray]) -> tuple[Trace, ...]:
+    """The same of two sensors of one quantity: reading of one less what the other makes of it.
+
+    Offsets of the sensors, which no vehicle states, are taken out before, too.
+    """
+    return tuple(
+        Trace(r.run, CHANNELS[c], SENSOR_UNITS[c // 3], r.time_s, plain[:, c], plain[:, c], after[:, c])
+        for r, plain, after in zip(model.rows, refitted, delivered, strict=True)
+        for c in range(6, 12)
+        if np.isfinite(r.y[:, c]).all()
+    )
+
+
 def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
     """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain.
 
@@ -358,7 +375,7 @@ def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
     """
     model, chain = found.model, found.chain
     own = sensor_floor(model)
-    out = {CHANNELS[c]: float(max(model.floor[c], own[c])) for c in range(6) if np.isfinite(model.floor[c])}
+    out = {name: float(max(model.floor[c], own[c])) for c, name in enumerate(CHANNELS) if np.isfinite(model.floor[c])}
     if chain is not None and found.measured:
         out |= {f"rotor_speed_{i + 1}": float(sd) for i, sd in enumerate(speed_floor(found))}
     return out

@@ -94,9 +94,9 @@ class Evidence:
 def weighed(analysis: Analysis) -> Analysis:
     """The analysis with gains on the runs held out, and with the words of its effects and values that these allow."""
     part = fitted_part(analysis)
-    held = [part(t.run, t.time_s) < 0 for t in analysis.traces]
+    held = [part(t.run, t.time_s) < 0 for t in analysis.compared]
     shares = effect_shares(analysis, held)
-    whole = evidence(analysis, tuple(t.before for t in analysis.traces), held)
+    whole = evidence(analysis, tuple(t.before for t in analysis.compared), held)
     findings = tuple(judged(f, analysis, held, shares.get(f.id, 0.0), whole) for f in analysis.findings)
     against: dict[str, str] = {}
     for names, left in analysis.without_values.items():
@@ -117,14 +117,14 @@ def effect_shares(analysis: Analysis, held: list[np.ndarray]) -> dict[str, float
 
     def energy(parts: Sequence[np.ndarray]) -> float:
         sums: dict[str, np.ndarray] = {}
-        for trace, own, mask in zip(analysis.traces, parts, held, strict=True):
+        for trace, own, mask in zip(analysis.compared, parts, held, strict=True):
             new = np.array([np.nansum(own[mask] ** 2), np.isfinite(own[mask]).sum()])
             sums[trace.channel] = sums.get(trace.channel, np.zeros(2)) + new
         return sum(
             s[0] / max(s[1], 1) / analysis.noise_floor[c] ** 2 for c, s in sums.items() if analysis.noise_floor.get(c)
         )
 
-    before, after = (energy([getattr(t, stage) for t in analysis.traces]) for stage in ("before", "after"))
+    before, after = (energy([getattr(t, stage) for t in analysis.compared]) for stage in ("before", "after"))
     if before <= after:
         return dict.fromkeys(analysis.without, 0.0)
     return {i: float(np.clip((energy(x) - after) / (before - after), 0.0, 1.0)) for i, x in analysis.without.items()}
@@ -143,7 +143,7 @@ def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: 
     found = evidence(analysis, without, held, acts_on)
     if finding.windows and not found.ratios:
         # What acts in a window of one run alone (a gust) belongs to that run and is judged there.
-        windows = [in_windows(t, finding.windows) for t in analysis.traces]
+        windows = [in_windows(t, finding.windows) for t in analysis.compared]
         found = evidence(analysis, without, windows, acts_on)
     nothing = rules.MAY_BE_NOTHING(not away_from_nothing(finding))
     reason = found.objection or found.undone_by(whole) or ("every number of it may be nothing" if nothing else "")
@@ -170,10 +170,11 @@ def evidence(
     """What rows held out (masks of the traces) say of an effect, given what is left of the traces without it.
 
     Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
-    without it; where none of them is compared (an accelerometer's error), those that differ most.
+    without it, and what two sensors say of each other: a wrong mass makes up for an accelerometer's scale in the force,
+    never there. Where none of its channels is compared, those that differ most.
     """
     size: dict[str, list[float]] = {}
-    for trace, left, mask in zip(analysis.traces, without, held, strict=True):
+    for trace, left, mask in zip(analysis.compared, without, held, strict=True):
         added = (left - trace.after) ** 2
         own = size.setdefault(trace.channel, [0.0, 0.0, 0.0, 0.0])
         own[0], own[1] = own[0] + float(np.nansum(added[mask])), own[1] + int(mask.sum())
@@ -184,7 +185,9 @@ def evidence(
     strongest = max(here.values(), default=0.0)
     if strongest <= LEAST_EXCITED * max(there.values(), default=0.0):
         return Evidence()
-    acting = [c for c in here if c in acts_on] or [c for c in here if here[c] > ACTS * strongest]
+    sensors = {t.channel for t in analysis.between_sensors}
+    differing = [c for c in here if here[c] > ACTS * strongest]
+    acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
     ratios = [r for r in (ratio_of(analysis, without, held, c) for c in acting) if r is not None]
     beyond = any(here[c] * noise[c] > leftover_rms(analysis, held, c) for c in acting)
     return Evidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
@@ -192,7 +195,7 @@ def evidence(
 
 def leftover_rms(analysis: Analysis, held: list[np.ndarray], channel: str) -> float:
     """What the model leaves of a channel beyond its noise on masked rows, root mean square in the channel's unit."""
-    pairs = [(t, m) for t, m in zip(analysis.traces, held, strict=True) if t.channel == channel and m.any()]
+    pairs = [(t, m) for t, m in zip(analysis.compared, held, strict=True) if t.channel == channel and m.any()]
     if not pairs:
         return 0.0
     left = np.concatenate([t.after[m] for t, m in pairs])
@@ -204,7 +207,7 @@ def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], held: list[np.
 
     Blocks are drawn anew for the interval. What acts for a short time is judged in shorter blocks.
     """
-    parts = zip(analysis.traces, without, held, strict=True)
+    parts = zip(analysis.compared, without, held, strict=True)
     own = [(t, left - t.after, m) for t, left, m in parts if t.channel == channel]
     for block_s in BLOCKS_S:
         energies = np.array([e for t, added, m in own for e in block_energies(t, added, m, block_s)]).reshape(-1, 3)

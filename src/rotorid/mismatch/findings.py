@@ -105,10 +105,12 @@ class Analysis:
     """Channel to p-value that the residual does not depend on the inputs, before and after."""
     regimes: dict[str, dict[str, np.ndarray]]
     """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
+    between_sensors: tuple[Trace, ...] = ()
+    """Two sensors of one quantity compared (`accelerometer_x` … `gyroscope_z`): effects are judged by them, too."""
     without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
-    """To the id of a stated effect what is left of every trace without it, all else fitted anew."""
+    """To the id of a stated effect what is left of every trace of `compared` without it, all else fitted anew."""
     without_values: Mapping[tuple[str, ...], tuple[np.ndarray, ...]] = field(default_factory=dict)
-    """To the names of a wrong value, and of every two, what is left of every trace with them as believed."""
+    """To the names of a wrong value, and of every two, the same with them as believed."""
     suggested_values: Mapping[str, tuple[tuple[float, float, float, float], str]] = field(default_factory=dict)
     """Values that the runs held out do not bear out: as in `values`, and why."""
     shares: Mapping[str, float] = field(default_factory=dict)
@@ -136,6 +138,11 @@ class Analysis:
     """How often each rule's condition held during the analysis (`rules`)."""
     put_right: tuple[str, ...] = ()
     """Values put right within what was believed of them, in words: `thrust coefficient −0.7 %`."""
+
+    @property
+    def compared(self) -> tuple[Trace, ...]:
+        """Everything that effects are judged by: the traces that are shown, and those between sensors."""
+        return (*self.traces, *self.between_sensors)
 
     @property
     def wrong_values(self) -> dict[str, tuple[float, float, float, float]]:

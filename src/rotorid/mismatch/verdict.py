@@ -136,7 +136,8 @@ class EffectVerdict(Part):
     alternatives: tuple[str, ...]
     sentence: str
     share: Share | None = Field(
-        description="Part of the squared error between before and after on the held-out runs that goes without it."
+        description="Part of the squared error between before and after on the held-out runs that goes without it, "
+        "two sensors of one quantity compared among the channels."
     )
     equation: str
     channels: tuple[str, ...]

@@ -9,6 +9,10 @@ from rotorid.effects.catalogue import catalogue
 AXIS = {"x": 0, "y": 1, "z": 2}
 FORCE_WORDS = ("forward force", "sideways force", "vertical force")
 MOMENT_WORDS = ("roll moment", "pitch moment", "yaw moment")
+SENSOR_WORDS = {
+    "accelerometer": "accelerometer against the velocity along",
+    "gyroscope": "gyroscope against the attitude about",
+}
 FORWARD_WORDS = {
     "position": "position after half a second",
     "velocity": "velocity after half a second",
@@ -117,6 +121,8 @@ def channel_words(channel: str) -> str:
         return MOMENT_WORDS[AXIS[last]]
     if group == "rotor_speed":
         return f"speed of rotor {last}"
+    if group in SENSOR_WORDS:
+        return f"{SENSOR_WORDS[group]} {last}"
     return channel.replace("_", " ")
 
 

@@ -33,7 +33,7 @@ SMOOTH = 0.3
 PLAIN_CHANGE = 8.0
 """Times the noise by which a reading should have changed to be called held: more than two steps of a coarse one."""
 LEAST_JUMP = 5.0
-"""A reading without noise that was held jumps at the end by this many of its usual steps."""
+"""A jump is this many of the usual steps of a reading: what was held jumps back at its end."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,9 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
 
 
 def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.ndarray) -> bool:
-    """Whether a reading (n,) of an instrument should have changed where it was held, by what it does elsewhere.
+    """Whether a reading (n,) of an instrument should have changed where it was held, or is not what the load makes.
 
-    By its regression on what drives it: the known load of a bench, on a stand thrusts and tilts.
+    By its regression elsewhere on what drives it: the known load of a bench, on a stand thrusts and tilts.
     """
     families = (c.rotor_columns(f, vehicle.rotor_count) for f in ("rotor_speed", "rotor_command", "throttle"))
     rotors = next((n for n in families if n and run.has(*n)), ())
@@ -134,7 +134,9 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
     x = x / np.maximum(np.abs(x[known]).max(axis=0), 1e-300)
     slopes = np.linalg.lstsq(x[outside], reading[outside], rcond=1e-9)[0]
     noise = float((reading[outside] - x[outside] @ slopes).std())
-    return bool(np.ptp(x[inside] @ slopes) > PLAIN_CHANGE * noise)
+    expected = x[inside] @ slopes
+    off = np.abs(expected - reading[inside])
+    return bool(max(np.ptp(expected), np.nanmedian(off)) > PLAIN_CHANGE * noise)
 
 
 def _as_stretches(run: Run, name, sensor, kind, mask, p_value) -> list[Stretch]:
@@ -204,8 +206,8 @@ def held(
         if p > CHANCE or length < 8 * habit or may_stand(v, a, b, noisy):
             continue
         mask = np.zeros(len(values), bool)
-        # The first of the repeated readings is a true one.
-        mask[index[a] + 1 : index[b - 1] + 1] = True
+        # The first of the repeated readings is a true one, but where it is a jump (to zero) by itself.
+        mask[index[a] + int(not jumps_to(v, a)) : index[b - 1] + 1] = True
         out.append((mask, p))
     return out
 
@@ -224,6 +226,12 @@ def may_stand(values: np.ndarray, start: int, stop: int, noisy: bool = False) ->
         return False
     jump = float(np.abs(values[stop] - values[stop - 1]).max()) if stop < len(values) else 0.0
     return jump < LEAST_JUMP * usual
+
+
+def jumps_to(values: np.ndarray, start: int) -> bool:
+    """Whether columns (n, k) come to the reading at `start` by a step far beyond their usual ones."""
+    usual, _ = steps_and_bends([values[: start + 1]])
+    return start > 0 and bool(np.abs(values[start] - values[start - 1]).max() > LEAST_JUMP * usual > 0)
 
 
 def steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
