@@ -1,5 +1,6 @@
 """What every stage uses: the checked configuration and the code of the library as a parameter."""
 
+import os
 import sys
 import time
 from functools import cache
@@ -8,6 +9,10 @@ from pathlib import Path
 from rotorid import log as logs
 from rotorid.codehash import Code
 from rotorid.config import ConfigError, check
+
+# Jobs run side by side: threads of the linear algebra in each of them cost processor time and save none.
+for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(library, "1")
 
 STARTED = time.time()
 ROOT = Path(workflow.basedir)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from rotorid.mismatch import rules
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.findings import Analysis
@@ -23,6 +25,8 @@ from rotorid.recordings.sufficient import sufficient
 from rotorid.writing import all_or_none, rounded
 
 LOG = logging.getLogger(__name__)
+ONE_THREAD = threadpool_limits.wrap(limits=1)
+"""The matrices are small: a second thread of the linear algebra costs half as much again and saves no time."""
 
 
 def deliver(
@@ -38,6 +42,7 @@ def deliver(
     return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path, progress)
 
 
+@ONE_THREAD
 def analysis_of(recordings: RecordingSet, off: Collection[str] = ()) -> Analysis:
     """The analysis for the kind of the set, without the rules named in `off`.
 
@@ -68,6 +73,7 @@ def judge(recordings: RecordingSet) -> Verdict:
     return verdict_of(analysis_of(recordings))
 
 
+@ONE_THREAD
 def verdict_of(analysis: Analysis) -> Verdict:
     """The verdict that an analysis amounts to."""
     forward = forward_channels(analysis).channels if analysis.instrument is None else {}
@@ -80,6 +86,7 @@ def with_runs_left_out(verdict: Verdict, analysis: Analysis) -> Verdict:
     return verdict.model_copy(update={"details": (*left_out, *verdict.details)}) if left_out else verdict
 
 
+@ONE_THREAD
 def write_files(
     analysis: Analysis,
     verdict_path: Path,

@@ -56,6 +56,11 @@ class Blocks:
         """The same with some outputs only."""
         return Blocks(self.frequency_hz, self.y[:, :, chosen], self.x, self.z, self.run, self.time_s)
 
+    def up_to(self, top_hz: float) -> Blocks:
+        """The same at frequencies up to `top_hz` only."""
+        kept = self.frequency_hz <= top_hz * (1.0 + 1e-9)
+        return Blocks(self.frequency_hz[kept], *(v[:, kept] for v in (self.y, self.x, self.z)), self.run, self.time_s)
+
     def part(self, chosen) -> Blocks:
         """Some of the blocks only."""
         kept = [getattr(self, n)[chosen] for n in ("y", "x", "z", "run", "time_s")]

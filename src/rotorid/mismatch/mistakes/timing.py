@@ -6,6 +6,7 @@ group of sensors that agree is taken as right. What is below one sample is a nui
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import permutations
@@ -65,6 +66,12 @@ DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
 UNDECIDED = 12.0
 """Motor lags within this log-likelihood are not told apart."""
 LATE_FLOOR_S = 2e-5
+BAND_STEP, LEAST_BAND = 1.5, 5.0
+"""Ratio of the bands that are tried, and of the narrowest's ends (0.4 to 2 Hz)."""
+LEAST_GAIN = 0.97
+"""Gain between two readings of one quantity, over that at the lowest frequencies, below which noise decides."""
+SCALES = (0.85, 1.25)
+"""Gain at the lowest frequencies that may be a sensor's scale (a filter's velocity of a fast flight: 1.15)."""
 
 
 @dataclass(frozen=True)
@@ -138,15 +145,16 @@ def comparisons(
     have = set().union(*(s.values for s in all_signals))
     speeds = next((n for n in map(compare.speeds_of, all_signals) if n), None)
     force = "accelerometer" if "accelerometer" in have else None
+    source = force or speeds
     pairs: list[tuple[str, str, Blocks | None]] = []
     if {"attitude", "gyroscope"} <= have:
         pairs.append(("attitude", "gyroscope", compare.turning(all_signals)))
     if {"velocity", "attitude"} <= have and (force or speeds in ("rotors", "commands")):
-        world = compare.accelerating(all_signals, vehicle, force or speeds)
+        world = compare.accelerating(all_signals, vehicle, source)
         if world is not None:
             # Level motion follows the tilt, so it compares with the attitude; vertical motion with the force.
             pairs.append(("velocity", "attitude", world.outputs([0, 1])))
-            pairs.append(("velocity", force or speeds, world.outputs([2])))
+            pairs.append(("velocity", source, world.outputs([2])))
     if {"position", "velocity"} <= have:
         pairs.append(("position", "velocity", compare.moving(all_signals)))
     if "gyroscope" in have and speeds:
@@ -164,13 +172,38 @@ def comparisons(
         motor_s = 0.0
         if over in ("commands", "throttle"):
             motor_s, blocks = _through_motor(blocks)
+        if over == "gyroscope" or (late == "velocity" and source == "accelerometer"):
+            blocks = one_quantity(blocks, [2] if (late, over) == ("velocity", source) else range(blocks.y.shape[2]))
+            if blocks is None:
+                continue
         found = lagged.fit(blocks)
         if found is None:
             continue
         if late == "velocity":
-            shares = shares_of(all_signals, vehicle, force or speeds, [0, 1] if over == "attitude" else [2], found)
+            shares = shares_of(all_signals, vehicle, source, [0, 1] if over == "attitude" else [2], found)
         out.append((late, over, blocks, found, motor_s, shares))
     return out
+
+
+def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
+    """The widest band, from the lowest frequency up, in which two sensors show one quantity; None for none.
+
+    Two readings of one quantity have a gain of one, or of a sensor's scale, at every frequency. Where it falls, noise
+    decides, and the lateness with it: a vibration seen through aliasing is in an autopilot's estimate of the velocity,
+    too, with a phase of its own. `own` says which column of X is the same quantity as each output.
+    """
+    lowest, top = blocks.frequency_hz[0], blocks.frequency_hz[-1]
+    tops = top / BAND_STEP ** np.arange(1 + int(np.log(top / (LEAST_BAND * lowest)) / np.log(BAND_STEP)))
+    bands = [b for b in (blocks.up_to(f) for f in tops) if b.frequency_hz.size > 1]
+    gains = []
+    for band in bands:
+        found = lagged.fit(band)
+        if found is None:
+            return blocks
+        gains.append(float(np.mean(found.gain[range(len(own)), own])))
+    if not gains or not SCALES[0] < gains[-1] < SCALES[1]:
+        return None
+    return next(b for b, gain in zip(bands, gains, strict=True) if gain > LEAST_GAIN * gains[-1])
 
 
 def shares_of(
