@@ -18,6 +18,7 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.networks.compiled import batch_epochs
 from rotorid.networks.network import Network, gradients
 from rotorid.text_files import check_file
 from rotorid.wording import printable
@@ -77,32 +78,45 @@ def train(
         first = _restore(Path(checkpoint), weights, biases, history)
         LOGGER.info("continued after epoch %d", first)
     current = replace(network, weights=tuple(weights), biases=tuple(biases))
-    for epoch in range(first, training.epochs):
-        errors = np.empty_like(targets)
-        for rows in _groups(training, epoch, len(inputs)):
-            weight_steps, bias_steps, error = gradients(current, inputs[rows], targets[rows])
-            errors[rows] = error
-            for w, step in zip(weights, weight_steps, strict=True):
-                w += training.rate * step
-            for b, step in zip(biases, bias_steps, strict=True):
-                if b is not None:
-                    b += training.rate * step
-        if epoch % training.every == 0:
-            history[epoch // training.every] = np.mean(errors**2, axis=0)
-        if (epoch + 1) % training.checkpoint_every == 0 or epoch + 1 == training.epochs:
-            if not all(np.isfinite(w).all() for w in weights):
-                raise ValueError(f"training ran away by epoch {epoch + 1}: lower the rate {training.rate}")
-            LOGGER.info("epoch %d of %d, mse %s", epoch + 1, training.epochs, np.mean(errors**2, axis=0).round(9))
-            if checkpoint is not None:
-                _store(Path(checkpoint), epoch + 1, weights, biases, history)
+    run = _batch if training.method == "batch" else _by_groups
+    for start in range(first, training.epochs, training.checkpoint_every):
+        stop = min(start - start % training.checkpoint_every + training.checkpoint_every, training.epochs)
+        mse = run(current, inputs, targets, training, range(start, stop), history)
+        if not all(np.isfinite(w).all() for w in weights):
+            raise ValueError(f"training ran away by epoch {stop}: lower the rate {training.rate}")
+        LOGGER.info("epoch %d of %d, mse %s", stop, training.epochs, mse.round(9))
+        if checkpoint is not None:
+            _store(Path(checkpoint), stop, weights, biases, history)
     epochs = np.arange(kept) * training.every
     return Trained(current, epochs, history)
 
 
+def _batch(network, inputs, targets, training: Training, epochs: range, history: np.ndarray) -> np.ndarray:
+    """Train the network in place by some epochs, one step each; the last epoch's mean squared errors (n_out,)."""
+    errors = batch_epochs(network, inputs, targets, training.rate, len(epochs), training.every, epochs.start)
+    start = -(-epochs.start // training.every)
+    history[start : start + len(errors) - 1] = errors[:-1]
+    return errors[-1]
+
+
+def _by_groups(network, inputs, targets, training: Training, epochs: range, history: np.ndarray) -> np.ndarray:
+    """The same with one step for each group of samples."""
+    errors = np.empty_like(targets)
+    for epoch in epochs:
+        for rows in _groups(training, epoch, len(inputs)):
+            weight_steps, bias_steps, errors[rows] = gradients(network, inputs[rows], targets[rows])
+            for w, step in zip(network.weights, weight_steps, strict=True):
+                w += training.rate * step
+            for b, step in zip(network.biases, bias_steps, strict=True):
+                if b is not None:
+                    b += training.rate * step
+        if epoch % training.every == 0:
+            history[epoch // training.every] = np.mean(errors**2, axis=0)
+    return np.mean(errors**2, axis=0)
+
+
 def _groups(training: Training, epoch: int, count: int) -> list:
     """Rows of each step of an epoch."""
-    if training.method == "batch":
-        return [slice(None)]
     order = np.random.default_rng([training.seed, epoch]).permutation(count)
     size = 1 if training.method == "stochastic" else training.group
     return [order[i : i + size] for i in range(0, count, size)]
