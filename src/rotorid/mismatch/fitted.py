@@ -108,7 +108,7 @@ def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
         if trusted or not (trusted := strains(model)):
             break
     if rules.MERE_SCALE(only_scales(chain[0])):
-        result, *full = speed_path(prepared, chosen(model), ("throttle_curve",))
+        result, *full = speed_path(prepared, chosen(model), ("throttle_curve",), trusted=trusted)
         reason = Reason("mere_scale", "another thrust coefficient explains as much")
         chain = replace(result, dropped={**result.dropped, "throttle_curve": reason}), *full
         model = refined_model(prepared, *turning(prepared, chain))

@@ -48,8 +48,6 @@ NEVER_EXCITED = 1e-24
 """Diagonal of a normal matrix up to which a column is not excited at all."""
 UNKNOWN = 1e12
 """Variance of a coefficient of which nothing is known."""
-NOISE_SAFETY = 2.0
-"""Sensor noise is often more than its white part; energies of it are taken this much larger when they exclude."""
 
 
 def autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
@@ -382,16 +380,16 @@ class Regression:
         (cols, a, _), (others, b, _) = more_of, fewer_of
         index = np.flatnonzero(self.training)
         a, b = a[fold[index]], b[fold[index]]
-        left = [
-            -2 * np.einsum("bk,bk->b", self.cross[np.ix_(index, c)], beta)
-            + np.einsum("bk,bkl,bl->b", beta, self.gram[np.ix_(index, c, c)], beta)
-            for c, beta in ((cols, a), (others, b))
-        ]
-        shift = a.copy()
+        left, grams = [], []
+        for c, beta in ((cols, a), (others, b)):
+            gram, cross = self._noise_free(index, c)
+            quadratic = np.einsum("bk,bkl,bl->b", beta, gram, beta)
+            left.append(quadratic - 2 * np.einsum("bk,bk->b", cross, beta))
+            grams.append(gram)
+        shift, gram = a.copy(), grams[0]
         shared = np.isin(cols, others)
         at = [list(others).index(c) for c in cols[shared]]
         shift[:, shared] -= b[:, at]
-        gram = self.gram[np.ix_(index, cols, cols)]
         promised = np.einsum("bk,bkl,bl->b", shift, gram, shift)
         # What the fitted blocks of each fold hold of the same change of coefficients.
         every = gram.sum(axis=0)
@@ -410,6 +408,16 @@ class Regression:
             np.bincount(environment, doubt, count),
             np.bincount(environment, fold[index], count) / size,
         )
+
+    def _noise_free(self, index: np.ndarray, cols: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gram matrices (blocks, k, k) and cross products (blocks, k) less each block's part of the regressors' noise.
+
+        Coefficients that the noise does not shrink promise, and leave, no more than the signal in the columns: scored
+        on noisy columns a true one would keep 1 − 2 λ of its promise where a share λ of the energy is noise.
+        """
+        _, _, bias, bias_cross = self._normal(cols, self.training)
+        gram, cross = self.gram[np.ix_(index, cols, cols)], self.cross[np.ix_(index, cols)]
+        return gram - bias / len(index), cross - bias_cross / len(index)
 
     def _doubt(self, index: np.ndarray, cols: np.ndarray, fold: np.ndarray, inverses: np.ndarray) -> np.ndarray:
         """Squares that errors of coefficients fitted without a block's fold are expected to make in it, (blocks,)."""
@@ -511,7 +519,7 @@ class Regression:
         own, grid = self.columns([key]), np.ix_(cols, cols)
         whole = beta @ gram[np.ix_(own, own)] @ beta
         energy, noise = direction @ gram[grid] @ direction, direction @ bias[grid] @ direction
-        return float(energy / max(whole, 1e-300)), float(NOISE_SAFETY * noise / max(energy, 1e-300))
+        return float(energy / max(whole, 1e-300)), float(noise / max(energy, 1e-300))
 
     def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
         """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
