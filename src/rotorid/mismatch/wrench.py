@@ -52,6 +52,9 @@ SAME_WRENCH = 0.004
 SIDEWAYS = 0.25
 WORTH_TELLING = 3.0
 """Times that share which counts as noise where it is asked whether something matters."""
+STEADY_ARM = 0.1
+"""One-sigma of a steady moment over thrust, as a share of the longest arm, while what lies between command and speed is
+searched: a centre of mass is seldom further off."""
 MEMORY_GRID = 37
 """Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
@@ -383,13 +386,16 @@ def speed_path(
         precision = np.concatenate(
             [1 / np.square(np.minimum(t.prior_sd, sure if t.kind == "value" else np.inf)) for t in terms]
         )
+        if "moment" in groups:
+            arm_m = float(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).max())
+            precision = np.append(precision, np.full(3, (STEADY_ARM * arm_m) ** -2.0))
         keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
 
         def residual_of(segment: Segment, speed: np.ndarray, columns: bool):
             moved = replace(segment, motion=replace(segment.motion, rotor_speed=speed))
             if columns:
                 r = assemble_rows(prepared, terms, [moved], known)[0]
-                return r.y[:, keep], r.x[:, keep]
+                return r.y[:, keep], np.concatenate([r.x[:, keep], steady_moments(moved, prepared, groups)], axis=2)
             parts = residual(moved, vehicle)
             for form, values in known or []:
                 extra = form.contribution(moved.motion, vehicle, values)
@@ -410,6 +416,20 @@ def speed_path(
         problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
     forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
     return SpeedSearch(problem, forms).run(), full_speed, full_voltage
+
+
+def steady_moments(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:
+    """Columns (n, 3 groups, 3 or 0) of a moment about each axis in proportion to the thrust.
+
+    A centre of mass off its place, or rotors that differ, make such moments: no curve between command and speed is to
+    explain them.
+    """
+    thrust = segment.motion.rotor_speed**2 @ prepared.vehicle.thrust_coefficients_n_s2()
+    thrust = prepared.thinner(thrust[:, None])
+    columns = np.zeros((len(thrust), 3 * len(groups), 3 if "moment" in groups else 0))
+    for axis in range(columns.shape[2]):
+        columns[:, 3 * groups.index("moment") + axis, axis] = thrust[:, 0]
+    return columns
 
 
 def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:
