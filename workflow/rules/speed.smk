@@ -1,0 +1,33 @@
+"""What the benchmarks measured, for the report: stored tables, made by `python -m benchmarks`."""
+
+
+rule chapter_speed:
+    """Tables of the benchmarks, and how time grows with the recording."""
+    message:
+        "Chapter speed: tables"
+    input:
+        simulator="benchmarks/simulator.md",
+        selection="benchmarks/selection.md",
+        importing="benchmarks/importing.md",
+        mismatch="benchmarks/mismatch.md",
+        rebuild="benchmarks/rebuild.md",
+        fleet="benchmarks/fleet.md",
+    output:
+        simulator="results/report/speed/simulator.csv",
+        selection="results/report/speed/selection.csv",
+        importing="results/report/speed/importing.csv",
+        mismatch="results/report/speed/mismatch.csv",
+        rebuild="results/report/speed/rebuild.csv",
+        fleet="results/report/speed/fleet.csv",
+        growth=report(
+            "results/report/speed/growth.svg",
+            category="Appendix",
+            caption="../report/captions/appendix.rst",
+            labels={"figure": "growth with the recording"},
+        ),
+    params:
+        code=code_of("tabulate_speed"),
+    log:
+        "results/logs/chapter_speed.log",
+    script:
+        "../scripts/tabulate_speed.py"

@@ -1,0 +1,39 @@
+"""Tables and figure of the chapter on speed, from what the benchmarks wrote.
+
+- One table (CSV) of each benchmark, its columns by short names.
+- Time and memory of the mismatch stage against the length of the recording (SVG).
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from rotorid import log
+from rotorid.markdown_table import first_table
+from rotorid.plots import speed, style
+
+COLUMNS = {
+    "simulator": ["what", "seconds", "times"],
+    "selection": ["hidden", "flights", "columns", "making", "pysindy", "search", "analysis", "found_by", "found"],
+    "importing": ["log", "size_mb", "plain", "ours", "beyond", "outcome"],
+    "mismatch": ["recording", "samples", "analysis_s", "per_second", "memory_mb", "found"],
+    "rebuild": ["what", "processor", "wall"],
+    "fleet": ["what", "amount"],
+}
+
+
+def main(files: Mapping[str, str], out: Mapping[str, str]) -> None:
+    """Write the table of each benchmark in `files` to the file of the same name in `out`, and `out["growth"]`."""
+    tables = {
+        name: first_table(Path(files[name]).read_text(), columns, files[name]) for name, columns in COLUMNS.items()
+    }
+    for name, table in tables.items():
+        table.to_csv(out[name], index=False)
+    numbers = tables["mismatch"][["samples", "analysis_s", "memory_mb"]].apply(pd.to_numeric)
+    style.save(speed.growth(numbers), out["growth"])
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(files=dict(snakemake.input.items()), out=dict(snakemake.output.items()))
