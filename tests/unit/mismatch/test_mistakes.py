@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from rotorid.mismatch.mistakes import dropout, find_mistakes
-from rotorid.recordings import RecordingSet
+from rotorid.mismatch.mistakes import dropout, find_mistakes, lagged
+from rotorid.mismatch.mistakes.lagged import Blocks
+from rotorid.mismatch.mistakes.timing import one_quantity
+from rotorid.recordings import RecordingSet, Run, Vehicle
 
 from .flights import COLUMNS, quad, recorded, with_table
 
@@ -247,6 +250,41 @@ def test_dropouts(sound, kind):
 
 
 ACCELEROMETER = tuple(f"specific_force_{a}_m_s2" for a in "xyz")
+
+
+def test_a_reading_held_at_zero_under_a_steady_load_dropped_out():
+    """The load does not change there, but the reading is not what it makes; the first zero is none of its own."""
+    rng = np.random.default_rng(4)
+    load = np.repeat([0.0, 2.0, 4.0, 2.0, 0.0], 400)
+    reading = np.round(load + 0.01 * rng.standard_normal(len(load)), 3)
+    reading[900:1100] = 0.0
+    table = {"time_s": np.arange(len(load)) / 100, "reference_force_x_n": load, "force_x_n": reading}
+    bench = Vehicle.model_validate({"name": "b", "kind": "bench", "tared": True})
+    fixed, finding = dropout.find(RecordingSet("b", bench, (Run("r", pd.DataFrame(table)),)))
+    assert finding.windows == (("r", 9.0, 10.99),)
+    assert np.flatnonzero(np.isnan(fixed.runs[0].column("force_x_n"))).tolist() == list(range(900, 1100))
+
+
+@pytest.mark.parametrize("phase", [0.0, 1.2])
+def test_two_readings_of_one_quantity_tell_time_where_their_gain_is_one(phase):
+    """Above 5 Hz one reading is mostly a noise of which the other holds a tenth, with a phase of its own."""
+    rng = np.random.default_rng(5)
+    frequency_hz = np.arange(1, 31) / 2.56
+    shape = (40, len(frequency_hz), 1)
+    moved, noise = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape) for _ in range(2))
+    size = np.where(frequency_hz > 5.0, 8.0, 0.0)[None, :, None]
+    motion = moved / (1.0 + frequency_hz[None, :, None] ** 2)
+    blocks = Blocks(
+        frequency_hz,
+        motion + 0.1 * size * noise * np.exp(-1j * phase),
+        motion + size * noise,
+        np.zeros((40, len(frequency_hz), 0), complex),
+        np.zeros(40, int),
+        np.arange(40.0),
+    )
+    narrow = one_quantity(blocks, [0])
+    assert 2.0 < narrow.frequency_hz[-1] <= 5.3
+    assert abs(lagged.fit(narrow).lag_s) < 1e-4
 
 
 def test_a_sensor_that_freezes_for_a_tenth_of_a_second(sound):

@@ -176,16 +176,23 @@ def test_a_noisy_regressor_attenuates_and_the_correction_undoes_it():
 
 
 def test_the_share_of_noise_in_a_column_beside_the_others():
-    """Noise variance 0.25 of 1.25 in all (times the safety of 2); beside the noise-free signal it is all noise."""
+    """Noise variance 0.25 of 1.25 in all; beside the noise-free signal it is all noise."""
     rng = np.random.default_rng(6)
     read, again = noisy_case(rng)
     alone = regression([read], ["x"], noisy=[again])
-    assert alone.noise_share(["x"], "x", np.ones(1)) == pytest.approx(2 * 0.2, abs=0.03)
+    assert alone.noise_share(["x"], "x", np.ones(1)) == pytest.approx(0.2, abs=0.02)
     truth = coloured(8000, 1.0, np.random.default_rng(6), pole=0.9)
     both = [rows_of(read.y[:, 0], truth, read.x[:, 0, 0])]
     more = [rows_of(read.y[:, 0], truth, again.x[:, 0, 0])]
     beside = regression(both, ["truth", "x"], noisy=more)
-    assert beside.noise_share(["truth", "x"], "x", np.ones(1)) > 1.0
+    assert beside.noise_share(["truth", "x"], "x", np.ones(1)) > 0.8
+
+
+def test_a_true_effect_keeps_its_promise_on_a_noisy_column():
+    """A fifth of the column's energy is noise: scored on it, three fifths of the promise would be kept."""
+    read, again = noisy_case(np.random.default_rng(8))
+    seen = regression([read], ["x"], noisy=[again]).compare(["x"], [])
+    assert seen.votes.all() and seen.transfer == pytest.approx(1.0, abs=0.05) and seen.won == 1.0
 
 
 # --- what is built on a fit

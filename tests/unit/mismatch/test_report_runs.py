@@ -107,7 +107,7 @@ def test_established_effects_better_a_channel_and_come_in_the_order_of_their_sha
 
 def test_an_effect_is_judged_in_the_channels_that_it_acts_on():
     analysis = analysed(0.0)
-    held = [np.full(len(t.time_s), t.run == HELD) for t in analysis.traces]
+    held = [np.full(len(t.time_s), t.run == HELD) for t in analysis.compared]
     without = analysis.without["rotor_drag"]
     assert {r.channel for r in evidence(analysis, without, held, ("force_x",)).ratios} == {"force_x"}
     assert {r.channel for r in evidence(analysis, without, held).ratios} > {"force_x"}
@@ -116,7 +116,7 @@ def test_an_effect_is_judged_in_the_channels_that_it_acts_on():
 def test_two_values_that_make_up_for_each_other_are_not_called_wrong():
     """Each alone is missed, both together are not."""
     analysis = analysed(0.0)
-    after, missed = (tuple(getattr(t, stage) for t in analysis.traces) for stage in ("after", "before"))
+    after, missed = (tuple(getattr(t, stage) for t in analysis.compared) for stage in ("after", "before"))
     values = {"torque_coefficient_n_m_s2": (1.0, 0.9, 0.8, 1.0), "inertia_zz_kg_m2": (1.0, 0.9, 0.8, 1.0)}
     alone = {(name,): missed for name in values}
     told = weighed(replace(analysis, values=values, without_values=alone))
@@ -162,12 +162,27 @@ def test_the_ratio_is_that_of_errors_with_and_without_where_the_effect_acts():
     noise = rng.standard_normal(len(time_s))
     added = np.where(time_s > 80.0, rng.standard_normal(len(time_s)), 0.0)
     trace = Trace("a", "force_x", "N", time_s, noise + added, noise + added, noise)
-    analysis = SimpleNamespace(traces=(trace,))
+    analysis = SimpleNamespace(compared=(trace,))
     every, nothing = np.ones(len(time_s), bool), np.zeros(len(time_s), bool)
     ratio = ratio_of(analysis, (noise + added,), [every], "force_x")
     assert ratio.value == pytest.approx(np.sqrt(0.5), abs=0.02)
     assert ratio.low < np.sqrt(0.5) < ratio.high and ratio.high - ratio.low < 0.1
     assert ratio_of(analysis, (noise + added,), [nothing], "force_x") is None
+
+
+def test_an_error_of_a_sensor_is_judged_by_what_two_sensors_say():
+    """A wrong mass makes up for an accelerometer's scale in the force, and not beside the velocity."""
+    rng = np.random.default_rng(2)
+    time_s = np.arange(0.0, 60.0, 0.025)
+    noise, missed = rng.standard_normal((2, len(time_s)))
+    force = Trace("a", "force_z", "N", time_s, noise + missed, noise, noise)
+    between = Trace("a", "accelerometer_z", "m/s2", time_s, noise + missed, noise + missed, noise)
+    analysis = SimpleNamespace(
+        compared=(force, between), between_sensors=(between,), noise_floor={"force_z": 1.0, "accelerometer_z": 1.0}
+    )
+    every = [np.ones(len(time_s), bool)] * 2
+    found = evidence(analysis, (noise, noise + missed), every, ("force_z",))
+    assert found.ratios[0].channel == "accelerometer_z" and found.ratios[0].high < 0.8 and not found.objection
 
 
 def bench(size_n: float) -> RecordingSet:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.prepare import prepare
 from rotorid.mismatch.regression import full_fit_residuals
 from rotorid.mismatch.rows import Rows
 from rotorid.mismatch.wrench import (
@@ -13,10 +14,12 @@ from rotorid.mismatch.wrench import (
     channel_floor,
     inflated_channels,
     sizes_of_parts,
+    steady_moments,
     without_unseen,
 )
 from rotorid.recordings import Vehicle
 
+from .flights import recorded
 from .test_rows import still
 
 
@@ -105,3 +108,15 @@ def test_no_channel_is_known_better_than_a_share_of_the_rotors_own_changes():
     segment = Segment("run", 100.0, still(400, rotor_speed=speed), "accelerometer")
     floor = channel_floor([segment], vehicle)
     np.testing.assert_allclose(floor[:6], SAME_WRENCH * np.array([0.375, 0.375, 1.5, 0.0, 0.15, 0.015]), atol=1e-12)
+
+
+def test_steady_moments_go_with_the_thrust_about_each_axis():
+    """What a centre of mass off its place makes is free while the chain is searched."""
+    prepared = prepare(recorded(1, 2))
+    segment = prepared.segments[0]
+    columns = steady_moments(segment, prepared, ("force", "moment"))
+    thrust = prepared.thinner((1.3877e-6 * (segment.motion.rotor_speed**2)).sum(axis=1, keepdims=True))[:, 0]
+    assert columns.shape == (len(thrust), 6, 3) and not columns[:, :3].any()
+    for axis in range(3):
+        np.testing.assert_allclose(columns[:, 3 + axis], np.outer(thrust, np.eye(3)[axis]), rtol=1e-9)
+    assert steady_moments(segment, prepared, ("force",)).shape == (len(thrust), 3, 0)
