@@ -18,39 +18,29 @@ class TypesetError(InputError):
     """The report could not be typeset; carries what pandoc or typst said."""
 
 
-def typst_source(
-    chapters: Sequence[str | Path],
-    title: str,
-    subtitle: str,
-    parts: str | Path,
-    out: str | Path,
-    left_out: Sequence[str] = (),
-    notice: str = "",
-    later: Mapping[str, int] | None = None,
-) -> None:
-    """Chapters to one typst document.
+@dataclass(frozen=True)
+class Document:
+    """What a report is made from."""
 
-    Parameters
-    ----------
-    chapters
-        Rendered markdown, in reading order; paths of images relative to the current folder.
-    title, subtitle
-        Text of the title page.
-    parts
-        Folder with `report.typ`, `crossref.lua` and `references.bib`.
-    out
-        Where the typst source goes.
-    left_out
-        Names of chapters that are not in this report: a reference into one of them says so.
-    notice
-        What the title page says of the data.
-    later
-        By how many steps a figure or table (by its identifier) stands later than in its chapter's text.
-    """
-    template = Path(parts) / "report.typ"
-    options = ["--to=typst", f"--template={template}", f"--output={out}"]
+    chapters: Sequence[str | Path]
+    """Rendered markdown, in reading order; paths of images relative to the current folder."""
+    title: str
+    subtitle: str
+    """Text of the title page."""
+    parts: str | Path
+    """Folder with `report.typ`, `report.html`, `report.css`, `crossref.lua` and `references.bib`."""
+    left_out: Sequence[str] = ()
+    """Names of chapters that are not in this report: a reference into one of them says so."""
+    notice: str = ""
+    """What the title page says of the data."""
+
+
+def typst_source(document: Document, out: str | Path, later: Mapping[str, int] | None = None) -> None:
+    """A document to typst source; `later` says by how many steps a figure or table (by its identifier) stands later
+    than in its chapter's text."""
+    options = ["--to=typst", f"--template={Path(document.parts) / 'report.typ'}", f"--output={out}"]
     options.append("--metadata=later:" + ",".join(f"{name}={steps}" for name, steps in (later or {}).items()))
-    _pandoc(chapters, title, subtitle, parts, options, left_out, notice)
+    _pandoc(document, options)
 
 
 @dataclass(frozen=True)
@@ -73,15 +63,7 @@ MOST_STEPS = 4
 ROUNDS = 12
 
 
-def without_gaps(
-    chapters: Sequence[str | Path],
-    title: str,
-    subtitle: str,
-    parts: str | Path,
-    out: str | Path,
-    left_out: Sequence[str] = (),
-    notice: str = "",
-) -> None:
+def without_gaps(document: Document, out: str | Path) -> None:
     """`typst_source` with figures and tables put some paragraphs later where a page would end half empty.
 
     Each chapter begins a page of its own, so that one figure of each is tried in every round; what fills most stays.
@@ -90,7 +72,7 @@ def without_gaps(
     seen: dict[str, dict[int, float]] = {}
     settled: set[str] = set()
     for _ in range(ROUNDS):
-        typst_source(chapters, title, subtitle, parts, out, left_out, notice, later)
+        typst_source(document, out, later)
         tried: set[int] = set()
         for gap in gaps(out):
             name, steps = gap.identifier, later.get(gap.identifier, 0)
@@ -108,7 +90,7 @@ def without_gaps(
                 settled.add(name)
         if not tried:
             return
-    typst_source(chapters, title, subtitle, parts, out, left_out, notice, later)
+    typst_source(document, out, later)
 
 
 def gaps(source: str | Path) -> list[Gap]:
@@ -137,49 +119,33 @@ def pdf(source: str | Path, out: str | Path) -> None:
         raise TypesetError(f"{source}: typst says: {error}") from None
 
 
-def html(
-    chapters: Sequence[str | Path],
-    title: str,
-    subtitle: str,
-    parts: str | Path,
-    out: str | Path,
-    left_out: Sequence[str] = (),
-    notice: str = "",
-) -> None:
-    """Chapters to one HTML file that holds its figures, style and equations (MathML); see `typst_source`."""
-    parts = Path(parts)
+def html(document: Document, out: str | Path) -> None:
+    """A document to one HTML file that holds its figures, style and equations (MathML)."""
+    parts = Path(document.parts)
     options = ["--to=html5", "--standalone", "--embed-resources", "--mathml", "--toc", "--toc-depth=2"]
     options += ["--number-sections", f"--template={parts / 'report.html'}", f"--css={parts / 'report.css'}"]
-    _pandoc(chapters, title, subtitle, parts, [*options, f"--output={out}"], left_out, notice)
+    _pandoc(document, [*options, f"--output={out}"])
 
 
-def _pandoc(
-    chapters: Sequence[str | Path],
-    title: str,
-    subtitle: str,
-    parts: str | Path,
-    options: Sequence[str],
-    left_out: Sequence[str],
-    notice: str,
-) -> None:
+def _pandoc(document: Document, options: Sequence[str]) -> None:
     import pypandoc
 
-    parts = Path(parts)
+    parts = Path(document.parts)
     command = [
         pypandoc.get_pandoc_path(),
         f"--from={MARKDOWN}",
-        *(str(chapter) for chapter in chapters),
+        *(str(chapter) for chapter in document.chapters),
         "--fail-if-warnings",
         "--columns=10000",  # or tables with long lines would get columns of equal width
         f"--lua-filter={parts / 'crossref.lua'}",
         "--citeproc",
         f"--bibliography={parts / 'references.bib'}",
-        f"--metadata=title:{title}",
-        f"--metadata=subtitle:{subtitle}",
+        f"--metadata=title:{document.title}",
+        f"--metadata=subtitle:{document.subtitle}",
         "--metadata=lang:en",
         "--metadata=link-citations:true",
-        "--metadata=left-out:" + ",".join(name.replace("_", "-") for name in left_out),
-        f"--metadata=notice:{notice}",
+        "--metadata=left-out:" + ",".join(name.replace("_", "-") for name in document.left_out),
+        f"--metadata=notice:{document.notice}",
         "--metadata=reference-section-title:References",
         *options,
     ]

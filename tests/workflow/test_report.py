@@ -55,7 +55,7 @@ def plain(page: str) -> str:
 
 
 def test_html_numbers_by_chapter_and_refers_to_the_numbers(chapters: list[str]) -> None:
-    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
     page = Path("report.html").read_text()
     text = plain(page).replace("\u00a0", " ")
     assert "See Figure 1.1, Table 1.1, Equation 1.1, Chapter 2 and Section 2.1;" in text
@@ -67,7 +67,7 @@ def test_html_numbers_by_chapter_and_refers_to_the_numbers(chapters: list[str]) 
 
 
 def test_html_needs_no_other_file(chapters: list[str]) -> None:
-    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
     page = Path("report.html").read_text()
     assert "<math" in page
     assert "data:image/svg+xml" in page or "<svg" in page
@@ -75,7 +75,7 @@ def test_html_needs_no_other_file(chapters: list[str]) -> None:
 
 
 def test_typst_says_the_same_numbers_and_makes_a_pdf(chapters: list[str]) -> None:
-    typeset.typst_source(chapters, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.typst_source(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.typ")
     source = Path("report.typ").read_text()
     assert "#link(<fig:first-box>)[Figure~1.1]" in source
     assert "math.equation(numbering: _ => [(1.1)])" in source
@@ -98,15 +98,15 @@ def test_typst_says_the_same_numbers_and_makes_a_pdf(chapters: list[str]) -> Non
 def test_what_leads_nowhere_stops_the_report(chapters: list[str], text: str, message: str) -> None:
     Path("bad.md").write_text(text)
     with pytest.raises(typeset.TypesetError, match=message):
-        typeset.html(["bad.md"], "Title", "Subtitle", PARTS, "report.html")
+        typeset.html(typeset.Document(["bad.md"], "Title", "Subtitle", PARTS), "report.html")
 
 
 def test_a_figure_that_moves_stands_still_in_print(chapters: list[str]) -> None:
     Path("moving.svg").write_text(FIGURE.replace("<rect", "<circle r='4'/><rect"))
     Path("two.md").write_text(TWO.replace("{#fig:second-box}", '{#fig:second-box moving="moving.svg"}'))
-    typeset.typst_source(chapters, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.typst_source(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.typ")
     assert "moving.svg" not in Path("report.typ").read_text()
-    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
     page = Path("report.html").read_text()
     assert "moving=" not in page
     assert base64.b64encode(Path("moving.svg").read_bytes()).decode() in page or "circle" in page
@@ -127,10 +127,10 @@ def a_chapter(after: list[str], before: int = 4) -> list[str]:
 def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> None:
     """Before: a page ended half empty."""
     texts = a_chapter([SAID] * 5)
-    typeset.typst_source(texts, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.typst_source(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
     (gap,) = typeset.gaps("report.typ")
     assert gap.identifier == "fig:tall" and gap.movable and gap.height_pt > 3 * typeset.MOST_EMPTY_PT
-    typeset.without_gaps(texts, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
     (gap,) = typeset.gaps("report.typ")
     assert gap.height_pt < typeset.MOST_EMPTY_PT
     source = Path("report.typ").read_text()
@@ -139,7 +139,7 @@ def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> 
 
 def test_a_figure_right_after_another_is_looked_at_too(chapters: list[str]) -> None:
     texts = a_chapter(["![Second.](tall.svg){#fig:tall-second width=100%}", SAID, SAID], before=1)
-    typeset.typst_source(texts, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.typst_source(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
     first, second = typeset.gaps("report.typ")
     assert first.height_pt == 0 and not first.movable
     assert second.height_pt > 2 * typeset.MOST_EMPTY_PT and second.movable
@@ -147,11 +147,13 @@ def test_a_figure_right_after_another_is_looked_at_too(chapters: list[str]) -> N
 
 def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) -> None:
     law = "The law, which is\n\n[$$ F = C_F\\,\\omega^2 , $$]{#eq:law}\n\nholds at all speeds."
-    typeset.typst_source(a_chapter([law, SAID]), "Title", "Subtitle", PARTS, "report.typ", later={"fig:tall": 1})
+    typeset.typst_source(
+        typeset.Document(a_chapter([law, SAID]), "Title", "Subtitle", PARTS), "report.typ", later={"fig:tall": 1}
+    )
     source = Path("report.typ").read_text()
     assert source.index("holds at all speeds.") < source.index("#figure(") < source.rindex("Some words")
     texts = a_chapter(["## Next {#sec:next}", SAID])
-    typeset.without_gaps(texts, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
     (gap,) = typeset.gaps("report.typ")
     assert not gap.movable and gap.height_pt > typeset.MOST_EMPTY_PT
     source = Path("report.typ").read_text()
@@ -159,7 +161,7 @@ def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) ->
 
 
 def test_nothing_is_fetched_and_no_script_runs_in_the_html(chapters: list[str]) -> None:
-    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
     page = Path("report.html").read_text()
     policy = html.unescape(re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', page)[1])
     assert "default-src 'none'" in policy and "script" not in policy
@@ -175,7 +177,7 @@ def test_the_html_is_as_wide_as_the_window_and_says_nothing_to_the_console(chapt
         f"| {' | '.join(['n'] * 40)} |\n| {' | '.join(['---:'] * 40)} |\n| {cells} |\n\n: Wide. {{#tbl:second-wide}}\n"
     )
     Path("two.md").write_text(TWO + "\n" + wide)
-    typeset.html(chapters, "Title", "Subtitle", PARTS, "report.html")
+    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
     with Browser(Path.cwd()) as browser:
         browser.open(Path("report.html"), width)
         assert browser.said == []
@@ -211,7 +213,7 @@ def named(chapters: list[str]) -> list[str]:
 
 
 def test_names_with_markup_are_text_in_the_html(named: list[str]) -> None:
-    typeset.html(named, "Title", "Subtitle", PARTS, "report.html")
+    typeset.html(typeset.Document(named, "Title", "Subtitle", PARTS), "report.html")
     page = Path("report.html").read_text()
     seen = re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", "", page)))
     assert [name for name in NASTY if name not in seen] == []
@@ -221,7 +223,7 @@ def test_names_with_markup_are_text_in_the_html(named: list[str]) -> None:
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="needs pdftotext")
 def test_names_with_markup_are_text_in_the_pdf(named: list[str]) -> None:
     """Before: an entity became its sign, quotation marks and dashes others."""
-    typeset.typst_source(named, "Title", "Subtitle", PARTS, "report.typ")
+    typeset.typst_source(typeset.Document(named, "Title", "Subtitle", PARTS), "report.typ")
     typeset.pdf("report.typ", "report.pdf")
     seen = subprocess.run(["pdftotext", "-layout", "report.pdf", "-"], capture_output=True, text=True).stdout
     letters = re.sub(r"[\s-]", "", seen.replace("…", "..."))  # lines break inside names; typst sets three dots as one
@@ -231,7 +233,7 @@ def test_names_with_markup_are_text_in_the_pdf(named: list[str]) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_a_browser_runs_nothing_in_the_html(named: list[str]) -> None:
-    typeset.html(named, "Title", "Subtitle", PARTS, "report.html")
+    typeset.html(typeset.Document(named, "Title", "Subtitle", PARTS), "report.html")
     page = Path("report.html").read_text()
     for put in ("<script>document.title = 'taken'</script>", "<img src=x onerror=\"document.title = 'taken'\">"):
         Path("put.html").write_text(page.replace("</main>", put + "</main>").replace("</body>", put + "</body>"))

@@ -6,12 +6,12 @@ from rotorid import log, typeset
 
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
-        typeset.html(
+        document = typeset.Document(
             chapters=snakemake.input.chapters,
             title=snakemake.params.title,
             subtitle=snakemake.params.subtitle,
             parts=Path(snakemake.input.template).parent,
-            out=snakemake.output.html,
             left_out=snakemake.params.left_out,
             notice=snakemake.params.notice,
         )
+        typeset.html(document, snakemake.output.html)
