@@ -3,6 +3,7 @@
     python benchmarks/fleet.py make DIR [--sets 1000]        flights of 40 vehicles, benches and stands, some broken
     snakemake --cores 1 fleet --config recordings=DIR        (or through a cluster's profile)
     python benchmarks/fleet.py check DIR [--sample 20]       every set there; a sample judged alone, byte by byte
+        [--out benchmarks/fleet.md --measured "processor time of the whole, h: 0.9" ...]    its table, with what was measured
 
 A vehicle hides what its number says: nothing, a drag that grows from flight to flight, a payload, a motor lag, drag and
 lag, a centre of mass beside the believed one. Every 25th set is a bench or a stand of `tests/concealed`, one
@@ -36,6 +37,13 @@ SECONDS, FLIGHTS, EVERY = 5.0, 2, 5
 """Two flights of 5 s, a sample every fifth step of 2 ms."""
 INSTRUMENTS = "bench/single/*,stand/single/*,bench/clean/*,stand/clean/*"
 VERDICTS = Path("results/fleet/verdicts")
+HEADING = [
+    "# A fleet",
+    "",
+    "`python benchmarks/fleet.py make DIR`, `snakemake --cores 1 fleet --config recordings=DIR`, "
+    "`python benchmarks/fleet.py check DIR --out benchmarks/fleet.md`.",
+    "",
+]
 
 
 def hidden(vehicle: int, day: int) -> list[dict]:
@@ -88,7 +96,7 @@ def spoil(folder: Path, way: int) -> None:
         run.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
 
 
-def check(folder: Path, sample: int, verdicts: Path) -> None:
+def check(folder: Path, sample: int, verdicts: Path, out: Path | None, measured: list[str]) -> None:
     """Compare what the fleet says with what its sets say by themselves; exit code 1 where they differ."""
     names = sorted(p.parent.name for p in folder.glob("*/vehicle.yaml"))
     found = {p.name: p for p in verdicts.glob("*/*") if p.is_dir()}
@@ -106,7 +114,13 @@ def check(folder: Path, sample: int, verdicts: Path) -> None:
             else:
                 same = all((alone / n).read_bytes() == (found[name] / n).read_bytes() for n in FILES)
         wrong += [] if same else [name]
-    print(f"{sample} judged alone: {'all the same, byte by byte' if not wrong else 'other than ' + ', '.join(wrong)}")
+    alike = "all the same, byte by byte" if not wrong else "other than " + ", ".join(wrong)
+    print(f"{sample} judged alone: {alike}")
+    if out:
+        rows = [("sets", len(names)), ("judged", len(found)), ("of them failed, as they should", len(failed))]
+        rows += [(f"a sample of {sample} judged alone", alike), *(text.rsplit(": ", 1) for text in measured)]
+        lines = [f"| {what} | {amount} |" for what, amount in rows]
+        out.write_text("\n".join([*HEADING, "| what | measured |", "| --- | --- |", *lines, ""]))
     sys.exit(bool(wrong))
 
 
@@ -117,8 +131,10 @@ if __name__ == "__main__":
     parser.add_argument("--sets", type=int, default=1000)
     parser.add_argument("--sample", type=int, default=20)
     parser.add_argument("--verdicts", type=Path, default=VERDICTS)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--measured", nargs="*", default=[], help="further rows, 'what: amount'")
     given = parser.parse_args()
     if given.what == "make":
         make(given.folder, given.sets)
     else:
-        check(given.folder, given.sample, given.verdicts)
+        check(given.folder, given.sample, given.verdicts, given.out, given.measured)
