@@ -3,7 +3,7 @@
     python benchmarks/fleet.py make DIR [--sets 1000]        flights of 40 vehicles, benches and stands, some broken
     snakemake --cores 1 fleet --config recordings=DIR        (or through a cluster's profile)
     python benchmarks/fleet.py check DIR [--sample 20]       every set there; a sample judged alone, byte by byte
-        [--out benchmarks/fleet.md --measured "processor time of the whole, h: 0.9" ...]    its table, with what was measured
+        [--out benchmarks/fleet.md --measured "processor time, h: 0.9" ...]    its table, with what was measured
 
 A vehicle hides what its number says: nothing, a drag that grows from flight to flight, a payload, a motor lag, drag and
 lag, a centre of mass beside the believed one. Every 25th set is a bench or a stand of `tests/concealed`, one
