@@ -25,10 +25,10 @@ def dead_zone(path, values):
 
 
 def root(path, values):
-    """T/T_max = (1 - a) u + a u², u = ω_c/ω_max; a = 1 is a proportional speed."""
+    """T/T_max = (1 - a) u + a u², u = ω_c/ω_max, no thrust where that is negative; a = 1 is a proportional speed."""
     u = np.clip(path.speed / path.full_speed, 0.0, None)
     a = 1.0 - values[0]
-    return path.full_speed * np.sqrt((1 - a) * u + a * u**2)
+    return path.full_speed * np.sqrt(np.maximum((1 - a) * u + a * u**2, 0.0))
 
 
 def power(path, values):

@@ -18,7 +18,7 @@ from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, Trace, with_status
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each, without_values
@@ -32,6 +32,7 @@ from rotorid.mismatch.refitted import refitted
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
+from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
 from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.values import (
@@ -51,6 +52,8 @@ from rotorid.recordings import RecordingSet
 
 UNITS = {"force": "N", "moment": "N m"}
 SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
+NO_DEPENDENCE_P = 0.01
+"""p-value of a residual's dependence on what is recorded from which it is taken for noise."""
 SURELY_HEAVIER = 2.0
 """Standard errors by which a vehicle must be heavier than believed to carry a payload."""
 TIMING_FLOOR = 0.05
@@ -158,7 +161,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         instead=instead_of(model, values),
         put_right=within_trust.in_words(moved),
     )
-    return without_values_in_question(weighed(analysis))
+    return with_noise_held_out(without_values_in_question(weighed(analysis)))
 
 
 def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
@@ -379,6 +382,23 @@ def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
     if chain is not None and found.measured:
         out |= {f"rotor_speed_{i + 1}": float(sd) for i, sd in enumerate(speed_floor(found))}
     return out
+
+
+def with_noise_held_out(analysis: Analysis) -> Analysis:
+    """Where nothing is stated, the analysis with floors that hold on the runs held out, too.
+
+    What is left of a channel there and depends on nothing recorded is noise, however much less of it the fitted runs
+    had: a vibration seen through aliasing is louder or not by the rotors' speed.
+    """
+    if with_status(analysis, *CLAIMED) or analysis.wrong_values:
+        return analysis
+    part, floors = fitted_part(analysis), dict(analysis.noise_floor)
+    for channel in {t.channel for t in analysis.traces} - set(analysis.unexplained_channels):
+        own = [t.after[part(t.run, t.time_s) < 0] for t in analysis.traces if t.channel == channel]
+        left = np.concatenate(own) if own else np.zeros(0)
+        if len(left) and analysis.p_values.get(channel, (0.0, 0.0))[1] > NO_DEPENDENCE_P:
+            floors[channel] = max(floors.get(channel, 0.0), float(np.sqrt(np.nanmean(left**2))))
+    return replace(analysis, noise_floor=floors)
 
 
 def speed_floor(found: Fitted) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import fields, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -491,3 +492,14 @@ def recognised_forms():
 def test_a_fault_is_recognised(effect, form):
     _, findings, _ = find_mistakes(form.apply(recorded(1, 2), np.array(form.example)))
     assert [f.id for f in findings] == [effect.id]
+
+
+@pytest.mark.parametrize("effect_id", [e.id for e in catalogue().values() if e.speed_forms])
+def test_speeds_are_finite_at_the_bounds_of_every_form(effect_id):
+    """From no command to the full one: the search goes to the bounds, and one that is no number ends it."""
+    count = 200
+    command = np.repeat(np.linspace(0.0, 2000.0, count)[:, None], 4, axis=1)
+    path = SpeedPath(command, np.arange(count) / 100.0, 2000.0, np.linspace(16.8, 14.0, count), 16.8)
+    for form in catalogue()[effect_id].speed_forms:
+        for ends in product(*((p.low, p.high) for p in form.parameters)):
+            assert np.isfinite(form.apply(path, np.array(ends))).all(), (form.name, ends)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.mismatch.analyse import analyse
+from rotorid.mismatch.analyse import analyse, with_noise_held_out
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.mismatch.deliver import verdict_of
 from rotorid.mismatch.evidence import evidence, ratio_of, weighed
@@ -183,6 +183,17 @@ def test_an_error_of_a_sensor_is_judged_by_what_two_sensors_say():
     every = [np.ones(len(time_s), bool)] * 2
     found = evidence(analysis, (noise, noise + missed), every, ("force_z",))
     assert found.ratios[0].channel == "accelerometer_z" and found.ratios[0].high < 0.8 and not found.objection
+
+
+def test_noise_of_the_runs_held_out_counts_where_nothing_is_stated():
+    """What is left there and depends on nothing is noise; what depends on something, or beside a claim, is not."""
+    claimed = replace(analysed(0.0), noise_floor={"force_x": 1e-6}, p_values={"force_x": (1.0, 1.0)})
+    silent = replace(claimed, findings=(), values={}, unexplained_channels=())
+    (held,) = (t.after for t in claimed.traces if t.channel == "force_x" and t.run == HELD)
+    assert with_noise_held_out(silent).noise_floor["force_x"] == pytest.approx(np.sqrt(np.mean(held**2)))
+    dependent = replace(silent, p_values={"force_x": (1.0, 1e-3)})
+    for other in (claimed, dependent, replace(silent, unexplained_channels=("force_x",))):
+        assert with_noise_held_out(other).noise_floor["force_x"] == 1e-6
 
 
 def bench(size_n: float) -> RecordingSet:
