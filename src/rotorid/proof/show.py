@@ -63,8 +63,18 @@ def provenance(row: pd.Series, present: str) -> str:
 
 
 def of_families(families: pd.DataFrame) -> pd.DataFrame:
-    """Drawn cases, one row a family and date, as text."""
-    out = families.astype(object).fillna("").astype(str)
+    """Drawn cases as text: a row for each family and date in which something is wrong, the others of a date together."""
+    known = families.astype(object).fillna("")
+    whole = (known["cases"] == known["right"]) & (known["false_alarms"] == 0)
+    rows = []
+    for (simulator, released), own in known.groupby(["simulator", "released"], sort=False):
+        right = own[whole[own.index]]
+        rows += own[~whole[own.index]].to_dict("records")
+        if len(right):
+            others = {"simulator": simulator, "released": released, "wrong_names": "", "missed": ""}
+            sums = {name: right[name].sum() for name in ("cases", "right", "false_alarms")}
+            rows.append({"family": f"{len(right)} families, all right", **others, **sums})
+    out = pd.DataFrame(rows, columns=[c for c in known.columns if c not in ("judged_by", "looked_at")]).astype(str)
     out["released"] = out["released"].replace("", "development")
     for column in ("family", "wrong_names", "missed"):
         out[column] = out[column].str.replace("_", " ")

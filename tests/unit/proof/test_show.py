@@ -33,3 +33,17 @@ def test_a_wrong_value_is_named_without_its_unit() -> None:
     shown = show.of_studies(pd.DataFrame([row | errors])).iloc[0]
     assert shown["found"] == "rotor drag; wrong values: inertia yy, mass"
     assert shown["error"] == "0.100 / 0.100 / 0.100 N".replace(" ", "\u00a0")
+
+
+def test_families_in_which_nothing_was_wrong_stand_together():
+    families = pd.DataFrame(
+        [
+            ("Drawn", "late", "2026-11-30", 1, 1, 0, None, None, "aa", 0),
+            ("Drawn", "steady_wind", "2026-11-30", 2, 1, 0, None, "steady_wind 1", "aa", 0),
+            ("Drawn", "clean", "2026-11-30", 4, 4, 0, None, None, "aa", 0),
+        ],
+        columns="simulator family released cases right false_alarms wrong_names missed judged_by looked_at".split(),
+    )
+    shown = show.of_families(families)
+    assert shown["family"].tolist() == ["steady wind", "2 families, all right"]
+    assert shown["cases"].tolist() == ["2", "5"] and shown["missed"].tolist() == ["steady wind 1", ""]
