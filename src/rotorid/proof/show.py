@@ -55,15 +55,15 @@ def _shown(present: str, rows: pd.DataFrame) -> pd.DataFrame:
 
 def provenance(row: pd.Series, present: str) -> str:
     """Whether older code judged a row's cases, and how many of them are development cases."""
-    said = [] if pd.isna(row["judged_by"]) or row["judged_by"] in ("", present) else ["older code"]
+    said = [] if pd.isna(row["judged_by"]) or row["judged_by"] in ("", present) else ["older"]
     looked, cases = row["looked_at"], row["cases"]
     if looked > 0 and pd.notna(cases):
-        said.append("looked at" if looked >= cases else f"{int(looked)} looked at")
+        said.append("seen" if looked >= cases else f"{int(looked)} seen")
     return ", ".join(said)
 
 
 def of_families(families: pd.DataFrame) -> pd.DataFrame:
-    """Drawn cases as text: a row for each family and date in which something is wrong, the others of a date together."""
+    """Drawn cases as text: a row for each family and date with something wrong, the others of a date together."""
     known = families.astype(object).fillna("")
     whole = (known["cases"] == known["right"]) & (known["false_alarms"] == 0)
     rows = []
