@@ -32,7 +32,7 @@ def targets(summary: pd.DataFrame) -> Figure:
         ax.plot(row.value, k, "o", color=colour)
     ax.set_yticks(range(len(rows)), [f"{r.what} ({int(r.cases)})" for r in rows.itertuples()])
     ax.set_xlim(-0.02, 1.02)
-    ax.set_xlabel("share (green: where the target lies; in brackets: cases)")
+    ax.set_xlabel("share (in brackets: cases)")
     ax.grid(axis="y", visible=False)
     return fig
 
