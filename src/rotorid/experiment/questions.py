@@ -16,7 +16,7 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.regression import Regression
 from rotorid.mismatch.rows import Term
-from rotorid.mismatch.select import COST_PER_PARAMETER, SMALLEST_SIZE, Search
+from rotorid.mismatch.select import COST_PER_PARAMETER
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet
 
@@ -132,8 +132,6 @@ def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Questi
     hypotheses, rivals = [], {}
     for i in ids:
         choices = [(t.key,) for t in forms[i]]
-        if i != finding.id:
-            choices += shared_class(search, own, rest, forms[i], forms[finding.id])
         if not choices:
             continue
         rivals[i] = tuple(choices)
@@ -145,30 +143,6 @@ def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Questi
     if len(hypotheses) < 2:
         return None
     return Question(tuple(h.id for h in hypotheses), tuple(hypotheses), shared, rivals)
-
-
-def shared_class(search: Search, own: str, rest: list[str], others: list[Term], same: list[Term]) -> list[tuple]:
-    """Another id beside a simpler form of the id in the model, where the engine takes the two for one of a class.
-
-    As in `Search.alternatives`: of ids that physics confuses, as many parameters together as the term has, and acting
-    in channels of their own; where both act alike the id is at work in any case.
-    """
-    out = []
-    for t in others:
-        if t.effect not in search.ask.confusers.get(search.terms[own].effect, ()):
-            continue
-        for s in same:
-            room = search.terms[own].size - t.size
-            if s.key == own or s.run or room < 1 or search.directions(s) > room:
-                continue
-            beside = search.regression.fit([*search.always, *rest, s.key, t.key])
-            seen = [
-                search.ask.sizes_of(k, beside.beta[beside.places(search.regression.columns([k]))]) > SMALLEST_SIZE
-                for k in (s.key, t.key)
-            ]
-            if not (seen[0] & seen[1]).any():
-                out.append((t.key, s.key))
-    return out
 
 
 def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[str, Term]) -> tuple[str, ...]:

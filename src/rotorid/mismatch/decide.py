@@ -31,8 +31,6 @@ MOST_VALUES = 3
 LEAST_ROOM = 0.25
 """A value that is asked whether it is wrong may be so by this share at least; in the search it has less room, or it
 would take physics up."""
-SHARED = 0.1
-"""Share of what two values explain together that is lost without either where they are one ratio to the recordings."""
 MOST_DISTRUST = 9.0
 WIDEST_TRUST = 0.1
 VALUE_FLOOR = 0.002
@@ -187,7 +185,6 @@ def wrong_values(
     regression: Regression,
     search: Search,
     selection: Selection,
-    reverse: Regression | None,
     size_of: Callable[[str, float], float],
     moving: bool = True,
     refused: Collection[str] = (),
@@ -196,13 +193,11 @@ def wrong_values(
 
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
     counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
-    sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
-    side (`reverse`: measured moments as regressors) agrees, where it survives on the held-out part, and where it
-    matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is False
-    on a stand, where a mass only weighs; `refused` values are not called wrong.
+    sold as a wrong thrust and three wrong inertias. A value is named only where it survives on the held-out part, and
+    where it matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is
+    False on a stand, where a mass only weighs; `refused` values are not called wrong.
     """
     regression = regression.with_room(LEAST_ROOM)
-    reverse = None if reverse is None else reverse.with_room(LEAST_ROOM)
     nuisance = regression.keys_of("nuisance", "wind")
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
@@ -227,24 +222,17 @@ def wrong_values(
     doubtful = set(refused)
     at_limits: list[list[str]] = []
     while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
-        if rules.SPARE_VALUE((extra := spare(regression, always, named, loose)) is not None):
-            doubtful.add(extra)
-            continue
         fit = regression.fit(always + named, loose=loose)
-        other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
         certainty, pinned = {}, False
         for key in named:
             beta, covariance = coefficients(regression, fit, key)
             change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
-            check = float(coefficients(reverse or regression, other, key)[0][0])
             noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
-            agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
-            agrees = not rules.VALUE_AGREES(not agrees)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
             fails = rules.VALUE_TRANSFER(fails_elsewhere(regression, always, named, key, loose))
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:
             # Two values that run away together say nothing against either of them alone.
@@ -263,26 +251,6 @@ def wrong_values(
         sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
         out[key] = relative_change(key, float(beta[0]), sd) if moving else (float(beta[0]), sd)
     return out
-
-
-def spare(regression: Regression, always: list[str], named: list[str], loose: dict[str, float]) -> str | None:
-    """Of two values that share a ratio (torque over inertia) the one that the other can do without.
-
-    Without either hardly anything is lost of what the two explain together (SHARED), and without the spare one less
-    than any form is wrong by.
-    """
-
-    def gain(without: tuple[str, ...]) -> float:
-        return regression.fit(always + [k for k in named if k not in without], loose=loose).gain
-
-    whole, found = gain(()), {}
-    for pair in combinations(named, 2):
-        both = whole - gain(pair)
-        lost = {key: whole - gain((key,)) for key in pair}
-        least = min(lost, key=lost.get)
-        if max(lost.values()) < SHARED * both and lost[least] < SHARE_OF_LARGEST**2 * both:
-            found[least] = lost[least]
-    return min(found, key=found.get) if found else None
 
 
 def exchangeable(

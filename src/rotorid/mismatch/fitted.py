@@ -25,7 +25,6 @@ from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.speedpath import SpeedResult
-from rotorid.mismatch.unsure import without_unsure
 from rotorid.mismatch.within_trust import beyond_trust
 from rotorid.mismatch.wrench import (
     WrenchModel,
@@ -33,7 +32,6 @@ from rotorid.mismatch.wrench import (
     chosen,
     path_segments,
     refine_nonlinear,
-    reverse_regression,
     speed_path,
     with_wind,
     wrench_model,
@@ -84,8 +82,7 @@ def fitted(prepared: Prepared) -> Fitted:
         model = refined_model(prepared, *turning(prepared))
     else:
         chain, model = with_chain(prepared, chain)
-    model, values = without_unsure(model, values_called_wrong(model, ()), values_called_wrong)
-    return Fitted(model, values, chain, measured)
+    return Fitted(model, values_called_wrong(model, ()), chain, measured)
 
 
 def turning(prepared: Prepared, chain: Chain | None = None):
@@ -210,9 +207,8 @@ def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
 
 def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
     """Believed values that the model's recordings contradict, less those refused."""
-    reverse, search = reverse_regression(model.prepared, model, model.segments), model.search
-    size = size_of_value(model)
-    return wrong_values(search.regression, search, model.selection, reverse, size, refused=refused)
+    search = model.search
+    return wrong_values(search.regression, search, model.selection, size_of_value(model), refused=refused)
 
 
 def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:

@@ -13,7 +13,9 @@ Three sources, in this order of trust:
    sensor's matter) and for a mean other than zero. The threshold is
    Bonferroni's over every window of every channel of every run; the spread of both statistics is measured on the
    blocks of the residual themselves, so that colour that whitening left, or noise that comes in bouts, raises the
-   threshold. Edges are those of the most likely segment.
+   threshold. Edges are those of the most likely segment. A force that the accelerometer reads and the velocity does
+   not show is none: a vibration seen through a low sampling rate stands still for a second where the rotors turn at
+   a multiple of that rate.
 """
 
 from __future__ import annotations
@@ -78,6 +80,8 @@ REGIME_BINS = 8
 REGIME_P = 1e-3
 CONTRAST = 2.0
 """Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
+MOST_OF_IT = 0.5
+"""Share of a stretch's energy that is a difference between two sensors, from which it is the sensor's matter."""
 EXCESS_SHARE = 0.25
 """Bins with at least this share of the largest excess belong to the regime."""
 
@@ -347,7 +351,29 @@ def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
         found += _louder(traces, white, limit) + _shifted(traces, white, parts, limit)
         if "run" in analysis.unexplained_depends_on:
             found += _apart(traces, parts)
-    return found
+    sensors = _sensor_differences(analysis)
+    return [i for i in found if not _of_one_sensor(i, sensors)]
+
+
+def _sensor_differences(analysis: Analysis) -> dict[tuple[str, str, float], np.ndarray]:
+    """To run, channel and first instant of a trace of forces (n,), N, that the accelerometer alone reads."""
+    if analysis.force_source != "accelerometer":
+        return {}
+    return {
+        (t.run, f"force_{t.channel[-1]}", float(t.time_s[0])): analysis.improved.mass_kg * t.after
+        for t in analysis.between_sensors
+        if t.channel.startswith("accelerometer") and len(t.time_s)
+    }
+
+
+def _of_one_sensor(interval: Interval, differences: Mapping[tuple[str, str, float], np.ndarray]) -> bool:
+    """Whether most of the residual there is a difference between the accelerometer and the velocity."""
+    trace, part = interval.trace, slice(interval.start, interval.stop)
+    difference = differences.get((trace.run, trace.channel, float(trace.time_s[0])))
+    if difference is None:
+        return False
+    left, whole = (float(np.nansum(x[part] ** 2)) for x in (trace.after - difference, trace.after))
+    return left < MOST_OF_IT * whole
 
 
 def _apart(traces, parts) -> list[Interval]:

@@ -38,6 +38,8 @@ class Segment:
     command: np.ndarray | None = None
     """Commanded rotor speeds, (n, k), rad/s; throttle times the upper limit where only throttle is recorded."""
     measured_speed: bool = True
+    independent_velocity: bool = True
+    """Whether the velocity knows nothing of the accelerometer, so that comparing the two shows errors of the latter."""
     extra: dict[str, np.ndarray] = field(default_factory=dict)
     """Unknown columns of the run, candidates for a regime variable."""
 

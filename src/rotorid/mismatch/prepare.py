@@ -12,6 +12,7 @@ from scipy.signal import welch
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, not_testable_reason
 from rotorid.mismatch import rules
+from rotorid.mismatch.estimated_velocity import made_from_accelerometer
 from rotorid.mismatch.excess_noise import noise_factors
 from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments, full_speed
 from rotorid.mismatch.rows import (
@@ -28,9 +29,6 @@ from rotorid.mismatch.rows import (
     residual,
     slope_column,
     value_columns,
-)
-from rotorid.mismatch.rows import (
-    measured_moment as moment_of,
 )
 from rotorid.mismatch.split import HELD_OUT_SHARE, split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS, empirical_effects
@@ -275,6 +273,8 @@ def prepare(
             noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 1), full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     segments = representative(without_noise(segments))
+    if made_from_accelerometer(segments, cutoff):
+        segments, noisy = ([replace(s, independent_velocity=False) for s in own] for own in (segments, noisy))
     prepared = Prepared(recordings, vehicle, split, segments, noisy, thinner, noise, [], unseen=unseen)
     terms, reasons = make_terms(vehicle, segments, prepared.groups)
     return replace(prepared, terms=terms, not_testable=reasons)
@@ -297,7 +297,11 @@ def prepare_like(prepared: Prepared, recordings: RecordingSet) -> tuple[list[Seg
         segments += build_segments(*own, full_speed_rad_s=full)
         noisy += build_segments(*own, prepared.noise, draws_of(run, 1), full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
-    return representative(without_noise(segments)), noisy
+    same = prepared.segments[0].independent_velocity
+    segments, noisy = (
+        [replace(s, independent_velocity=same) for s in own] for own in (representative(without_noise(segments)), noisy)
+    )
+    return segments, noisy
 
 
 def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, np.ndarray]]):
@@ -365,20 +369,16 @@ def assemble_rows(
     terms: list[Term],
     segments: list[Segment] | None = None,
     effects: list[tuple[Form, np.ndarray]] | None = None,
-    measured_moment: bool = False,
 ) -> list[Rows]:
     """Rows of every segment for the given terms; `effects` only shape the accelerations in regressors.
 
     The columns of believed values are built on the baseline alone: with effects in them, a thrust and a mass that
     grow together would leave a copy of the effects for themselves, and loose trust in values would swallow physics.
-    `measured_moment` puts the measured moments into the value columns in place of the predicted ones.
     """
     vehicle, groups = prepared.vehicle, prepared.groups
 
     def source(segment):
-        model, reverse = {}, None
-        if measured_moment and "moment" in groups:
-            reverse = moment_of(segment, vehicle)
+        model = {}
         if segment.motion.rotor_speed is not None:
             model = model_wrench(segment, vehicle, [])
             known = model_wrench(segment, vehicle, effects) if effects else model
@@ -394,7 +394,7 @@ def assemble_rows(
             elif term.kind == "effect":
                 yield from form_columns(term.form, term.values, segment, vehicle, groups)
             elif term.kind == "value":
-                yield value_columns(term.key, segment, vehicle, groups, model, reverse)
+                yield value_columns(term.key, segment, vehicle, groups, model)
             else:
                 yield offset_columns(term.key, segment, vehicle, groups)
 

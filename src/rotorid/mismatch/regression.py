@@ -428,15 +428,6 @@ class Regression:
         """Which columns of a term act in any row fitted, (k,)."""
         return np.diag(self._total_gram)[self.columns([key])] > 0
 
-    def gain_at(self, fit: Fit, own: np.ndarray, left_out: np.ndarray) -> float:
-        """Whitened squares that columns `own` explain on the training blocks with the coefficients of a fit of which
-        the columns `left_out` are taken away: negative where the two only cancel."""
-        gram, cross, bias, bias_cross = self._normal(fit.columns, self.training)
-        gram, cross = gram - bias, cross - bias_cross
-        rest = np.where(np.isin(fit.columns, np.concatenate([own, left_out])), 0.0, fit.beta)
-        part = np.where(np.isin(fit.columns, own), fit.beta, 0.0)
-        return float(2 * part @ (cross - gram @ rest) - part @ gram @ part)
-
     def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
         """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
 
@@ -767,8 +758,3 @@ def build(
         block_s=per_block / rate_hz,
         blocks_of_rows=tuple(blocks_of_rows),
     )
-
-
-def chi2_p(statistic: float, degrees: int) -> float:
-    """Upper tail of χ²."""
-    return float(chi2.sf(statistic, degrees))

@@ -120,7 +120,6 @@ STRAIN = rule(
     "A term does not push a believed value that the model without it leaves near its belief.",
     deviations=(4.0, "standard deviations of trust: beyond, the user's number would have to be a mistake"),
 )
-JACKKNIFE = rule("jackknife", "A term stays significant where every block of the recording has its say.")
 TRANSFER = rule(
     "transfer",
     "A term keeps what it promises on environments that it was not fitted on.",
@@ -129,13 +128,6 @@ TRANSFER = rule(
     promise=(25.0, "whitened squares: less may fail by chance"),
 )
 TWO_SENSORS = rule("two_sensors", "An error of a sensor shows in the comparison with the sensor beside it, too.")
-STEADY = rule(
-    "steady",
-    "A coefficient is the same in every run.",
-    p_value=(1e-6, "some fifty terms in some ten runs are looked at"),
-    spread=(0.4, "share of itself: forms that are nearly right vary by less between manoeuvres"),
-)
-CANCELS_UNNAMED = rule("cancels_unnamed", "A named term does no harm where the terms without a name are left out.")
 CANCELS = rule(
     "cancels",
     "A term is not cancelled by another in its strongest channel.",
@@ -146,26 +138,16 @@ CANCELS = rule(
 
 SIMPLER = rule("simpler", "A model with one id less and other forms of the rest is taken where it explains as much.")
 EXCHANGE = rule("exchange", "An id gives way to another that explains more in its place.")
-PAIR = rule("pair", "Two terms that mask each other enter together.")
-VALUES_FIRST = rule(
-    "values_first", "Believed values alone are taken where with more room they explain as much as effects."
-)
 COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters where no plainer one is left to.")
 
 # Classes
 
-ALIKE = rule("alike", "A simpler term beside which another explains no more than a form's error may stand in for it.")
-SHARED_CLASS = rule("shared_class", "A simpler form of an id and a confuser that acts elsewhere may stand in for it.")
 PAYLOAD_OR_OFFSET = rule("payload_or_offset", "An offset of the centre of mass on a heavier vehicle may be a payload.")
 THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a thrust curve may be a throttle curve.")
 
 # Believed values
 
-VALUE_AGREES = rule("value_agrees", "A wrong value shows with either side of the balance as the regressor.")
 VALUE_TRANSFER = rule("value_transfer", "A wrong value keeps what it promises where it was not fitted.")
-SPARE_VALUE = rule(
-    "spare_value", "Of two values that share one ratio the one that the other can do without is not wrong."
-)
 VALUE_IN_QUESTION = rule(
     "value_in_question", "A value that a member of an open class would change is not called wrong."
 )
@@ -173,7 +155,6 @@ SETTLED = rule("settled", "Values not called wrong move within their trust where
 
 # Flights
 
-UNSURE = rule("unsure", "An effect of which every parameter may be nothing is not in the model.")
 OWN_SCALES = rule("own_scales", "Where thrust differs between runs each run has its own scale.")
 CARRIED = rule("carried", "A load of two plateaus is a payload on board for so long.")
 MERE_SCALE = rule(
@@ -189,14 +170,6 @@ COLOURED_NOISE = rule(
 
 # Stands and benches
 
-SECOND_CHANCE = rule("second_chance", "A term that was refuted beside a false one is asked once more.")
-NOISE_IN_A_PLAY = rule(
-    "noise_in_a_play",
-    "A play of which a part may be noise of measured speeds says nothing.",
-    share=(0.1, "a play is not linear in that noise, so it cannot be taken off"),
-)
-EARLY_FILTER = rule("early_filter", "A reading is not smoothed and early at once: that is noise of the speeds.")
-TWO_ROUNDS = rule("two_rounds", "Forms of many parameters join in a second round: they would swallow several causes.")
 APPROXIMATE = rule("approximate", "An effect is still needed where a stronger one's gain may vary smoothly.")
 NEEDLESS_VALUE = rule("needless_value", "A wrong value is still needed where an effect's form is free or richer.")
 CURVED_GAIN = rule("curved_gain", "A gain beside a curved characteristic is wrong at small loads and over all of them.")
@@ -206,11 +179,6 @@ ELSEWHERE = rule(
     squares=(12.0, "whitened squares: an id's price and half"),
 )
 PLAINER_FORM = rule("plainer_form", "A form of which every number may be nothing gives way to one of fewer parameters.")
-DEARER = rule(
-    "dearer",
-    "Another effect that explains as much only by more parameters is no alternative.",
-    squares=(12.0, "whitened squares less the price of parameters: odds of 400 to 1"),
-)
 ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading are curves of one load.")
 
 # Words

@@ -10,15 +10,13 @@ import numpy as np
 
 from rotorid.mismatch import rules
 from rotorid.mismatch.findings import Reason
-from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
+from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 ENTER_P = 5e-5
 """A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
 KEEP_P = 1e-4
-FINAL_P = 1e-3
-"""The same with a jackknife over blocks, which no single moment of the flight can decide."""
 COST_PER_PARAMETER = 8.0
 """Whitened squares that each further parameter must explain before a richer form is preferred."""
 SMALLEST_SIZE = rules.SIZE["least"]
@@ -32,8 +30,6 @@ ALTERNATIVE_P = 0.01
 """A term that beside an alternative is less significant than this could be that alternative instead."""
 INSTEAD_P = 1e-3
 """It must itself be as significant as this in the other's place."""
-SAME_DIRECTION = 0.05
-"""Share of the strongest combination of a term's parameters below which another is not told from it."""
 MOST_EXTRA_PARAMETERS = 3
 """An alternative with more further parameters than this explains by its freedom, not by its cause."""
 MOST_EFFECTS = 10
@@ -85,18 +81,16 @@ class Questions:
 
     sizes_of: Callable[[str, np.ndarray], np.ndarray]
     """Size of a term (key, coefficients) per channel in units of its noise, (12,), less what values would absorb."""
-    joint_sizes: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    joint_sizes: Callable[[np.ndarray, np.ndarray], np.ndarray]
     """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
     known_sizes: np.ndarray = field(default_factory=lambda: np.zeros(12))
     """The same of effects that are in the model already (between command and rotor speed), (12,)."""
     contradicted: Callable[[str, Fit], bool] | None = None
     """Whether a second sensor shows that an error of the first is none."""
-    confusers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """To an id, those that physics confuses with it."""
 
 
 class Search:
-    """Forward search with replacement of forms, backward checks and pair moves."""
+    """Forward search with replacement of forms and backward checks."""
 
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
@@ -269,21 +263,6 @@ class Search:
             None,
         )
 
-    def values_alone(self, selection: Selection) -> Regression | None:
-        """The regression with more room for believed values, where those alone explain as much as a selection does.
-
-        A value that is off by many times its trust is held back in the search, and something else takes up the rest.
-        """
-        reg, fit = self.regression, selection.fit
-        limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
-        moved = [abs(float(fit.beta[fit.columns == reg.start[t.key]][0])) for t in reg.terms if t.kind == "value"]
-        held = sum(m > NEAR_LIMIT * most for m, most in zip(moved, limits, strict=True))
-        if not held or not selection.active:
-            return None
-        wide = reg.with_room(VALUE_LIMITS[1])
-        enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
-        return wide if rules.VALUES_FIRST(enough) else None
-
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
@@ -321,7 +300,9 @@ class Search:
             active = [k for k in active if k != key]
             refuted[self.terms[key].once] = reason
             trail.append(f"- {key}: {reason}")
-        fit, final = self._jackknifed(active, dropped, trail)
+        # No single block of the recording decides.
+        fit = self.regression.fit(self.always + active, jackknife=True)
+        final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
         kept = {self.terms[k].effect for k in active}
         # What acts in one window of one run was dropped under its key.
         reasons = {self.terms[name].effect if name in self.terms else name: r for name, r in dropped.items()}
@@ -330,7 +311,7 @@ class Search:
     def _grown(self, active: list[str], dropped: dict[str, str], trail: list[str]) -> list[str]:
         """The model grown, its forms replaced and its weak terms taken out; `dropped` and `trail` are filled."""
         for _ in range(4 * MOST_EFFECTS):
-            added = self._next(active, dropped) or self.pair(active, dropped) or []
+            added = self._next(active, dropped) or []
             active = active + added
             trail += [f"+ {key}" for key in added]
             for key in list(active):
@@ -381,7 +362,7 @@ class Search:
         return int(rules.COMPOUND_LAST(later)) if candidate.named else 2
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
-        """A term that another sensor, the held-out runs or the runs among themselves speak against, with the reason."""
+        """A term that another sensor, other environments or another term speak against, with the reason."""
         if self.ask.contradicted is not None:
             fit = self.regression.fit(self.always + active)
             none = next((k for k in active if self.ask.contradicted(k, fit)), None)
@@ -389,10 +370,6 @@ class Search:
                 return none, Reason("two_sensors", "the comparison of two sensors shows nothing of it")
         if rules.TRANSFER((failed := self.refuted_elsewhere(active)) is not None):
             return failed, Reason("transfer", "where it was not fitted it does not keep what it promises")
-        if rules.STEADY((unsteady := self.unsteady(active)) is not None):
-            return unsteady, Reason("steady", "it differs from run to run")
-        if rules.CANCELS_UNNAMED((leaning := self.leaning(active)) is not None):
-            return leaning, Reason("cancels_unnamed", "it only cancels a cause without a name")
         if rules.CANCELS((cancelling := self.cancelling(active)) is not None):
             return cancelling, Reason("cancels", "where it is strongest it only cancels another")
         return None
@@ -403,7 +380,7 @@ class Search:
         Something the catalogue lacks is in a channel where noise is low: a tilt of ten degrees is bought there, and
         an accelerometer that is turned by ten degrees hides it in the force.
         """
-        if self.ask.joint_sizes is None or len(active) < 2:
+        if len(active) < 2:
             return None
         fit = self.regression.fit(self.always + active)
         named = [k for k in active if self.terms[k].effect not in UNKNOWNS and not self.terms[k].run]
@@ -421,20 +398,6 @@ class Search:
                 if least > SMALLEST_SIZE and both[c] < rules.CANCELS["share"] * least:
                     found.add(key)
         return min(found, key=lambda k: fit.gain - self.without(k, active).gain, default=None)
-
-    def _jackknifed(self, active: list[str], dropped: dict[str, str], trail: list[str]):
-        """The final fit and p-values, after terms that hang on single blocks are taken out of `active`."""
-        while True:
-            fit = self.regression.fit(self.always + active, jackknife=True)
-            final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
-            doubtful = max(active, key=lambda k: final[k], default=None)
-            if doubtful is None or not rules.JACKKNIFE(final[doubtful] > FINAL_P):
-                return fit, final
-            active.remove(doubtful)
-            dropped[self.terms[doubtful].once] = Reason(
-                "jackknife", f"p = {final[doubtful]:.2g} where each block has its say"
-            )
-            trail.append(f"- {doubtful}: fails the jackknife")
 
     def refuted_elsewhere(self, active: list[str]) -> str | None:
         """The term that keeps least of what it promises on environments it was not fitted on, if that is too little.
@@ -458,83 +421,8 @@ class Search:
                 worst, found = kept, key
         return found
 
-    def leaning(self, active: list[str]) -> str | None:
-        """The named term that does the most harm where the empirical ones beside it are left out.
-
-        An improved vehicle holds the named ones alone: a tilt of twenty degrees against a force by place that undoes
-        it is a tilt of twenty degrees there. Harm is judged over all channels.
-        """
-        unknown = [k for k in active if self.terms[k].effect in UNKNOWNS]
-        if not unknown:
-            return None
-        fit = self.regression.fit(self.always + active)
-        left_out = self.regression.columns(unknown)
-        worst, found = 0.0, None
-        for key in active:
-            if key in unknown or self.terms[key].run:
-                continue
-            own = self.regression.columns([key])
-            gain = self.regression.gain_at(fit, own, left_out)
-            if gain < worst:
-                worst, found = gain, key
-        return found
-
-    def unsteady(self, active: list[str]) -> str | None:
-        """A term whose coefficients are not the same from run to run, beyond doubt and by much."""
-        fit = self.regression.fit(self.always + active)
-        for key in active:
-            if self.terms[key].run:
-                continue
-            spread, p = self.regression.between_runs(fit, key)
-            cols = self.regression.columns([key])
-            beta = fit.beta[fit.places(cols)]
-            runs = len(np.unique(self.regression.run[self.regression.training]))
-            # Coefficients of one term have different units: what counts is how much of its contribution changes.
-            gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
-            changes = np.diag(gram) @ spread * runs > rules.STEADY["spread"] ** 2 * (beta @ gram @ beta)
-            if p < rules.STEADY["p_value"] and changes:
-                return key
-        return None
-
-    def pair(self, active: list[str], dropped: dict[str, str], most: int = 14) -> list[str] | None:
-        """Two terms that mask each other: neither enters alone, both hold together."""
-        if len(active) > MOST_EFFECTS - 2 or not rules.PAIR.on:
-            return None
-        base = self.regression.explained(self.always + active)
-        best: dict[str, tuple[float, Term]] = {}
-        for gain, term in self.gains(active):
-            if term.form.compound or term.once in dropped:
-                continue
-            if term.once not in best or gain > best[term.once][0]:
-                best[term.once] = (gain, term)
-        pool = sorted(best.values(), key=lambda c: -c[0])[:most]
-        winner, top = None, 0.0
-        for i, (one_gain, one) in enumerate(pool):
-            for other_gain, other in pool[i + 1 :]:
-                keys = [one.key, other.key]
-                gain = self.regression.explained(self.always + active + keys) - base
-                gain -= COST_PER_PARAMETER * (one.size + other.size)
-                if gain < max(one_gain, 0) + max(other_gain, 0) + COST_PER_EFFECT or gain <= top:
-                    continue
-                if rules.PAIR(all(self._holds(k, active + keys) for k in keys)):
-                    winner, top = keys, gain
-        return winner
-
-    def _holds(self, key: str, active: list[str]) -> bool:
-        judged = self.judge(key, active, self.without(key, active))
-        return (
-            judged.p_value < ENTER_P / 10
-            and judged.physical
-            and judged.score > 0
-            and not rules.SIZE(self.weight(key, judged.beta, active) <= SMALLEST_SIZE)
-        )
-
     def alternatives(self, key: str, active: list[str]) -> list[str]:
-        """Ids that could stand in for a term: with one of them in its place the term is no longer needed.
-
-        Nor is it where beside another of fewer parameters it would explain no more than what any form is wrong by, or
-        where another and a simpler form of the term's own id, of as many parameters together, explain as much.
-        """
+        """Ids that could stand in for a term: with one of them in its place the term is no longer needed."""
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
         base = self.without(key, active)
@@ -545,7 +433,7 @@ class Search:
                 continue
             if term.effect in found or term.effect in UNKNOWNS:
                 continue
-            if self._stands_in(term.key, own, rest, base) or rules.SHARED_CLASS(self._shares(term.key, key, rest)):
+            if self._stands_in(term.key, own, rest, base):
                 found.append(term.effect)
         return found
 
@@ -559,47 +447,4 @@ class Search:
         beside = self.regression.fit(self.always + rest + [other])
         if self.ask.contradicted is not None and self.ask.contradicted(other, beside):
             return False
-        both = self.judge(own.key, [*rest, other], beside)
-        alike = len(instead.beta) < len(own.beta) and both.gain < SHARE_OF_LARGEST**2 * own.gain
-        return both.p_value > ALTERNATIVE_P or rules.ALIKE(alike)
-
-    def directions(self, term: Term) -> int:
-        """How many parameters of a term these recordings tell from each other, by the size of what they do.
-
-        Torques of rotors that all turn alike are one moment, however many they are.
-        """
-        cols = self.regression.columns([term.key])
-        gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
-        sizes = np.linalg.eigvalsh(gram)
-        return int((sizes > SAME_DIRECTION * sizes[-1]).sum())
-
-    def _shares(self, other: str, key: str, rest: list[str]) -> bool:
-        """Whether a term is no longer needed beside another and a simpler form of its own id that acts elsewhere.
-
-        Three differences between four rotors may be an offset of the centre of mass, in roll and pitch, and torques
-        that differ, in yaw. Where both act alike the id is there in any case (rotor drag, and the airframe's beside
-        it). Two causes can imitate almost anything, so this is asked of those alone that physics confuses with it.
-        """
-        if self.terms[other].effect not in self.ask.confusers.get(self.terms[key].effect, ()):
-            return False
-        own = self.terms[key]
-        room = own.size - self.terms[other].size
-        if room < 1:
-            return False
-        for simpler in self.terms.values():
-            if simpler.effect != own.effect or simpler.key == key or simpler.run or self.directions(simpler) > room:
-                continue
-            pair = [*rest, simpler.key, other]
-            instead = self.judge(other, pair, self.without(other, pair))
-            if not instead.physical or instead.p_value > INSTEAD_P:
-                continue
-            beside = self.regression.fit(self.always + pair)
-            if self.ask.contradicted is not None and self.ask.contradicted(other, beside):
-                continue
-            both = (beside.beta[beside.places(self.regression.columns([k]))] for k in (simpler.key, other))
-            seen = [
-                self.ask.sizes_of(k, beta) > SMALLEST_SIZE for k, beta in zip((simpler.key, other), both, strict=True)
-            ]
-            if not (seen[0] & seen[1]).any() and self.judge(key, pair, beside).p_value > ALTERNATIVE_P:
-                return True
-        return False
+        return self.judge(own.key, [*rest, other], beside).p_value > ALTERNATIVE_P

@@ -147,21 +147,34 @@ class SpeedProblem:
         self.filters = [autoregression([p[:, j] for p in parts]) for j in range(parts[0].shape[1])]
 
     def fit(self, chain: Chain, start: np.ndarray, shift_s: float = 0.0) -> SpeedFit:
-        """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds."""
-        low = np.array([p.low for _, f in chain for p in f.parameters] + [-2 * self.shift_prior_s])
-        high = np.array([p.high for _, f in chain for p in f.parameters] + [2 * self.shift_prior_s])
-        x0 = np.clip(np.append(start, shift_s), low + 1e-9, high - 1e-9)
-        scale = np.where(np.abs(x0) > 1e-3, np.abs(x0), 0.02)
-        scale[-1] = self.shift_prior_s
+        """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds.
+
+        A delay in the chain is the shift: of both, one would undo the other, and what is interpolated twice is smooth.
+        """
+        count = len(start)
+        low = [p.low for _, f in chain for p in f.parameters] + [-2 * self.shift_prior_s]
+        high = [p.high for _, f in chain for p in f.parameters] + [2 * self.shift_prior_s]
+        x0 = np.clip(np.append(start, shift_s), np.add(low, 1e-9), np.subtract(high, 1e-9))
+        scale = np.append(np.where(np.abs(x0) > 1e-3, np.abs(x0), 0.02)[:-1], self.shift_prior_s)
+        free = slice(0, count if any(form.apply is shifted for _, form in chain) else count + 1)
 
         def function(x):
-            rows = np.concatenate([w.ravel() for w in self.whitened(chain, x[:-1], x[-1])])
-            return np.append(rows, x[-1] / self.shift_prior_s)
+            shift = float(x[count]) if len(x) > count else 0.0
+            rows = np.concatenate([w.ravel() for w in self.whitened(chain, x[:count], shift)])
+            return np.append(rows, shift / self.shift_prior_s)
 
         found = least_squares(
-            function, x0, bounds=(low, high), x_scale=scale, diff_step=1e-4, max_nfev=25, ftol=1e-5, xtol=1e-5
+            function,
+            x0[free],
+            bounds=(low[free], high[free]),
+            x_scale=scale[free],
+            diff_step=1e-4,
+            max_nfev=25,
+            ftol=1e-5,
+            xtol=1e-5,
         )
-        return SpeedFit(chain, found.x[:-1], float(found.x[-1]), 2 * found.cost)
+        shift = float(found.x[count]) if len(found.x) > count else 0.0
+        return SpeedFit(chain, found.x[:count], shift, 2 * found.cost)
 
     def with_covariance(self, fit: SpeedFit) -> SpeedFit:
         """The fit with a covariance that is robust against what whitening left (blocks of a second)."""

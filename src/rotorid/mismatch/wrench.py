@@ -19,15 +19,14 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
-    VALUE_LIMITS,
     Fit,
     Regression,
     autoregression,
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, winds_last
-from rotorid.mismatch.select import FINAL_P, Questions, Search, Selection
+from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual
+from rotorid.mismatch.select import Questions, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
     SpeedResult,
@@ -59,6 +58,8 @@ MEMORY_GRID = 37
 """Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
 
+MOST_P_OF_WIND = 1e-3
+"""p-value up to which a wind is seen by the fit through the drag."""
 SURE_Z = 3.0
 """Standard errors by which a nuisance must differ from nothing to be delivered."""
 MOST_INFLATION = 2.0
@@ -246,15 +247,9 @@ def searched(
         return key in errors and refute(fitted_rows, fit, regression.columns([key]), noise)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
-    confusers = {i: e.confusers for i, e in catalogue().items()}
     known = np.zeros(12) if known_sizes is None else known_sizes
-    ask = Questions(sizes_of, seconds.sizes, known, contradicted, confusers)
-    search = Search(regression.without_winds(), ask)
+    search = Search(regression.without_winds(), Questions(sizes_of, seconds.sizes, known, contradicted))
     selection = search.run(start)
-    if (wide := search.values_alone(selection)) is not None:
-        regression = regression.with_room(VALUE_LIMITS[1])
-        search = Search(wide, ask)
-        selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 
 
@@ -613,7 +608,7 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
         if np.abs(step).max() < 0.01:
             break
     blown = replace(fit, beta=np.append(fit.beta[:-2], wind))  # the last step from it is all that the fit holds
-    if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > FINAL_P:
+    if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > MOST_P_OF_WIND:
         return model  # a wind that the fit through the drag does not see is none
     sd = np.sqrt(np.diag(fit.covariance)[-2:])
     again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
@@ -649,20 +644,3 @@ def after_residual(model: WrenchModel) -> list[np.ndarray]:
 def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
     """Whitening filters that the model's regression was built with."""
     return model.regression.filters
-
-
-def reverse_regression(prepared: Prepared, model: WrenchModel, segments) -> Regression:
-    """The values and selected effects with the measured moments as regressors instead of the predicted ones.
-
-    Noise in the rotor speeds pulls the usual estimate one way, noise in the body rates pulls this one the other
-    way: the truth lies between (Frisch bounds).
-    """
-    active = [model.search.terms[k] for k in model.selection.active]
-    always = [t for t in model.terms if t.kind != "effect"]
-    terms = winds_last([*always, *active])
-    rows = assemble_rows(prepared, terms, segments, chosen(model), measured_moment=True)
-    rate = prepared.thinner.rate_hz
-    regression = build(
-        rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
-    )
-    return regression.without_winds()

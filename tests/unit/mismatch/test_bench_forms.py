@@ -219,21 +219,6 @@ def test_crosstalk_and_a_loop_on_the_mixed_load_bring_no_company():
     assert named(analyse_instrument(recorded(mixed_loop))) == {"crosstalk", "hysteresis"}
 
 
-def test_what_holds_by_itself_has_a_second_chance_unless_it_was_refused():
-    def tilted(load, run, warmth):
-        load[:, 0] += 0.02 * load[:, 2]
-        return load
-
-    setup = set_up(recorded(tilted, runs=3))
-    terms, _ = make_terms(setup)
-    search = reading_model(setup, terms).search
-    chosen = search.second_chance([])
-    assert search.terms[chosen].effect == "crosstalk"
-    assert search.second_chance([chosen]) is None
-    search.refused = {"crosstalk": "said so", "compliance": "said so"}
-    assert search.second_chance([]) is None or search.terms[search.second_chance([])].effect not in search.refused
-
-
 def test_beside_an_s_shape_the_gains_stay_at_their_belief():
     """y = F + 0.3 sin(π F/30 N): slope 0.031 at no load, no wrong gain; a and the full scale come out."""
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load + 0.3 * np.sin(np.pi * load / 30.0)))

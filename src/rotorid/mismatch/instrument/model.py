@@ -23,13 +23,10 @@ from rotorid.mismatch.regression import (
     autoregression,
     bounded,
     build,
-    chi2_p,
     full_fit_residuals,
 )
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import (
-    ENTER_P,
-    SMALLEST_SIZE,
     Questions,
     Search,
     Selection,
@@ -48,38 +45,24 @@ ROWS_PER_COLUMN = 8
 STRONGEST = 0.9
 TARE_MARGIN = 2.0
 """A tare comes from a few samples and is only as good as their mean: an offset must be this much larger."""
-LEAST_BLOCKS_OF_A_RUN = 5
-EXCITED_SHARE = 0.1
-MAIN_SHARE = 0.2
 ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
 MOST_AT_ONCE = 6
 """More causes than this at once are not told apart by six channels: what they leave is stated as unexplained."""
-MOST_OF_A_FORM = 6
-"""Parameters of a form from which it joins in the second round only."""
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
 UNMOVED = 1e-9
 """Relative change of a believed value that is held."""
-LATER = ("thrust and torque apart",)
-"""Forms of fewer parameters that could swallow several causes as well: they join in the second round, too."""
 
 
 class ReadingSearch(Search):
-    """The search in two rounds: first without forms of many parameters, which would swallow several causes at once."""
-
-    rich = False
+    """The search, which also asks whether nonlinear parameters are resolved and which others carry over."""
 
     def __init__(self, regression: Regression, ask: Questions, refused: Mapping[str, str] | None = None):
         super().__init__(regression, ask)
         self.refused = refused or {}
-
-    def _allowed(self, term: Term) -> bool:
-        if self.rich or of_single_runs(term.key) or not rules.TWO_ROUNDS.on:
-            return True
-        return term.size <= MOST_OF_A_FORM and (term.form is None or term.form.name not in LATER)
 
     def physical(self, term, beta, error):
         """Also no nonlinear parameter at its bound, and none that is below what an instrument resolves."""
@@ -92,133 +75,8 @@ class ReadingSearch(Search):
                 return False
         return super().physical(term, beta, error)
 
-    def judge(self, key, active, base, jackknife=False):
-        """As for flights; no play in the noise of speeds; nothing that makes the reading smoothed and early at once.
-
-        Noise is taken off as far as a regressor is linear in it, which a play is not: one of which a tenth may be noise
-        says nothing. A low-pass delays. Smoothing without delay is what takes the noise out of measured rotor speeds:
-        it makes the load quieter and says nothing of the reading.
-        """
-        judged = super().judge(key, active, base, jackknife)
-        if self.terms[key].effect == "hysteresis" and self.regression.bias_gram.any():
-            keys = self.always + [k for k in active if k != key] + [key]
-            noise = self.regression.noise_share(keys, key, judged.beta)
-            if rules.NOISE_IN_A_PLAY(noise > rules.NOISE_IN_A_PLAY["share"]):
-                return replace(judged, physical=False)
-        terms = {self.terms[k].effect: self.terms[k] for k in (*active, key)}
-        early = "delay" in terms and terms["delay"].values and terms["delay"].values[0] < 0
-        both = early and "amplifier_filter" in terms and self.terms[key].effect in ("delay", "amplifier_filter")
-        if rules.EARLY_FILTER(bool(both)):
-            return replace(judged, physical=False)
-        return judged
-
     def candidates(self, active):
-        if len(active) >= MOST_AT_ONCE:
-            return []
-        return [c for c in super().candidates(active) if self._allowed(self.terms[c.key])]
-
-    def _next(self, active, dropped):
-        """As for flights; where a richer form of what is at work explains more than any newcomer it comes first.
-
-        It takes the other's place in `active`. What is of many parameters may enter so, for it has its cause already.
-        """
-        added = super()._next(active, dropped)
-        if self.rich or added is None:
-            return added
-        best, found = self.worth([*active, *added]), None
-        for place, key in enumerate(active):
-            for term in self.terms.values():
-                if term.kind == "effect" and term.effect == self.terms[key].effect and not self._allowed(term):
-                    trial = [*active[:place], term.key, *active[place + 1 :]]
-                    if (worth := self.worth(trial)) > best:
-                        best, found = worth, trial
-        if found is None or not self._all_physical(found):
-            return added
-        active[:] = found
-        return self._next(active, dropped)
-
-    def best_form(self, key, active):
-        if self.rich:
-            return super().best_form(key, active)
-        every = self.terms
-        self.terms = {k: t for k, t in every.items() if self._allowed(t) or k == key or k in active}
-        try:
-            return super().best_form(key, active)
-        finally:
-            self.terms = every
-
-    def simpler(self, active):
-        every = self.terms
-        self.terms = {k: t for k, t in every.items() if self._allowed(t) or k in active}
-        try:
-            return super().simpler(active)
-        finally:
-            self.terms = every
-
-    def swapped(self, active, dropped):
-        every = self.terms
-        self.terms = {k: t for k, t in every.items() if self._allowed(t) or k in active}
-        try:
-            return super().swapped(active, dropped)
-        finally:
-            self.terms = every
-
-    def second_chance(self, active):
-        """A term that passes every test beside what is at work, whatever was found of it beside other terms.
-
-        One that did not keep its promise may have stood beside a false term, which was refuted after it.
-        """
-        for c in self.candidates(active):
-            holds = c.named and c.score > 0 and c.p_value < ENTER_P and c.physical
-            if not holds or self.terms[c.key].effect in self.refused:
-                continue
-            trial = [*active, c.key]
-            if self.weight(c.key, c.beta, active) >= SMALLEST_SIZE and self._refuted(trial) is None:
-                return c.key
-        return None
-
-    def unsteady(self, active):
-        """A term one of whose coefficients differs from run to run, beyond doubt and by much.
-
-        Each coefficient is refitted in the runs that excite it, all others held. A term without a name, which may
-        say that something differs from run to run, makes no other steady.
-        """
-        reg = self.regression
-        fit = reg.fit(self.always + active)
-        unnamed = reg.columns([k for k in active if self.terms[k].effect in UNKNOWNS])
-        fit = replace(fit, beta=np.where(np.isin(fit.columns, unnamed), 0.0, fit.beta))
-        place = {c: i for i, c in enumerate(fit.columns)}
-        runs = np.unique(reg.run[reg.training])
-        for key in active:
-            if self.terms[key].effect in UNKNOWNS:
-                continue
-            for column in reg.columns([key]):
-                beta = fit.beta[place[column]]
-                total = reg.gram[reg.training][:, column, column].sum()
-                found = []
-                for run in runs:
-                    mask = np.flatnonzero(reg.training & (reg.run == run))
-                    own = reg.gram[mask, column, column]
-                    if len(mask) < LEAST_BLOCKS_OF_A_RUN or own.sum() < EXCITED_SHARE * total / len(runs):
-                        continue
-                    rest = reg.gram[np.ix_(mask, [column], fit.columns)][:, 0, :] @ fit.beta - own * beta
-                    scores = reg.cross[mask, column] - rest
-                    here = scores.sum() / own.sum()
-                    spread = np.sum((scores - own * here) ** 2) / own.sum() ** 2
-                    found.append((here, max(spread, 1.0 / own.sum())))
-                if len(found) < 2:
-                    continue
-                b, v = np.array(found).T
-                mean = np.sum(b / v) / np.sum(1 / v)
-                q = float(np.sum((b - mean) ** 2 / v))
-                wide = np.sqrt(np.mean((b - mean) ** 2)) > rules.STEADY["spread"] * abs(mean)
-                main = beta**2 * total > MAIN_SHARE * np.sum(
-                    fit.beta[[place[c] for c in reg.columns([key])]] ** 2
-                    * np.diagonal(reg.gram[reg.training].sum(axis=0))[reg.columns([key])]
-                )
-                if wide and main and chi2_p(q, len(b) - 1) < rules.STEADY["p_value"]:
-                    return key
-        return None
+        return [] if len(active) >= MOST_AT_ONCE else super().candidates(active)
 
     def alternatives(self, key, active):
         """Of what could stand in for a term by all runs together, what is worth about as much where it was not fitted.
@@ -233,26 +91,9 @@ class ReadingSearch(Search):
             own, terms = [*self.always, *rest, key], [t.key for t in self.terms.values() if t.effect == effect]
             others = ([*self.always, *rest, t] for t in terms)
             worse = min(self.regression.compare(own, o, whole_runs=runs >= LEAST_RUNS).total for o in others)
-            dearer = self.worth([*rest, key]) - max(self.worth([*rest, t]) for t in terms)
-            far = rules.ELSEWHERE(worse > rules.ELSEWHERE["squares"])
-            return far or rules.DEARER(dearer > rules.DEARER["squares"])
+            return rules.ELSEWHERE(worse > rules.ELSEWHERE["squares"])
 
         return [effect for effect in super().alternatives(key, active) if not refuted(effect)]
-
-    def run(self, active=None) -> Selection:
-        """Both rounds; the second starts from what the first found, the last once more from what it left out."""
-        first = super().run(active)
-        self.rich = True
-        second = super().run(first.active)
-        while rules.SECOND_CHANCE((again := self.second_chance(second.active)) is not None):
-            trail = [*second.trail, f"+ {again}: it holds by itself"]
-            third = super().run([*second.active, again])
-            if again not in third.active:
-                break
-            second = replace(third, trail=trail + third.trail, not_established=second.not_established)
-        kept = {self.terms[k].effect for k in second.active}
-        dropped = {e: r for e, r in (first.not_established | second.not_established).items() if e not in kept}
-        return replace(second, trail=first.trail + second.trail, not_established=dropped)
 
 
 @dataclass
@@ -296,11 +137,6 @@ class ReadingModel:
     def change(self, key: str, coefficient: float, sd: float) -> tuple[float, float]:
         """Relative change of a believed value and its one-sigma: nothing accelerates on a stand, its coefficient."""
         return coefficient, sd
-
-
-def of_single_runs(key: str) -> bool:
-    """Whether a term has numbers of its own for each run."""
-    return "own in each run" in key
 
 
 def kept_values(search: Search, active: Sequence[str]) -> list[str]:
