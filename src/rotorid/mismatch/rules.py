@@ -128,6 +128,12 @@ TRANSFER = rule(
     promise=(25.0, "whitened squares: less may fail by chance"),
 )
 TWO_SENSORS = rule("two_sensors", "An error of a sensor shows in the comparison with the sensor beside it, too.")
+STEADY = rule(
+    "steady",
+    "A coefficient of a flight is the same in every run.",
+    p_value=(1e-6, "some fifty terms in some ten runs are looked at"),
+    spread=(0.4, "share of itself: forms that are nearly right vary by less between manoeuvres"),
+)
 CANCELS = rule(
     "cancels",
     "A term is not cancelled by another in its strongest channel.",
@@ -138,6 +144,9 @@ CANCELS = rule(
 
 SIMPLER = rule("simpler", "A model with one id less and other forms of the rest is taken where it explains as much.")
 EXCHANGE = rule("exchange", "An id gives way to another that explains more in its place.")
+VALUES_FIRST = rule(
+    "values_first", "Believed values alone are taken where with more room they explain as much as effects."
+)
 COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters where no plainer one is left to.")
 
 # Classes

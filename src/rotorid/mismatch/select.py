@@ -10,7 +10,7 @@ import numpy as np
 
 from rotorid.mismatch import rules
 from rotorid.mismatch.findings import Reason
-from rotorid.mismatch.regression import MOST_ATTENUATION, Fit, Regression, quadratic_form
+from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
 
@@ -263,6 +263,21 @@ class Search:
             None,
         )
 
+    def values_alone(self, selection: Selection) -> Regression | None:
+        """The regression with more room for believed values, where those alone explain as much as a selection does.
+
+        A value that is off by many times its trust is held back in the search, and something else takes up the rest.
+        """
+        reg, fit = self.regression, selection.fit
+        limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
+        moved = [abs(float(fit.beta[fit.columns == reg.start[t.key]][0])) for t in reg.terms if t.kind == "value"]
+        held = sum(m > NEAR_LIMIT * most for m, most in zip(moved, limits, strict=True))
+        if not held or not selection.active:
+            return None
+        wide = reg.with_room(VALUE_LIMITS[1])
+        enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
+        return wide if rules.VALUES_FIRST(enough) else None
+
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
@@ -370,6 +385,8 @@ class Search:
                 return none, Reason("two_sensors", "the comparison of two sensors shows nothing of it")
         if rules.TRANSFER((failed := self.refuted_elsewhere(active)) is not None):
             return failed, Reason("transfer", "where it was not fitted it does not keep what it promises")
+        if rules.STEADY((unsteady := self.unsteady(active)) is not None):
+            return unsteady, Reason("steady", "it differs from run to run")
         if rules.CANCELS((cancelling := self.cancelling(active)) is not None):
             return cancelling, Reason("cancels", "where it is strongest it only cancels another")
         return None
@@ -420,6 +437,23 @@ class Search:
             if kept < worst:
                 worst, found = kept, key
         return found
+
+    def unsteady(self, active: list[str]) -> str | None:
+        """A term whose coefficients are not the same from run to run, beyond doubt and by much."""
+        fit = self.regression.fit(self.always + active)
+        for key in active:
+            if self.terms[key].run:
+                continue
+            spread, p = self.regression.between_runs(fit, key)
+            cols = self.regression.columns([key])
+            beta = fit.beta[fit.places(cols)]
+            runs = len(np.unique(self.regression.run[self.regression.training]))
+            # Coefficients of one term have different units: what counts is how much of its contribution changes.
+            gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
+            changes = np.diag(gram) @ spread * runs > rules.STEADY["spread"] ** 2 * (beta @ gram @ beta)
+            if p < rules.STEADY["p_value"] and changes:
+                return key
+        return None
 
     def alternatives(self, key: str, active: list[str]) -> list[str]:
         """Ids that could stand in for a term: with one of them in its place the term is no longer needed."""

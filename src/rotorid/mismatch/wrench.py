@@ -19,6 +19,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
+    VALUE_LIMITS,
     Fit,
     Regression,
     autoregression,
@@ -248,8 +249,13 @@ def searched(
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
     known = np.zeros(12) if known_sizes is None else known_sizes
-    search = Search(regression.without_winds(), Questions(sizes_of, seconds.sizes, known, contradicted))
+    ask = Questions(sizes_of, seconds.sizes, known, contradicted)
+    search = Search(regression.without_winds(), ask)
     selection = search.run(start)
+    if (wide := search.values_alone(selection)) is not None:
+        regression = regression.with_room(VALUE_LIMITS[1])
+        search = Search(wide, ask)
+        selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 
 

@@ -178,6 +178,33 @@ def test_effects_that_add_up_are_left_alone():
     assert search_of([term("e0"), term("e1")], y, x).cancelling(["e0/form", "e1/form"]) is None
 
 
+def imitated_value(change: float, own: float, copied: float = 0.98) -> Search:
+    """A value that is `change` off, trusted to a twentieth, and an effect that looks nearly like it, `own` at work."""
+    rng = np.random.default_rng(4)
+    noise, x = case(rng, 2)
+    x = [[30 * a, 30 * (copied * a + np.sqrt(1 - copied**2) * b)] for a, b in x]
+    y = [n + change * a + own * b for n, (a, b) in zip(noise, x, strict=True)]
+    return search_of([Term("inertia_xx", "value", prior_sd=(0.05,)), term("unequal_rotors")], y, x)
+
+
+def test_a_value_far_beyond_its_trust_is_not_taken_up_by_an_effect_that_looks_like_it():
+    """Held to 0.15 in the search, 0.3 in truth: the value alone, with room, explains as much."""
+    search = imitated_value(0.3, 0.0)
+    found = search.run()
+    assert found.active == ["unequal_rotors/form"]
+    wide = search.values_alone(found)
+    assert abs(wide.fit(search.always).beta[0] - 0.3) < 0.01
+
+
+def test_beside_an_effect_that_is_there_a_value_has_no_more_room():
+    search = imitated_value(0.2, 0.2)
+    found = search.run()
+    assert found.active == ["unequal_rotors/form"] and search.values_alone(found) is None
+    # Nor where no value is held at its limit.
+    calm = imitated_value(0.02, 0.2)
+    assert calm.values_alone(calm.run()) is None
+
+
 def test_a_term_that_turns_a_value_from_one_side_of_its_belief_to_the_other_strains_it():
     """Without the term the value is three deviations low, with it five high: as far off, and pushed all the same."""
     rng = np.random.default_rng(5)

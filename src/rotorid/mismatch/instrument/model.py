@@ -78,6 +78,10 @@ class ReadingSearch(Search):
     def candidates(self, active):
         return [] if len(active) >= MOST_AT_ONCE else super().candidates(active)
 
+    def unsteady(self, active):
+        """None: an instrument's runs load different axes, and no coefficient could be asked of each."""
+        return None
+
     def alternatives(self, key, active):
         """Of what could stand in for a term by all runs together, what is worth about as much where it was not fitted.
 
