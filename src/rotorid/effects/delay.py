@@ -4,23 +4,33 @@ import numpy as np
 
 from rotorid.effects.clock_skew import at_other_times
 from rotorid.effects.contract import Effect, Form, Parameter, SpeedForm
-from rotorid.effects.loading import weights_of_four
+from rotorid.effects.loading import between_samples
 from rotorid.effects.recorded import late_sensors
 
 
-def shifted(path, values):
-    """ω(t) = ω_c(t - T), cubic between samples; the ends are held.
+def _later(speed, steps):
+    """Speeds (n, k) by whole steps later (earlier if negative); the ends are held."""
+    steps = int(np.clip(steps, -len(speed), len(speed)))
+    out = np.empty_like(speed)
+    if steps >= 0:
+        out[:steps], out[steps:] = speed[0], speed[: len(speed) - steps]
+    else:
+        out[steps:], out[:steps] = speed[-1], speed[-steps:]
+    return out
 
-    The mean of two neighbours, for a command that is held, would take 8 % of a fifth of the sampling rate away.
-    """
-    count = len(path.speed)
-    steps = float(np.clip(values[0] / path.dt_s, -count, count))
-    whole = int(np.floor(steps))
-    weights = weights_of_four(2.0 - (steps - whole))
-    ends = abs(whole) + 2
-    held = np.pad(path.speed, ((ends, ends), (0, 0)), "edge")
-    first = ends - whole - 2
-    return sum(w * held[first + i : first + i + count] for i, w in enumerate(weights) if w)
+
+def shifted(path, values):
+    """ω(t) = ω_c(t - T): of a command that holds the mean over a sample, of a smooth one a cubic between samples."""
+    steps = values[0] / path.dt_s
+    if not path.holds:
+        return between_samples(path.speed, np.arange(len(path.speed)) - steps)
+    whole = np.floor(steps)
+    part = steps - whole
+    out = _later(path.speed, whole)
+    if part > 0.0:
+        out *= 1.0 - part
+        out += part * _later(path.speed, whole + 1)
+    return out
 
 
 def set_forms(vehicle):

@@ -70,7 +70,9 @@ class Leftover:
 
     def path(self, segment: Segment, chain, values) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands."""
-        return commanded_path(segment, chain, values, self.result.fit.shift_s, self.full, self.volt)
+        return commanded_path(
+            segment, chain, values, self.result.fit.shift_s, self.full, self.volt, self.result.fit.holds
+        )
 
     def _speeds(self, segment, chain, values) -> np.ndarray:
         return segment.motion.rotor_speed - self.path(segment, chain, values)

@@ -349,7 +349,9 @@ def make_traces(
                 out.append(Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c]))
         if chain is not None and found.measured:
             result = chain[0]
-            path = commanded_path(segment, result.fit.chain, result.fit.values, result.fit.shift_s, *chain[1:])
+            path = commanded_path(
+                segment, result.fit.chain, result.fit.values, result.fit.shift_s, *chain[1:], result.fit.holds
+            )
             believed = prepared.thinner(segment.motion.rotor_speed - segment.command)
             left = prepared.thinner(segment.motion.rotor_speed - path)
             for i in range(believed.shape[1]):
@@ -409,9 +411,8 @@ def speed_floor(found: Fitted) -> np.ndarray:
     """
     thinner, left, inputs = found.prepared.thinner, [], []
     for segment in found.prepared.segments:
-        path = commanded_path(
-            segment, found.chain[0].fit.chain, found.chain[0].fit.values, found.chain[0].fit.shift_s, *found.chain[1:]
-        )
+        fit = found.chain[0].fit
+        path = commanded_path(segment, fit.chain, fit.values, fit.shift_s, *found.chain[1:], fit.holds)
         left.append(thinner(segment.motion.rotor_speed - path))
         command = segment.command / max(float(np.abs(segment.command).max()), 1e-12)
         slope = np.gradient(command, segment.dt_s, axis=0)

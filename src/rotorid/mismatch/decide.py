@@ -185,6 +185,7 @@ def wrong_values(
     regression: Regression,
     search: Search,
     selection: Selection,
+    reverse: Regression | None,
     size_of: Callable[[str, float], float],
     moving: bool = True,
     refused: Collection[str] = (),
@@ -193,11 +194,13 @@ def wrong_values(
 
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
     counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
-    sold as a wrong thrust and three wrong inertias. A value is named only where it survives on the held-out part, and
-    where it matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is
-    False on a stand, where a mass only weighs; `refused` values are not called wrong.
+    sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
+    side (`reverse`: measured moments as regressors) agrees, where it survives on the held-out part, and where it
+    matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is False
+    on a stand, where a mass only weighs; `refused` values are not called wrong.
     """
     regression = regression.with_room(LEAST_ROOM)
+    reverse = None if reverse is None else reverse.with_room(LEAST_ROOM)
     nuisance = regression.keys_of("nuisance", "wind")
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
@@ -223,16 +226,20 @@ def wrong_values(
     at_limits: list[list[str]] = []
     while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
         fit = regression.fit(always + named, loose=loose)
+        other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
         certainty, pinned = {}, False
         for key in named:
             beta, covariance = coefficients(regression, fit, key)
             change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
+            check = float(coefficients(reverse or regression, other, key)[0][0])
             noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
+            agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
+            agrees = not rules.VALUE_AGREES(not agrees)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
             fails = rules.VALUE_TRANSFER(fails_elsewhere(regression, always, named, key, loose))
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not matters:
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:
             # Two values that run away together say nothing against either of them alone.

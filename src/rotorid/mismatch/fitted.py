@@ -32,6 +32,7 @@ from rotorid.mismatch.wrench import (
     chosen,
     path_segments,
     refine_nonlinear,
+    reverse_regression,
     speed_path,
     with_wind,
     wrench_model,
@@ -207,8 +208,9 @@ def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
 
 def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
     """Believed values that the model's recordings contradict, less those refused."""
-    search = model.search
-    return wrong_values(search.regression, search, model.selection, size_of_value(model), refused=refused)
+    reverse, search = reverse_regression(model.prepared, model, model.segments), model.search
+    size = size_of_value(model)
+    return wrong_values(search.regression, search, model.selection, reverse, size, refused=refused)
 
 
 def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:

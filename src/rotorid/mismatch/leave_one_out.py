@@ -138,7 +138,7 @@ def speeds_without(found: Fitted, seen: WrenchModel, key: str, traces: tuple[Tra
     result, *rest = chain_without(found, key)
     thinner, known = seen.prepared.thinner, {}
     for r, segment in zip(seen.rows, seen.prepared.segments, strict=True):
-        path = commanded_path(segment, result.fit.chain, result.fit.values, result.fit.shift_s, *rest)
+        path = commanded_path(segment, result.fit.chain, result.fit.values, result.fit.shift_s, *rest, result.fit.holds)
         left = thinner(segment.motion.rotor_speed - path)
         known |= {(r.run, first_s(r.time_s), f"rotor_speed_{i + 1}"): own for i, own in enumerate(left.T)}
     return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.after) for t in traces)

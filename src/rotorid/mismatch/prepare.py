@@ -30,6 +30,9 @@ from rotorid.mismatch.rows import (
     slope_column,
     value_columns,
 )
+from rotorid.mismatch.rows import (
+    measured_moment as moment_of,
+)
 from rotorid.mismatch.split import HELD_OUT_SHARE, split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS, empirical_effects
 from rotorid.mismatch.voltmeter import without_noise
@@ -369,16 +372,20 @@ def assemble_rows(
     terms: list[Term],
     segments: list[Segment] | None = None,
     effects: list[tuple[Form, np.ndarray]] | None = None,
+    measured_moment: bool = False,
 ) -> list[Rows]:
     """Rows of every segment for the given terms; `effects` only shape the accelerations in regressors.
 
     The columns of believed values are built on the baseline alone: with effects in them, a thrust and a mass that
     grow together would leave a copy of the effects for themselves, and loose trust in values would swallow physics.
+    `measured_moment` puts the measured moments into the value columns in place of the predicted ones.
     """
     vehicle, groups = prepared.vehicle, prepared.groups
 
     def source(segment):
-        model = {}
+        model, reverse = {}, None
+        if measured_moment and "moment" in groups:
+            reverse = moment_of(segment, vehicle)
         if segment.motion.rotor_speed is not None:
             model = model_wrench(segment, vehicle, [])
             known = model_wrench(segment, vehicle, effects) if effects else model
@@ -394,7 +401,7 @@ def assemble_rows(
             elif term.kind == "effect":
                 yield from form_columns(term.form, term.values, segment, vehicle, groups)
             elif term.kind == "value":
-                yield value_columns(term.key, segment, vehicle, groups, model)
+                yield value_columns(term.key, segment, vehicle, groups, model, reverse)
             else:
                 yield offset_columns(term.key, segment, vehicle, groups)
 

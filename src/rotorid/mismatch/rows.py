@@ -62,6 +62,11 @@ class Term:
         return self.key if self.run else self.effect
 
 
+def winds_last(terms: Iterable[Term]) -> list[Term]:
+    """Terms with the winds of single runs after all others, where `Regression.without_winds` expects them."""
+    return sorted(terms, key=lambda t: t.kind == "wind" and bool(t.run))
+
+
 def baseline_wrench(motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Thrust force, thrust moment and reaction torque of the believed rotors, each (n, 3), N and N m."""
     squared = motion.rotor_speed**2
@@ -170,20 +175,32 @@ def slope_column(term: Term, segment: Segment, vehicle: Vehicle, groups) -> dict
     return {k: (a[k] - b[k]) / (2 * step) for k in a}
 
 
+def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:
+    """J dΩ/dt + Ω × J Ω from the measured body rates, (n, 3), N m."""
+    inertia, rate = vehicle.inertia_kg_m2.matrix(), segment.motion.angular_velocity
+    return segment.motion.angular_acceleration @ inertia + np.cross(rate, rate @ inertia)
+
+
 def value_columns(
     key: str,
     segment: Segment,
     vehicle: Vehicle,
     groups,
     model: dict[str, np.ndarray],
+    reverse: np.ndarray | None = None,
 ):
     """Column of a relative change of one believed value, as channel contributions.
 
     Accelerations on the left side are replaced by what the current model predicts (`model`: force N and moment
-    N m, native rate), because a regression on a noisy derivative of the body rate would be biased.
+    N m, native rate), because a regression on a noisy derivative of the body rate would be biased. `reverse`
+    (the measured moment, (n, 3), N m) takes the predicted moments' place for a check from the other side.
     """
     motion = segment.motion
     force, arm, torque = baseline_wrench(motion, vehicle)
+    if reverse is not None:
+        arm = reverse * np.array([1.0, 1.0, 0.0])
+        torque = reverse * np.array([0.0, 0.0, 1.0])
+        model = {**model, "moment": reverse}
     out = {}
     if key == "thrust":
         out = {"force": force, "moment": arm}

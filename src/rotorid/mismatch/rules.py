@@ -156,6 +156,7 @@ THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a
 
 # Believed values
 
+VALUE_AGREES = rule("value_agrees", "A wrong value shows with either side of the balance as the regressor.")
 VALUE_TRANSFER = rule("value_transfer", "A wrong value keeps what it promises where it was not fitted.")
 VALUE_IN_QUESTION = rule(
     "value_in_question", "A value that a member of an open class would change is not called wrong."

@@ -18,6 +18,7 @@ from scipy.stats import chi2
 from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import SpeedForm, SpeedPath
 from rotorid.effects.delay import shifted
+from rotorid.effects.loading import weights_of_four
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
 from rotorid.signal import kernels
@@ -32,6 +33,8 @@ LIFT_SD = 0.02
 """One-sigma of mean thrust over mean weight with the values as fitted: who flies is carried by his rotors. Whitened
 residuals of a hover say little of their mean, and a curve of too little thrust would explain moments that do not
 respond. Two percent are an accelerometer's scale."""
+PLAINLY_LESS = 0.98
+"""Share of the squares that commands which hold leave, below which commands are smooth: a lag imitates either."""
 CURVE_STAGE, LIMIT_STAGE = 0, 2
 LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
 MOST_LIMITED = 0.5
@@ -52,6 +55,8 @@ class SpeedFit:
     cost: float
     covariance: np.ndarray | None = None
     inflation: float = 1.0
+    holds: bool = True
+    """Whether commands hold from sample to sample; else they are smooth, and recorded now and then."""
 
     def of(self, effect_id: str) -> tuple[SpeedForm, np.ndarray]:
         """Form and values of one id."""
@@ -91,19 +96,40 @@ class SpeedResult:
 
 
 def commanded_path(
-    segment: Segment, chain: Chain, values: np.ndarray, shift_s: float, full_speed: float, full_voltage: float | None
+    segment: Segment,
+    chain: Chain,
+    values: np.ndarray,
+    shift_s: float,
+    full_speed: float,
+    full_voltage: float | None,
+    holds: bool = True,
 ) -> np.ndarray:
-    """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands."""
+    """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands; `holds` as in SpeedFit."""
     motion = segment.motion
     path = SpeedPath(segment.command, motion.time_s, full_speed, motion.voltage, full_voltage)
     steps, at = [], 0
     for _, form in chain:
         steps.append((form.stage, form.apply, values[at : at + len(form.parameters)]))
         at += len(form.parameters)
-    steps.append((3, shifted, np.array([shift_s])))
+    steps.append((3, shifted if holds else moved, np.array([shift_s])))
     for _, apply, own in sorted(steps, key=lambda s: s[0]):
         path = replace(path, speed=apply(path, own))
     return path.speed
+
+
+def moved(path: SpeedPath, values: np.ndarray) -> np.ndarray:
+    """Speeds (n, k) of a smooth command later by `values[0]`, s: cubic between samples, the ends held.
+
+    The mean of two neighbours, as of a command that holds, would take 8 % of a fifth of the sampling rate away.
+    """
+    count = len(path.speed)
+    steps = float(np.clip(values[0] / path.dt_s, -count, count))
+    whole = int(np.floor(steps))
+    weights = weights_of_four(2.0 - (steps - whole))
+    ends = abs(whole) + 2
+    held = np.pad(path.speed, ((ends, ends), (0, 0)), "edge")
+    first = ends - whole - 2
+    return sum(w * held[first + i : first + i + count] for i, w in enumerate(weights) if w)
 
 
 class SpeedProblem:
@@ -115,9 +141,10 @@ class SpeedProblem:
         self.full_voltage = full_voltage
         self.filters: list[np.ndarray] | None = None
         self.shift_prior_s = 0.5 / segments[0].rate_hz
+        self.holds = True
 
     def path(self, segment: Segment, chain: Chain, values, shift_s: float) -> np.ndarray:
-        return commanded_path(segment, chain, values, shift_s, self.full_speed, self.full_voltage)
+        return commanded_path(segment, chain, values, shift_s, self.full_speed, self.full_voltage, self.holds)
 
     def raw(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
         """Residual of every segment, (n, channels), unwhitened."""
@@ -147,34 +174,21 @@ class SpeedProblem:
         self.filters = [autoregression([p[:, j] for p in parts]) for j in range(parts[0].shape[1])]
 
     def fit(self, chain: Chain, start: np.ndarray, shift_s: float = 0.0) -> SpeedFit:
-        """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds.
-
-        A delay in the chain is the shift: of both, one would undo the other, and what is interpolated twice is smooth.
-        """
-        count = len(start)
-        low = [p.low for _, f in chain for p in f.parameters] + [-2 * self.shift_prior_s]
-        high = [p.high for _, f in chain for p in f.parameters] + [2 * self.shift_prior_s]
-        x0 = np.clip(np.append(start, shift_s), np.add(low, 1e-9), np.subtract(high, 1e-9))
-        scale = np.append(np.where(np.abs(x0) > 1e-3, np.abs(x0), 0.02)[:-1], self.shift_prior_s)
-        free = slice(0, count if any(form.apply is shifted for _, form in chain) else count + 1)
+        """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds."""
+        low = np.array([p.low for _, f in chain for p in f.parameters] + [-2 * self.shift_prior_s])
+        high = np.array([p.high for _, f in chain for p in f.parameters] + [2 * self.shift_prior_s])
+        x0 = np.clip(np.append(start, shift_s), low + 1e-9, high - 1e-9)
+        scale = np.where(np.abs(x0) > 1e-3, np.abs(x0), 0.02)
+        scale[-1] = self.shift_prior_s
 
         def function(x):
-            shift = float(x[count]) if len(x) > count else 0.0
-            rows = np.concatenate([w.ravel() for w in self.whitened(chain, x[:count], shift)])
-            return np.append(rows, shift / self.shift_prior_s)
+            rows = np.concatenate([w.ravel() for w in self.whitened(chain, x[:-1], x[-1])])
+            return np.append(rows, x[-1] / self.shift_prior_s)
 
         found = least_squares(
-            function,
-            x0[free],
-            bounds=(low[free], high[free]),
-            x_scale=scale[free],
-            diff_step=1e-4,
-            max_nfev=25,
-            ftol=1e-5,
-            xtol=1e-5,
+            function, x0, bounds=(low, high), x_scale=scale, diff_step=1e-4, max_nfev=25, ftol=1e-5, xtol=1e-5
         )
-        shift = float(found.x[count]) if len(found.x) > count else 0.0
-        return SpeedFit(chain, found.x[:count], shift, 2 * found.cost)
+        return SpeedFit(chain, found.x[:-1], float(found.x[-1]), 2 * found.cost, holds=self.holds)
 
     def with_covariance(self, fit: SpeedFit) -> SpeedFit:
         """The fit with a covariance that is robust against what whitening left (blocks of a second)."""
@@ -350,7 +364,10 @@ class SpeedSearch:
         return sum(float((w**2).sum()) for w in self.problem.whitened(chain, values, shift_s))
 
     def rich_noise(self) -> None:
-        """Learn the noise from the richest chain: one form of every id, in two rounds."""
+        """Learn the noise from the richest chain: one form of every id, of commands that hold or of smooth ones.
+
+        The two are compared by sizes alone: whitened by its own residual, the poorer would look as good.
+        """
         rich = {}
         for key, form in self.forms:
             if key in before_the_rotors() and form.stage != LIMIT_STAGE and key not in rich:
@@ -358,6 +375,10 @@ class SpeedSearch:
         fit = self.problem.fit((), np.zeros(0))
         for key, form in rich.items():
             fit = self.best_fit((*fit.chain, (key, form)), fit, form)
+        self.problem.holds = False
+        smooth = self.problem.fit(fit.chain, fit.values, fit.shift_s)
+        self.problem.holds = bool(smooth.cost > PLAINLY_LESS * fit.cost)
+        fit = fit if self.problem.holds else smooth
         if isinstance(self.problem, WrenchOnly):
             self.problem.refresh(fit)
         self.problem.learn_noise(fit.chain, fit.values, fit.shift_s)
@@ -495,12 +516,17 @@ class SpeedSearch:
         return bool(held.mean(axis=0).max() > MOST_LIMITED)
 
     def negligible(self, fit: SpeedFit, key: str) -> bool:
-        """Whether an id's parameters are all closer to changing nothing than their own limits; of a lag, than half a
-        sample: from one command to the next nobody recorded what happened."""
+        """Whether an id's parameters are all closer to changing nothing than their own limits.
+
+        Of a lag or a delay, than half a sample: from one command to the next nobody recorded what happened. The shift
+        is a delay, too: what one takes back of the other is none.
+        """
         form, values = fit.of(key)
-        least = 0.5 / self.problem.segments[0].rate_hz if key == "motor_lag" else 0.0
+        delays = form.apply is shifted
+        least = 0.5 / self.problem.segments[0].rate_hz if delays or key == "motor_lag" else 0.0
+        away = values + fit.shift_s if delays else values
         limits = [max(p.negligible, least) for p in form.parameters]
-        return all(abs(v - n) < limit for v, n, limit in zip(values, form.neutral, limits, strict=True))
+        return all(abs(v - n) < limit for v, n, limit in zip(away, form.neutral, limits, strict=True))
 
     def _without(self, fit: SpeedFit, key: str) -> SpeedFit:
         where = fit.slice_of(key)

@@ -33,12 +33,12 @@ def columns(size: int, rng) -> np.ndarray:
     return x
 
 
-def search_of(made, sizes) -> Search:
-    """A search of which only the sizes are asked."""
-    return Search(made, Questions(sizes, lambda columns, coefficients: np.ones(12)))
+def not_asked(columns, coefficients) -> np.ndarray:
+    """Joint sizes, which are not asked for here."""
+    return np.ones(12)
 
 
-def judged(changes: dict[str, float], seed: int = 0, size: int = 4000, refused=()) -> dict:
+def judged(changes: dict[str, float], seed: int = 0, reverse: bool = True, size: int = 4000, refused=()) -> dict:
     """What is said of a recording in which some values are off by relative changes."""
     rng = np.random.default_rng(seed)
     x = columns(size, rng)
@@ -50,13 +50,16 @@ def judged(changes: dict[str, float], seed: int = 0, size: int = 4000, refused=(
     terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
     filters = {c: np.array([1.0 / NOISE]) for c in (2, 5)}
     made = build([rows], terms, filters, lambda run, t: True, 1.0, RATE_HZ)
+    # The other side agrees, or sees the opposite of it.
+    other = Rows("a", rows.time_s, y if reverse else -y, x)
+    back = build([other], terms, filters, lambda run, t: True, 1.0, RATE_HZ)
 
     def size_of(key, change):
         column = x[:, :, list(TRUST).index(key)]
         return float(np.sqrt((column**2).mean(axis=0)).max() * abs(change) / NOISE)
 
-    search = search_of(made, lambda key, b: np.full(12, size_of(key, b[0])))
-    return wrong_values(made, search, Selection([], made.fit(list(TRUST))), size_of, refused=refused)
+    search = Search(made, Questions(lambda key, b: np.full(12, size_of(key, b[0])), not_asked))
+    return wrong_values(made, search, Selection([], made.fit(list(TRUST))), back, size_of, refused=refused)
 
 
 def test_a_wrong_torque_coefficient_is_named_with_its_interval():
@@ -87,6 +90,10 @@ def test_two_wrong_values_are_both_named():
 def test_a_change_that_no_laboratory_could_tell_is_not_named():
     assert SMALLEST_CHANGE > 0.01
     assert judged({"torque": 0.01}) == {}
+
+
+def test_a_value_that_the_other_side_contradicts_is_not_named():
+    assert judged({"torque": 0.12}, reverse=False) == {}
 
 
 def test_a_value_that_was_refused_is_not_named_again():
@@ -125,12 +132,12 @@ def test_a_value_that_one_run_alone_needs_is_not_called_wrong():
         rows.append(Rows(name, np.arange(4000) / RATE_HZ, y, x))
     terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
     made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: True, 1.0, RATE_HZ)
-    search = search_of(made, lambda key, b: np.ones(12))
-    assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), lambda key, change: 1.0) == {}
+    search = Search(made, Questions(lambda key, b: np.ones(12), not_asked))
+    assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
 
 
 def test_a_value_in_doubt_makes_room_for_the_one_that_is_plainly_wrong():
-    """Torque and inertia share a column, and the inertia is the less trusted: refused, it leaves the torque."""
+    """Torque and inertia share a column, the inertia is the less trusted, and the other side sees no inertia."""
     rng = np.random.default_rng(4)
     x = columns(4000, rng)
     x[:, 5, 3] = -x[:, 5, 1]
@@ -138,12 +145,24 @@ def test_a_value_in_doubt_makes_room_for_the_one_that_is_plainly_wrong():
     for channel in (2, 5):
         y[:, channel] = 0.12 * x[:, channel, 1] + coloured(4000, NOISE, rng, pole=0.0)
     terms = [Term(key, "value", prior_sd=(0.02 if key == "torque" else sd,)) for key, sd in TRUST.items()]
-    rows, filters = [Rows("a", np.arange(4000) / RATE_HZ, y, x)], {c: np.array([1.0 / NOISE]) for c in (2, 5)}
-    made = build(rows, terms, filters, lambda run, t: True, 1.0, RATE_HZ)
-    search = search_of(made, lambda key, b: np.ones(12))
+    seen = x.copy()
+    seen[:, 5, 3] = 0.01 * coloured(4000, 1.0, rng, pole=0.9)
+    time_s = np.arange(4000) / RATE_HZ
+    made, back = (
+        build(
+            [Rows("a", time_s, y, part)],
+            terms,
+            {c: np.array([1.0 / NOISE]) for c in (2, 5)},
+            lambda run, t: True,
+            1.0,
+            RATE_HZ,
+        )
+        for part in (x, seen)
+    )
+    search = Search(made, Questions(lambda key, b: np.ones(12), not_asked))
     nothing = Selection([], made.fit(list(TRUST)))
-    assert list(wrong_values(made, search, nothing, lambda key, change: 1.0)) == ["inertia_zz"]
-    found = wrong_values(made, search, nothing, lambda key, change: 1.0, refused=("inertia_zz",))
+    assert list(wrong_values(made, search, nothing, None, lambda key, change: 1.0)) == ["inertia_zz"]
+    found = wrong_values(made, search, nothing, back, lambda key, change: 1.0)
     assert list(found) == ["torque"]
     assert found["torque"][0] == pytest.approx(0.12, abs=0.01)
 
