@@ -18,7 +18,7 @@ from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, Trace, with_status
+from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each, without_values
@@ -387,12 +387,12 @@ def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
 
 
 def with_noise_held_out(analysis: Analysis) -> Analysis:
-    """Where nothing is stated, the analysis with floors that hold on the runs held out, too.
+    """Where nothing is stated that a model holds, the analysis with floors that hold on the runs held out, too.
 
     What is left of a channel there and depends on nothing recorded is noise, however much less of it the fitted runs
     had: a vibration seen through aliasing is louder or not by the rotors' speed.
     """
-    if with_status(analysis, *CLAIMED) or analysis.wrong_values:
+    if analysis.without or analysis.wrong_values:
         return analysis
     part, floors = fitted_part(analysis), dict(analysis.noise_floor)
     for channel in {t.channel for t in analysis.traces} - set(analysis.unexplained_channels):

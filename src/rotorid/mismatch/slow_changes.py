@@ -44,6 +44,7 @@ def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tu
         _, expected = _spectrum(added, rate)
         at = (frequency >= fast[0]) & (frequency <= fast[1])
         level = max(1.0, float(found[at].mean() / max(expected[at].mean(), 1e-300)))
+        found = np.minimum(found, _moving(prepared, model, contributions, c, left, rate))
         for low, high in SLOW_BANDS_HZ:
             band = (frequency >= low) & (frequency < high)
             if not band.any() or found[band].mean() < SLOW_EXCESS * level * expected[band].mean():
@@ -55,6 +56,19 @@ def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tu
             peak = float(frequency[band][np.argmax(found[band])])
             out[CHANNELS[c]] = (float(np.hypot(before, np.sqrt(excess))), peak)
     return out
+
+
+def _moving(prepared, model, contributions, channel: int, left, rate_hz: float) -> np.ndarray | float:
+    """Spectrum of a force's residual as the velocity shows it, infinite where no accelerometer is compared with one.
+
+    What the accelerometer alone reads moves nothing: a vibration seen through a low sampling rate is slow.
+    """
+    compared = len(model.noise) // 2 + channel
+    if channel > 2 or not np.isfinite(model.noise[compared]):
+        return np.inf
+    alone = left_by(model.rows, compared, contributions)
+    moving = [own - prepared.vehicle.mass_kg * part for own, part in zip(left, alone, strict=True)]
+    return _spectrum(moving, rate_hz)[1]
 
 
 def _spectrum(parts, rate_hz: float):

@@ -188,7 +188,7 @@ def test_an_error_of_a_sensor_is_judged_by_what_two_sensors_say():
 def test_noise_of_the_runs_held_out_counts_where_nothing_is_stated():
     """What is left there and depends on nothing is noise; what depends on something, or beside a claim, is not."""
     claimed = replace(analysed(0.0), noise_floor={"force_x": 1e-6}, p_values={"force_x": (1.0, 1.0)})
-    silent = replace(claimed, findings=(), values={}, unexplained_channels=())
+    silent = replace(claimed, findings=(), values={}, without={}, unexplained_channels=())
     (held,) = (t.after for t in claimed.traces if t.channel == "force_x" and t.run == HELD)
     assert with_noise_held_out(silent).noise_floor["force_x"] == pytest.approx(np.sqrt(np.mean(held**2)))
     dependent = replace(silent, p_values={"force_x": (1.0, 1e-3)})
