@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.creep import followed
-from rotorid.effects.loading import since_the_first, unsmoothed
+from rotorid.effects.loading import TOO_SHORT, since_the_first, unsmoothed
 from rotorid.effects.structural_resonance import resonance
 
 
@@ -69,4 +69,6 @@ EFFECT = Effect(
     confusers=("motor_lag", "delay", "creep"),
     separating_manoeuvre="tap the stand with the motors off, or record rotor speeds",
     kind="sensor",
+    shows="after a change of load",
+    lack_on=lambda instrument: TOO_SHORT,
 )

@@ -90,4 +90,5 @@ EFFECT = Effect(
     excited_by=("velocity", "angular_velocity"),
     confusers=("frame_drag", "motor_lag", "rotational_damping"),
     separating_manoeuvre="fly steady climbs and descents",
+    feels_air=True,
 )

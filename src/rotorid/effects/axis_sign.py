@@ -46,4 +46,5 @@ EFFECT = Effect(
     confusers=("rotor_order", "spin_direction"),
     separating_manoeuvre="turn the vehicle by hand about each axis in turn while recording",
     kind="mistake",
+    fitted=False,
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Parameter, SpeedForm
+from rotorid.effects.contract import SUPPLY, Effect, Parameter, SpeedForm
 
 
 def power(path, values):
@@ -33,7 +33,7 @@ EFFECT = Effect(
             "power of voltage",
             "ω = ω_c (V/V_0)^p",
             (P,),
-            1,
+            SUPPLY,
             power,
             (0.0,),
             ("voltage",),
@@ -43,16 +43,17 @@ EFFECT = Effect(
             "power of voltage, own reference",
             "ω = (1 + g) ω_c (V/V_0)^p",
             (P, Parameter("g", "1", -0.5, 1.0, meaning="excess of speed at the largest voltage")),
-            1,
+            SUPPLY,
             power_of_reference,
             (0.0, 0.0),
             ("voltage",),
+            own_scale=True,
         ),
         SpeedForm(
             "drift in time",
             "ω = ω_c (1 − k t)",
             (Parameter("k", "1/min", 0.0, 1.0, meaning="share of the speed lost per minute", negligible=0.01),),
-            1,
+            SUPPLY,
             drift,
             (0.0,),
             excited_by="time",

@@ -4,7 +4,7 @@ import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.hysteresis import play
-from rotorid.effects.loading import AXES, UNITS
+from rotorid.effects.loading import AXES, NO_ROTORS, UNITS
 
 LOOSE = 0.02
 """Half width of the play by which friction turns over, as a share of the largest tilt: a cable that rubs does so
@@ -129,4 +129,11 @@ EFFECT = Effect(
     confusers=("mount_tilt", "com_offset", "tare_offset"),
     separating_manoeuvre="lay the cable differently and repeat the tilts",
     kind="physics",
+    lack_on=lambda instrument: (
+        NO_ROTORS
+        if instrument.bench
+        else "zeroed in each attitude"
+        if instrument.vehicle.tared
+        else "the mount is never tilted"
+    ),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from functools import cache
+from typing import Literal
 
 import rotorid.effects
 from rotorid.effects.contract import Effect
@@ -19,6 +20,23 @@ def catalogue() -> dict[str, Effect]:
         if effect is not None:
             found[effect.id] = effect
     return dict(sorted(found.items()))
+
+
+@cache
+def ids_of(trait: str, value: object = True) -> frozenset[str]:
+    """Ids of the effects that declare a trait (a field of `Effect`) with this value."""
+    return frozenset(e.id for e in catalogue().values() if getattr(e, trait) == value)
+
+
+@cache
+def ids_of_stage(stage: int) -> frozenset[str]:
+    """Ids of the effects with a speed form of a stage (`CURVE` to `LAG`)."""
+    return frozenset(e.id for e in catalogue().values() if any(f.stage == stage for f in e.speed_forms))
+
+
+def moving_air(how: Literal["all the time", "in windows"]) -> Effect:
+    """The effect of air that moves over the ground all the time, or in windows."""
+    return next(e for e in catalogue().values() if e.air_moves == how)
 
 
 @cache

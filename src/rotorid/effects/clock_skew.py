@@ -94,4 +94,5 @@ EFFECT = Effect(
     separating_manoeuvre="tap the frame sharply at the start and at the end of a long run",
     kind="sensor",
     exact=True,
+    shows="after a change of load",
 )

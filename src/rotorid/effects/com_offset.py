@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import weight
+from rotorid.effects.loading import NO_ROTORS, weight
 
 
 def moment_only(motion, vehicle, values):
@@ -99,4 +99,11 @@ EFFECT = Effect(
     confusers=("unequal_rotors", "thrust_tilt"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets with rotor speeds recorded",
     exact=True,
+    lack_on=lambda instrument: (
+        NO_ROTORS
+        if instrument.bench
+        else "the weight was zeroed away"
+        if instrument.vehicle.tared
+        else "no mass is stated or no moment is read"
+    ),
 )

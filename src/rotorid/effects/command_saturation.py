@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Parameter, SpeedForm
+from rotorid.effects.contract import LIMIT, Effect, Parameter, SpeedForm
 
 
 def upper(path, values):
@@ -25,7 +25,7 @@ EFFECT = Effect(
             "upper limit",
             "ω = min(ω_c, ω_high)",
             (Parameter("w_high", "ω_max", 0.3, 1.2, True, (0.95, 0.9, 0.8, 0.7), "highest speed"),),
-            2,
+            LIMIT,
             upper,
             (1.0,),
             excited_by="limit",
@@ -34,7 +34,7 @@ EFFECT = Effect(
             "lower limit",
             "ω = max(ω_c, ω_low)",
             (Parameter("w_low", "ω_max", -0.1, 0.6, True, (0.1, 0.2, 0.3), "lowest speed"),),
-            2,
+            LIMIT,
             lower,
             (0.0,),
             excited_by="limit",

@@ -78,4 +78,9 @@ EFFECT = Effect(
     confusers=("load_nonlinearity", "crosstalk"),
     separating_manoeuvre="measure the deflection beside the load, or brace the structure and repeat",
     kind="physics",
+    lack_on=lambda instrument: (
+        "one channel only is read"
+        if instrument.bench
+        else "a stand has no known load whose direction could be seen to turn"
+    ),
 )

@@ -12,12 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from rotorid.effects.loading import Instrument
 
 
 @dataclass(frozen=True)
@@ -175,6 +178,14 @@ class Form:
     """Believed values (keys of the regression) that the form has a part of its own for: beside it their trust is no
     room to move in, or the two would share one slope."""
 
+    linear_drag: Literal["", "times rotor speed", "of airspeed alone"] = ""
+    """Of a force in proportion to the horizontal velocity through the air (or of a wind's part of it), how its
+    coefficient hangs on the rotors; empty for any other force."""
+    comes_and_goes: bool = False
+    """Whether it may be there for a part of a run alone (`Motion.carried`)."""
+    resolution: float = 1.0
+    """How many times the size that counts elsewhere its contribution must have."""
+
     kernel: Kernel | None = None
     """The same force and moment at one instant, as a plain function that the simulator compiles (`Kernel`); None where
     the form adds neither, or needs the past. A form without it is simulated by its array code."""
@@ -196,6 +207,9 @@ class Form:
     def nonlinear(self) -> tuple[int, ...]:
         return tuple(i for i, p in enumerate(self.parameters) if p.nonlinear)
 
+
+CURVE, SUPPLY, LIMIT, DELAY, LAG = range(5)
+"""Stages between command and rotor speed, in the order in which they act."""
 
 FormsFor = Callable[[Vehicle], tuple[Form, ...]]
 ReadingForms = "Callable[[Instrument], tuple[Form, ...]]"
@@ -228,8 +242,7 @@ class SpeedPath:
 class SpeedForm:
     """One way in which rotor speed differs from its command; `apply(path, values)` gives the new speed (n, k).
 
-    `stage` orders the path: 0 static map, 1 supply, 2 limits, 3 delay, 4 lag. `neutral` are the parameter values
-    that change nothing.
+    `stage` (`CURVE` to `LAG`) orders the path. `neutral` are the parameter values that change nothing.
     """
 
     name: str
@@ -242,6 +255,8 @@ class SpeedForm:
     excited_by: Literal["command", "change", "voltage", "limit", "time"] = "command"
     """What it takes to show: any command, a command that changes, a voltage below the largest, a command beyond
     the limit, or time since the start of the run."""
+    own_scale: bool = False
+    """Whether a parameter scales all speeds, as another full speed would."""
 
 
 @dataclass(frozen=True)
@@ -295,6 +310,35 @@ class Effect:
     """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
     reading_forms: ReadingForms | None = None
     """Forms of kinds `stand` and `bench`; None where the forms for a flight hold on a stand as well."""
+
+    # What the decision asks of an effect
+
+    air_moves: Literal["", "all the time", "in windows"] = ""
+    """Whether it is air that moves over the ground, in all runs or in windows of its own."""
+    feels_air: bool = False
+    """Whether its force hangs on the velocity through the air."""
+    drag: bool = False
+    """Whether its force opposes the velocity through the air: by it a force can be told as a wind's velocity."""
+    would_change: tuple[str, ...] = ()
+    """Believed values (keys of vehicle.yaml) that it would change by itself."""
+    like_on_heavier: tuple[str, ...] = ()
+    """Ids that on a vehicle heavier than believed may be this one; those after the first only beside the first."""
+    same_on_commands: str = ""
+    """Id from which it cannot be told where rotor speeds are known from their commands alone."""
+    curves_thrust: bool = False
+    """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
+    curve_of_load: bool = False
+    """Whether it bends a reading by the load alone, as any other such curve does on one rotor that does not tilt."""
+    shows: Literal["", "in what takes time", "after a change of load"] = ""
+    """What an instrument must record to show it; empty: steady points will do."""
+    shows_in_moments: bool = False
+    """Whether forces alone do not show it on an instrument."""
+    fitted: bool = True
+    """Whether the search fits it; else it is found in the recordings themselves."""
+    like_of_reading: tuple[str, ...] = ()
+    """Ids of an instrument's effects that do to its reading what the speed forms do to a speed nobody measured."""
+    lack_on: Callable[[Instrument], str] | None = None
+    """Why an instrument (`rotorid.effects.loading`) gives nothing to test it on, where it has no form there."""
 
     def excitation(self, form: Form) -> tuple[str, ...]:
         """What excites one of the effect's forms."""

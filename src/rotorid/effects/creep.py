@@ -4,7 +4,7 @@ import numpy as np
 
 from rotorid.compiling import compiled
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import change_of_load, one_per_channel
+from rotorid.effects.loading import TOO_SHORT, change_of_load, one_per_channel
 
 
 @compiled()
@@ -105,4 +105,6 @@ EFFECT = Effect(
     confusers=("zero_drift", "wall_interference", "battery_sag", "amplifier_filter"),
     separating_manoeuvre="hold a weight for minutes, take it off and go on recording",
     kind="sensor",
+    shows="in what takes time",
+    lack_on=lambda instrument: TOO_SHORT,
 )

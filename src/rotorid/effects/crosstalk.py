@@ -52,4 +52,5 @@ EFFECT = Effect(
     confusers=("mount_tilt", "sensor_origin", "thrust_tilt"),
     separating_manoeuvre="put known weights on along one axis after the other",
     kind="sensor",
+    lack_on=lambda instrument: "one channel only is read",
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.clock_skew import at_other_times
-from rotorid.effects.contract import Effect, Form, Parameter, SpeedForm
+from rotorid.effects.contract import DELAY, Effect, Form, Parameter, SpeedForm
 from rotorid.effects.loading import between_samples
 from rotorid.effects.recorded import late_sensors
 
@@ -76,7 +76,7 @@ EFFECT = Effect(
                     negligible=0.001,
                 ),
             ),
-            3,
+            DELAY,
             shifted,
             (0.0,),
             excited_by="change",
@@ -89,4 +89,6 @@ EFFECT = Effect(
     separating_manoeuvre="excite collective and attitude up to 8 Hz",
     kind="sensor",
     exact=True,
+    shows="after a change of load",
+    like_of_reading=("amplifier_filter", "delay"),
 )

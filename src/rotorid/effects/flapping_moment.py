@@ -102,4 +102,5 @@ EFFECT = Effect(
     excited_by=("velocity", "angular_velocity"),
     confusers=("rotor_interference", "rotor_drag"),
     separating_manoeuvre="fly forward, backward and sideways at several speeds",
+    feels_air=True,
 )

@@ -129,4 +129,6 @@ EFFECT = Effect(
     excited_by=("velocity",),
     confusers=("rotor_drag", "steady_wind"),
     separating_manoeuvre="fly a speed sweep beyond 10 m/s in both directions",
+    feels_air=True,
+    drag=True,
 )

@@ -86,4 +86,5 @@ EFFECT = Effect(
     excited_by=("rotor_speed",),
     confusers=("payload", "steady_wind"),
     separating_manoeuvre="repeat the flight in still air",
+    air_moves="in windows",
 )

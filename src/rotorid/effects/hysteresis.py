@@ -200,4 +200,5 @@ EFFECT = Effect(
     confusers=("creep", "amplifier_filter", "motor_lag"),
     separating_manoeuvre="load up and down in the same steps at two rates",
     kind="sensor",
+    lack_on=lambda instrument: "the load never comes back from above to a value other than none",
 )

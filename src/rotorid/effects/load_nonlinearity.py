@@ -92,4 +92,5 @@ EFFECT = Effect(
     confusers=("thrust_curve", "compliance", "hysteresis"),
     separating_manoeuvre="load with dead weights over the whole range, motors off",
     kind="sensor",
+    curve_of_load=True,
 )

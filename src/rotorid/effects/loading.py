@@ -18,6 +18,8 @@ from rotorid.recordings.vehicle import Vehicle
 CHANNELS = tuple(f"{g}_{a}" for g in ("force", "moment") for a in "xyz")
 UNITS = ("N", "N", "N", "N m", "N m", "N m")
 AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+NO_ROTORS = "a bench has no rotors"
+TOO_SHORT = "the recordings are too short or too slow to show it"
 REST_S = 3.0
 """A gap in the recording longer than this is taken as the load having been off."""
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.compiling import compiled
-from rotorid.effects.contract import Effect, Parameter, SpeedForm
+from rotorid.effects.contract import LAG, Effect, Parameter, SpeedForm
 
 SLOWEST_S = 0.3
 """Longest time constant: rotors of half a metre reach 0.1 s; no attitude loop holds with motors three times slower."""
@@ -64,17 +64,25 @@ EFFECT = Effect(
     sentence="rotor speed follows its command late and smoothed",
     forms=lambda vehicle: (),
     speed_forms=(
-        SpeedForm("one constant", "dω/dt = (ω_c − ω)/τ", (_tau("tau"),), 4, one_constant, (0.0,), excited_by="change"),
+        SpeedForm(
+            "one constant",
+            "dω/dt = (ω_c − ω)/τ",
+            (_tau("tau"),),
+            LAG,
+            one_constant,
+            (0.0,),
+            excited_by="change",
+        ),
         SpeedForm(
             "up and down",
             "dω/dt = (ω_c − ω)/τ_up or τ_down",
             (_tau("tau_up"), _tau("tau_down")),
-            4,
+            LAG,
             up_and_down,
             (0.0, 0.0),
             excited_by="change",
         ),
-        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), 4, on_thrust, (0.0,), excited_by="change"),
+        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), LAG, on_thrust, (0.0,), excited_by="change"),
     ),
     source="Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F1",
     sign="positive τ follows later; τ_up for speeds that grow, τ_down for speeds that fall",
@@ -84,4 +92,5 @@ EFFECT = Effect(
     ),
     confusers=("delay", "throttle_curve"),
     separating_manoeuvre="excite collective and attitude up to 8 Hz, or record rotor speeds",
+    like_of_reading=("amplifier_filter",),
 )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import at_sensor, rotation_of, weight
+from rotorid.effects.loading import NO_ROTORS, at_sensor, rotation_of, weight
 
 STEP_RAD = 1e-3
 
@@ -81,4 +81,5 @@ EFFECT = Effect(
     separating_manoeuvre="record the weight with the motors off at 0, 15 and 30 degrees",
     kind="sensor",
     exact=True,
+    lack_on=lambda instrument: NO_ROTORS if instrument.bench else "one channel only is read",
 )

@@ -131,6 +131,7 @@ def forms(vehicle):
             rigid_with_inertia,
             ("specific_force", "angular_velocity", "angular_acceleration"),
             must_show=(0,),
+            comes_and_goes=True,
             kernel=kernel_rigid,
         ),
         Form(
@@ -140,6 +141,7 @@ def forms(vehicle):
             rigid,
             ("specific_force",),
             must_show=(0,),
+            comes_and_goes=True,
             kernel=kernel_rigid,
             kernel_values=_without_products,
         ),
@@ -181,4 +183,11 @@ EFFECT = Effect(
     excited_by=("specific_force", "angular_velocity", "angular_acceleration"),
     confusers=("com_offset",),
     separating_manoeuvre="weigh the vehicle; stop sharply from forward flight and hover",
+    would_change=(
+        "mass_kg",
+        "thrust_coefficient_n_s2",  # of these two their ratios to mass and inertia
+        "torque_coefficient_n_m_s2",
+        *(f"inertia_{axis}_kg_m2" for axis in ("xx", "yy", "zz")),
+    ),
+    like_on_heavier=("com_offset", "inertia_products"),
 )

@@ -20,4 +20,5 @@ EFFECT = Effect(
     confusers=("hysteresis",),
     separating_manoeuvre="read with a finer range, or add a small known dither",
     kind="sensor",
+    fitted=False,
 )

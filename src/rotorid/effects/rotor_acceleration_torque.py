@@ -45,4 +45,5 @@ EFFECT = Effect(
     confusers=("motor_lag", "delay"),
     separating_manoeuvre="excite yaw on both sides of 1 Hz",
     exact=True,
+    shows="in what takes time",
 )

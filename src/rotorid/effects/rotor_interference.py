@@ -94,4 +94,5 @@ EFFECT = Effect(
     excited_by=("velocity",),
     confusers=("flapping_moment", "rotor_drag"),
     separating_manoeuvre="fly forward and backward at several speeds and heights of the rotor plane",
+    feels_air=True,
 )

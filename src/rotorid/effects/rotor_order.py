@@ -38,4 +38,5 @@ EFFECT = Effect(
     confusers=("spin_direction", "axis_sign", "unequal_rotors"),
     separating_manoeuvre="raise one motor at a time with the propellers off and watch which column moves",
     kind="mistake",
+    fitted=False,
 )

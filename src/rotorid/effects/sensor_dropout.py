@@ -65,4 +65,5 @@ EFFECT = Effect(
     confusers=(),
     separating_manoeuvre="check the sensor's plug and repeat the flight",
     kind="sensor",
+    fitted=False,
 )

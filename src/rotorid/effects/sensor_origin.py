@@ -57,4 +57,5 @@ EFFECT = Effect(
     separating_manoeuvre="hang known weights at known offsets from the sensor",
     kind="sensor",
     exact=True,
+    lack_on=lambda instrument: "no moment is read",
 )

@@ -41,4 +41,5 @@ EFFECT = Effect(
     confusers=("rotor_order", "axis_sign", "rotor_acceleration_torque"),
     separating_manoeuvre="look at the propellers, or yaw to both sides with sharp inputs",
     kind="mistake",
+    fitted=False,
 )

@@ -57,6 +57,7 @@ def forms(vehicle):
             on_rotors,
             rotor_force,
             ("rotation", "rotor_speed"),
+            linear_drag="times rotor speed",
             kernel=kernel_rotor_force,
         ),
         Form(
@@ -65,6 +66,7 @@ def forms(vehicle):
             on_frame,
             world_force,
             ("rotation",),
+            linear_drag="of airspeed alone",
             excited_by=("always",),
             kernel=kernel_world_force,
         ),
@@ -85,4 +87,5 @@ EFFECT = Effect(
     excited_by=("rotor_speed",),
     confusers=("accelerometer_error", "thrust_tilt", "rotor_drag"),
     separating_manoeuvre="hover while yawing through 360 degrees, and fly the same leg in both directions",
+    air_moves="all the time",
 )

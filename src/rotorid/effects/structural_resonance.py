@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import since_the_first, unsmoothed
+from rotorid.effects.loading import TOO_SHORT, since_the_first, unsmoothed
 
 
 def resonance(signal, frequency_hz, damping, dt_s):
@@ -65,4 +65,6 @@ EFFECT = Effect(
     confusers=("motor_lag", "amplifier_filter"),
     separating_manoeuvre="tap the stand with the motors off and look at the ringing",
     kind="physics",
+    shows="after a change of load",
+    lack_on=lambda instrument: TOO_SHORT,
 )

@@ -1,11 +1,15 @@
 """A reading that is not zero without a load."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import AXES, UNITS, on_channels
 
 ZERO = "reading without a load"
+RESOLUTION, RESOLUTION_IN_EACH_RUN = 2.0, 4.0
+"""A tare is the mean of a few samples, and only as good: an offset must be so many times larger than other effects."""
 
 
 def _own_in_each_run(instrument):
@@ -18,7 +22,7 @@ def _own_in_each_run(instrument):
         return Contribution(reading=reading)
 
     parameters = tuple(Parameter(f"b_{AXES[c]}({run})", UNITS[c], meaning=ZERO) for run in runs for c in channels)
-    return Form("own in each run", "y = F + b(run)", parameters, contribution)
+    return Form("own in each run", "y = F + b(run)", parameters, contribution, resolution=RESOLUTION_IN_EACH_RUN)
 
 
 def reading_forms(instrument):
@@ -36,6 +40,7 @@ def reading_forms(instrument):
         forms += [
             on_channels(f"constant in {AXES[c]}", "y = F + b", "b", "{}", (c,), one, meaning=ZERO) for c in channels
         ]
+    forms = [replace(form, resolution=RESOLUTION) for form in forms]
     if 1 < len(instrument.runs) <= 60 // len(channels):
         forms.append(_own_in_each_run(instrument))
     return tuple(forms)

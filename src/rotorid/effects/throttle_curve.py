@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Parameter, SpeedForm
+from rotorid.effects.contract import CURVE, Effect, Parameter, SpeedForm
 
 SLOPE = "a_1"
 """Symbol of what a curve adds to the slope between command and speed."""
@@ -59,9 +59,10 @@ EFFECT = Effect(
                 Parameter("a_0", "1", -0.8, 0.8, meaning="speed at no command, share of ω_max", negligible=LINEAR),
                 Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope", negligible=LINEAR),
             ),
-            0,
+            CURVE,
             affine,
             (0.0, 0.0),
+            own_scale=True,
         ),
         SpeedForm(
             "quadratic",
@@ -70,15 +71,16 @@ EFFECT = Effect(
                 Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope at no command", negligible=LINEAR),
                 Parameter("a_2", "1", -2.0, 2.0, meaning="growth of the slope with the command", negligible=LINEAR),
             ),
-            0,
+            CURVE,
             quadratic,
             (0.0, 0.0),
+            own_scale=True,
         ),
         SpeedForm(
             "dead zone",
             "ω = ω_max (u − u_0)/(1 − u_0)",
             (Parameter("u_0", "1", -0.3, 0.5, meaning="command at which the rotors start", negligible=LINEAR),),
-            0,
+            CURVE,
             dead_zone,
             (0.0,),
         ),
@@ -86,7 +88,7 @@ EFFECT = Effect(
             "thrust curve of the throttle",
             "T/T_max = b u + (1 − b) u²",
             (Parameter("b", "1", -0.3, 1.0, meaning="linear share of thrust", negligible=2 * LINEAR),),
-            0,
+            CURVE,
             root,
             (0.0,),
         ),
@@ -103,7 +105,7 @@ EFFECT = Effect(
                     negligible=LINEAR,
                 ),
             ),
-            0,
+            CURVE,
             power,
             (1.0,),
         ),
@@ -114,7 +116,7 @@ EFFECT = Effect(
                 Parameter("u_0", "1", -0.05, 0.5, meaning="command at which the rotors start", negligible=LINEAR),
                 Parameter("n", "1", 0.2, 3.0, meaning="exponent", negligible=LINEAR),
             ),
-            0,
+            CURVE,
             power_from,
             (0.0, 1.0),
         ),
@@ -127,4 +129,5 @@ EFFECT = Effect(
     validity="static and the same for all rotors; at one voltage, or together with battery_sag",
     confusers=("battery_sag", "thrust_curve", "command_saturation"),
     separating_manoeuvre="step the throttle up and down over its whole range with two battery charges",
+    would_change=("thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s"),
 )

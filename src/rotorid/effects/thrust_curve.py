@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs
-from rotorid.effects.loading import on_stand
+from rotorid.effects.loading import NO_ROTORS, on_stand
 from rotorid.effects.scale import scale
 
 SQUARE = "Δc_2"
@@ -204,4 +204,8 @@ EFFECT = Effect(
     excited_by=("rotor_speed",),
     confusers=("axial_inflow", "translational_lift"),
     separating_manoeuvre="step the throttle over the widest range of rotor speeds",
+    same_on_commands="throttle_curve",
+    curves_thrust=True,
+    curve_of_load=True,
+    lack_on=lambda instrument: NO_ROTORS,
 )

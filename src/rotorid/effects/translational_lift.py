@@ -63,4 +63,5 @@ EFFECT = Effect(
     excited_by=("velocity", "angular_velocity"),
     confusers=("thrust_curve", "axial_inflow"),
     separating_manoeuvre="fly level at constant rotor speed and several airspeeds",
+    feels_air=True,
 )

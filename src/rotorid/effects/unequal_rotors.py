@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
-from rotorid.effects.loading import on_stand
+from rotorid.effects.loading import NO_ROTORS, on_stand
 
 
 def _thrust(motion, vehicle, weights):
@@ -167,4 +167,6 @@ EFFECT = Effect(
     excited_by=("rotor_speed",),
     confusers=("com_offset", "thrust_tilt"),
     separating_manoeuvre="swap two propellers and repeat the hover, or excite roll, pitch and yaw",
+    shows_in_moments=True,
+    lack_on=lambda instrument: NO_ROTORS,
 )

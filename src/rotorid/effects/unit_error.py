@@ -46,4 +46,5 @@ EFFECT = Effect(
     confusers=("accelerometer_error", "gyro_error"),
     separating_manoeuvre="hover at rest: the accelerometer must read gravity and the rotors must carry the weight",
     kind="mistake",
+    fitted=False,
 )

@@ -4,7 +4,7 @@ import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.creep import followed
-from rotorid.effects.loading import at_sensor
+from rotorid.effects.loading import NO_ROTORS, TOO_SHORT, at_sensor
 from rotorid.effects.scale import rotor_radius_m
 
 STOPPED_RAD_S = 1.0
@@ -116,4 +116,5 @@ EFFECT = Effect(
     excited_by=("rotor_speed",),
     confusers=("battery_sag", "creep", "ground_effect"),
     separating_manoeuvre="turn the propeller round (puller, pusher), or move the wall and repeat",
+    lack_on=lambda instrument: NO_ROTORS if instrument.bench else TOO_SHORT,
 )

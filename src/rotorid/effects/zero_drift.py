@@ -7,7 +7,7 @@ session's time or of the temperature holds over all runs. A tare of each run imi
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.loading import AXES, on_channels, one_per_channel
+from rotorid.effects.loading import AXES, TOO_SHORT, on_channels, one_per_channel
 
 DRIFT = "drift of the zero"
 REACH = 1.0
@@ -97,4 +97,5 @@ EFFECT = Effect(
     confusers=("creep", "tare_offset", "battery_sag", "wall_interference"),
     separating_manoeuvre="record the zero before, between and after the loads, with the temperature",
     kind="sensor",
+    lack_on=lambda instrument: TOO_SHORT,
 )

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import before_the_rotors, catalogue
+from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage, moving_air
+from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
 from rotorid.mismatch.absorbed import absorbed_findings
@@ -47,7 +48,7 @@ from rotorid.mismatch.values import (
     without_values_in_question,
 )
 from rotorid.mismatch.within_trust import beyond_trust, settled
-from rotorid.mismatch.wrench import WrenchModel, chosen, nonlinear_intervals
+from rotorid.mismatch.wrench import WrenchModel, linear_drag, nonlinear_intervals
 from rotorid.recordings import RecordingSet
 
 UNITS = {"force": "N", "moment": "N m"}
@@ -117,7 +118,8 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         return None
     fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
     windows = tuple(g.window for g in seen.gusts)
-    findings = [replace(f, windows=windows) if f.id == "gust" and seen.gusts else f for f in findings]
+    blown = ids_of("air_moves", "in windows") if seen.gusts else ()
+    findings = [replace(f, windows=windows) if f.id in blown else f for f in findings]
     delivered = residuals_of(seen, fit)
     before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
     left = leftover(
@@ -180,9 +182,9 @@ def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
         model.noise,
         nonlinear_intervals(prepared, model, model.segments),
     )
-    aboard = on_board(model.segments)
-    if aboard:
-        findings = [carried_for_a_time(f, aboard) if f.id == "payload" else f for f in findings]
+    if aboard := on_board(model.segments):
+        comes_and_goes = {t.effect for t in model.search.terms.values() if t.form and t.form.comes_and_goes}
+        findings = [carried_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in findings]
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
@@ -198,7 +200,7 @@ def not_testable(prepared: Prepared, chain: Chain | None, findings: list[Finding
     if chain is None:
         reasons.update({k: "no rotor commands recorded" for k in before_the_rotors()})
     elif chain[2] is None:
-        reasons.setdefault("battery_sag", "no battery voltage")
+        reasons = {**dict.fromkeys(ids_of_stage(SUPPLY), "no battery voltage"), **reasons}
     known = {f.id for f in findings if f.status in CLAIMED}
     return {k: v for k, v in reasons.items() if k not in known}
 
@@ -244,15 +246,13 @@ def run_scale_notes(model: WrenchModel) -> list[str]:
 
 def wind_finding(model: WrenchModel) -> Finding:
     """The steady wind as a velocity, fitted through the drag."""
-    effect = catalogue()["steady_wind"]
+    effect = moving_air("all the time")
     w, sd = model.wind, model.wind_sd
-    drag = next(
-        (v for k, v in zip(model.selection.active, chosen(model), strict=True) if k.startswith("rotor_drag/")), None
-    )
-    form = next(f for f in effect.forms(model.prepared.vehicle) if f.name == "on the rotors")
-    k_d = 0.0 if drag is None or "independent" in drag[0].name else float(np.mean(drag[1]))
+    drag = linear_drag(model)
+    form = next(f for f in effect.forms(model.prepared.vehicle) if f.linear_drag == "times rotor speed")
+    k_d = 0.0 if drag is None or drag[0].linear_drag != form.linear_drag else float(np.mean(drag[1]))
     return Finding(
-        id="steady_wind",
+        id=effect.id,
         status="established",
         form=form if k_d else None,
         values=tuple(float(k_d * x) for x in w),
@@ -282,9 +282,7 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
             for p, v, s in zip(form.parameters, values, sd, strict=True)
         )
         alternatives = result.alternatives[key]
-        beyond = ()
-        if key == "command_saturation":
-            beyond = saturation_windows(prepared.segments, values[0] * full_speed, form.name == "upper limit")
+        beyond = limited_windows(prepared.segments, form, values, full_speed) if form.stage == LIMIT else ()
         out.append(
             Finding(
                 id=key,
@@ -315,22 +313,25 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     sure = {key: change for key, (change, sd) in values.items() if abs(change) > SURELY_HEAVIER * sd}
     heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in CLAIMED]
-    offset = next((f for f in stated if "com_offset" in (f.id, *f.alternatives)), None)
+    load = next(e for e in catalogue().values() if e.like_on_heavier)
+    first, *beside = load.like_on_heavier
+    offset = next((f for f in stated if first in (f.id, *f.alternatives)), None)
     if not rules.PAYLOAD_OR_OFFSET(offset is not None and heavier):
         return findings
     out = []
     for f in findings:
-        if f is offset or (f.id == "inertia_products" and f in stated):
-            f = replace(f, status="ambiguous", alternatives=tuple(sorted({f.id, "payload", *f.alternatives})))
+        if f is offset or (f.id in beside and f in stated):
+            f = replace(f, status="ambiguous", alternatives=tuple(sorted({f.id, load.id, *f.alternatives})))
         out.append(f)
     return out
 
 
 def throttle_or_thrust(finding: Finding) -> Finding:
     """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
-    if not rules.THROTTLE_OR_THRUST(finding.id == "thrust_curve" and finding.status in CLAIMED):
+    same = catalogue()[finding.id].same_on_commands if finding.id in catalogue() else ""
+    if not rules.THROTTLE_OR_THRUST(bool(same) and finding.status in CLAIMED):
         return finding
-    both = tuple(sorted({"thrust_curve", "throttle_curve", *finding.alternatives}))
+    both = tuple(sorted({finding.id, same, *finding.alternatives}))
     return replace(finding, status="ambiguous", alternatives=both)
 
 
@@ -456,12 +457,14 @@ def regimes_by_run(segments, prepared: Prepared) -> dict[str, dict[str, np.ndarr
     return out
 
 
-def saturation_windows(segments, limit_rad_s: float, upper: bool) -> tuple[tuple[str, float, float], ...]:
-    """Stretches in which a command goes beyond a limit, closer than 0.3 s taken together."""
+def limited_windows(
+    segments, form: SpeedForm, values: np.ndarray, full_speed: float
+) -> tuple[tuple[str, float, float], ...]:
+    """Stretches in which a limit holds a rotor's command (`full_speed` in rad/s), closer than 0.3 s taken together."""
     out = []
     for s in segments:
-        beyond = (s.command > limit_rad_s if upper else s.command < limit_rad_s).any(axis=1)
         times = s.motion.time_s
+        beyond = (form.apply(SpeedPath(s.command, times, full_speed), values) != s.command).any(axis=1)
         for start, stop in stretches(beyond):
             begin, end = float(times[start]), float(times[stop - 1])
             if out and out[-1][0] == s.run and begin - out[-1][2] < 0.3:

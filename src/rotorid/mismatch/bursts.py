@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from rotorid.effects.catalogue import moving_air
 from rotorid.effects.gust import window_form
 from rotorid.mismatch.rows import Term
 
@@ -51,16 +52,16 @@ def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray,
 
 def gust_terms(run: str, found) -> list[Term]:
     """Terms for the windows of one run."""
-    terms = []
+    terms, gust = [], moving_air("in windows").id
     for start, stop, _ in found:
         knots = int(np.clip(round((stop - start) / KNOT_S), 2, 12))
         form = window_form(start - 0.15, stop + 0.15, knots)
         size = len(form.parameters)
         terms.append(
             Term(
-                f"gust/{run}/{start:.2f}",
+                f"{gust}/{run}/{start:.2f}",
                 "effect",
-                "gust",
+                gust,
                 form,
                 (0.0,) * size,
                 size,

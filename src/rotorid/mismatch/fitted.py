@@ -12,14 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorid.effects.contract import Form
+from rotorid.effects.catalogue import ids_of_stage
+from rotorid.effects.contract import CURVE, Form
 from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import coefficients, wrong_values
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.gusts import with_gusts
-from rotorid.mismatch.payload_windows import Windows, carried_windows, changes, laden
+from rotorid.mismatch.payload_windows import Windows, carried_windows, changes, laden, loads
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
@@ -106,9 +107,10 @@ def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
         if trusted or not (trusted := strains(model)):
             break
     if rules.MERE_SCALE(only_scales(chain[0])):
-        result, *full = speed_path(prepared, chosen(model), ("throttle_curve",), trusted=trusted)
+        curves = ids_of_stage(CURVE)
+        result, *full = speed_path(prepared, chosen(model), tuple(curves), trusted=trusted)
         reason = Reason("mere_scale", "another thrust coefficient explains as much")
-        chain = replace(result, dropped={**result.dropped, "throttle_curve": reason}), *full
+        chain = replace(result, dropped={**result.dropped, **dict.fromkeys(curves, reason)}), *full
         model = refined_model(prepared, *turning(prepared, chain))
     return chain, model
 
@@ -120,10 +122,10 @@ def strains(model: WrenchModel) -> bool:
 
 def only_scales(result: SpeedResult) -> bool:
     """Whether a throttle curve between command and speed is nothing but another slope, as far as it is known."""
-    form = dict(result.fit.chain).get("throttle_curve")
+    key, form = next(((k, f) for k, f in result.fit.chain if f.stage == CURVE), (None, None))
     if form is None or SLOPE not in [p.symbol for p in form.parameters]:
         return False
-    where = result.fit.slice_of("throttle_curve")
+    where = result.fit.slice_of(key)
     sd = np.sqrt(np.diag(result.fit.covariance)[where])
     away = np.abs(result.fit.values[where] - np.array(form.neutral)) > 1.96 * sd
     return not any(away[i] for i, p in enumerate(form.parameters) if p.symbol != SLOPE)
@@ -177,7 +179,7 @@ def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows])
     segments, noisy = model.segments, model.noisy_segments
     both = laden(segments, windows), laden(noisy, windows) if noisy else noisy
     with_it = with_own_scales(prepared, *both)
-    carries = any(k.startswith("payload/rigid") for k in with_it.selection.active)
+    carries = any(t.key in with_it.selection.active for t in loads(with_it))
     filters, price = model.regression.filters, COST_PER_EFFECT * changes(both[0])
     if carries and cost_of(with_it, filters) + price < cost_of(model, filters):
         return *both, with_it

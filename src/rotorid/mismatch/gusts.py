@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.mismatch import rules
 from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
@@ -23,7 +23,6 @@ from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
 from rotorid.mismatch.regression import Fit, Regression, build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.wrench import (
-    FEELS_THE_AIR,
     WrenchModel,
     after_residual,
     block_seconds,
@@ -32,7 +31,6 @@ from rotorid.mismatch.wrench import (
     wrench_model,
 )
 
-DRAGS = ("rotor_drag", "frame_drag")
 KNOT_S, RESTLESS_KNOT_S = 0.3, 1.0
 """Distance of knots in a window, where a gust may set in within a fraction of a second, and where the wind changes
 all the time."""
@@ -104,9 +102,10 @@ def knots_of(start_s: float, stop_s: float, spacing_s: float) -> np.ndarray:
 def wind_term(run: str, knots_s: np.ndarray) -> Term:
     """Columns of one metre a second more wind at each knot, north then east."""
     size = 2 * len(knots_s)
-    key = f"gust/{run}/{knots_s[0]:.2f}"
     window = (run, float(knots_s[0]), float(knots_s[-1]))
-    return Term(key, "wind", "gust", None, tuple(knots_s), size, (np.inf,) * size, run=run, window=window)
+    gust = moving_air("in windows").id
+    key = f"{gust}/{run}/{knots_s[0]:.2f}"
+    return Term(key, "wind", gust, None, tuple(knots_s), size, (np.inf,) * size, run=run, window=window)
 
 
 def in_gusts(segments: list[Segment], gusts: dict[str, tuple[Term, np.ndarray]]) -> list[Segment]:
@@ -241,13 +240,14 @@ def beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -
 
 def feels_wind(model: WrenchModel) -> bool:
     """Whether a wind can be told: a drag is in the model, and the velocity over ground is known."""
-    drag = any(model.search.terms[k].effect in DRAGS for k in model.selection.active)
+    drag = any(model.search.terms[k].effect in ids_of("drag") for k in model.selection.active)
     return drag and all(s.motion.velocity is not None for s in model.segments)
 
 
 def lasting(model: WrenchModel) -> list[str]:
     """What is in the model of effects that no wind of a window or of the whole flight takes the place of."""
-    return [k for k in model.selection.active if model.search.terms[k].effect not in ("steady_wind", "gust")]
+    winds = moving_air("all the time").id, moving_air("in windows").id
+    return [k for k in model.selection.active if model.search.terms[k].effect not in winds]
 
 
 def rotation_at(segment: Segment, rows: Rows) -> np.ndarray:
@@ -275,14 +275,14 @@ def in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], ask
     """The search repeated with the wind of the windows asked for, as far as it is there; None where it is not."""
     still = {t.key: (t, np.zeros(t.size)) for t in asked}
     winds, _ = estimated(prepared, model, still, STEPS)
-    kept = [t for t in terms if t.effect != "steady_wind"]
+    kept = [t for t in terms if t.effect != moving_air("all the time").id]
     again = model
     for _ in range(ROUNDS):
         active = lasting(again)
         moved = in_gusts(model.segments, winds)
         noisy = in_gusts(model.noisy_segments, winds) if model.noisy_segments else model.noisy_segments
         again = wrench_model(prepared, [*kept, *asked], chosen(again), active, moved, noisy)
-        if not any(again.search.terms[k].effect in DRAGS for k in again.selection.active):
+        if not any(again.search.terms[k].effect in ids_of("drag") for k in again.selection.active):
             return None
         steps, covariances = estimated(prepared, again, still, 1)
         winds = {k: (t, values + steps[k][1]) for k, (t, values) in winds.items()}
@@ -331,7 +331,7 @@ def size_of(gust: Gust, model: WrenchModel, segments: list[Segment] | None = Non
     """Root mean square of a gust's force in its window, in units of the noise of the force; of the model's segments
     or of others."""
     knots, wind = gust.knots_s, gust.wind_m_s.T.ravel()
-    own = Term("gust", "wind", "gust", None, tuple(knots), len(wind), (np.inf,) * len(wind), run=gust.run)
+    own = wind_term(gust.run, knots)
     segments = [s for s in (model.segments if segments is None else segments) if s.run == gust.run]
     felt = felt_by(model)
     total, count = 0.0, 0
@@ -345,14 +345,14 @@ def size_of(gust: Gust, model: WrenchModel, segments: list[Segment] | None = Non
 def felt_by(model: WrenchModel):
     """Forms in the model that feel the air, with their values."""
     pairs = zip(model.selection.active, chosen(model), strict=True)
-    return [found for k, found in pairs if model.search.terms[k].effect in FEELS_THE_AIR]
+    return [found for k, found in pairs if model.search.terms[k].effect in ids_of("feels_air")]
 
 
 def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Term, np.ndarray]], steps: int):
     """Winds by Gauss-Newton on top of what blows in the model's segments: values and covariances by the terms' keys."""
     winds = dict(winds)
     asked = [term for term, _ in winds.values()]
-    always = [t for t in model.terms if t.kind != "effect" and t.effect != "gust"]
+    always = [t for t in model.terms if t.kind != "effect" and t.effect != moving_air("in windows").id]
     active = [model.search.terms[k] for k in lasting(model)]
     values = dict(zip(model.selection.active, chosen(model), strict=True))
     effects = [values[t.key] for t in active]
@@ -402,11 +402,12 @@ def gust_finding(gusts: tuple[Gust, ...]) -> Finding:
     lasting = first.knots_s[-1] - first.knots_s[0] > LASTING_S
     height, sd = first.unrest() if lasting else first.height()
     symbol = "w_{}_rms" if lasting else "w_{}"
+    effect = moving_air("in windows")
     return Finding(
-        id="gust",
+        id=effect.id,
         status="established",
         equation="v_air = v − Rᵀ w(t)",
-        sentence=catalogue()["gust"].sentence,
+        sentence=effect.sentence,
         parameters=tuple(
             Estimate(symbol.format(axis), float(w), "m/s", float(w - 1.96 * s), float(w + 1.96 * s))
             for axis, w, s in zip(("north", "east"), height, sd, strict=True)

@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from rotorid.effects.catalogue import ids_of
 from rotorid.mismatch.delivered import FittedModel, Values, delivered_fit, residuals_of
 from rotorid.mismatch.findings import CLAIMED, Finding, Trace
 from rotorid.mismatch.fitted import Fitted
@@ -53,10 +54,10 @@ def without_each(
         elif in_chain:
             segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), cutoff_of(seen))
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
-        elif finding.id == "steady_wind" and seen.wind is not None:
+        elif finding.id in ids_of("air_moves", "all the time") and seen.wind is not None:
             still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, still, fit))
-        elif finding.id == "gust" and seen.gusts:
+        elif finding.id in ids_of("air_moves", "in windows") and seen.gusts:
             steady = np.zeros(3) if seen.wind is None else np.array([*seen.wind, 0.0])
             calm = [replace(s, motion=replace(s.motion, wind=steady)) for s in seen.segments]
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, calm, fit))

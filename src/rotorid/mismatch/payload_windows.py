@@ -16,12 +16,12 @@ import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from rotorid.mismatch.motion import Segment, stretches
+from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import WrenchModel
 
-TERM = "payload/rigid"
 SEEN_IN = ((2, 0), (4, 1), (3, 2))
-"""Channel and parameter of TERM: its mass in the vertical force, its places in the moments of pitch and roll."""
+"""Channel and parameter of a load: its mass in the vertical force, its places in the moments of pitch and roll."""
 BLOCK_S = 0.5
 SMOOTHED_BLOCKS = 9
 SWITCH_COST = 30.0
@@ -40,7 +40,7 @@ Windows = tuple[tuple[float, float], ...]
 
 def carried_windows(model: WrenchModel) -> list[Windows]:
     """When a payload seems to be on board in every stretch; empty where none is taken up or dropped in one's midst."""
-    if TERM not in model.search.terms or not np.isfinite(model.rows[0].y[:, SEEN_IN[0][0]]).all():
+    if not loads(model) or not np.isfinite(model.rows[0].y[:, SEEN_IN[0][0]]).all():
         return []
     left, columns = unexplained_loads(model)
     per = max(2, int(BLOCK_S * model.prepared.thinner.rate_hz))
@@ -55,13 +55,19 @@ def carried_windows(model: WrenchModel) -> list[Windows]:
     return out
 
 
+def loads(model: WrenchModel) -> list[Term]:
+    """Terms of what may be there for a part of a run alone, the one of fewest parameters first."""
+    return sorted((t for t in model.search.terms.values() if t.form and t.form.comes_and_goes), key=lambda t: t.size)
+
+
 def unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """What the named effects but a payload leave in the channels of SEEN_IN that there are, and a payload's columns
     there, each (n, channels) of every stretch."""
     regression, fit = model.regression, model.selection.fit
     terms = model.search.terms
-    others = [k for k in model.selection.active if terms[k].effect not in {"payload", *UNKNOWNS} and not terms[k].run]
-    cols, own = regression.columns(others), regression.columns([TERM])
+    aside = {loads(model)[0].effect, *UNKNOWNS}
+    others = [k for k in model.selection.active if terms[k].effect not in aside and not terms[k].run]
+    cols, own = regression.columns(others), regression.columns([loads(model)[0].key])
     beta = fit.beta[fit.places(cols)]
     present = [(c, p) for c, p in SEEN_IN if np.isfinite(model.rows[0].y[:, c]).all()]
     left = [np.stack([r.y[:, c] - r.x[:, c][:, cols] @ beta for c, _ in present], axis=1) for r in model.rows]

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
-from rotorid.effects.contract import SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, DELAY, LAG, LIMIT, SpeedForm, SpeedPath
 from rotorid.effects.delay import shifted
 from rotorid.effects.loading import weights_of_four
 from rotorid.mismatch.motion import Segment
@@ -35,7 +35,6 @@ residuals of a hover say little of their mean, and a curve of too little thrust 
 respond. Two percent are an accelerometer's scale."""
 PLAINLY_LESS = 0.98
 """Share of the squares that commands which hold leave, below which commands are smooth: a lag imitates either."""
-CURVE_STAGE, LIMIT_STAGE = 0, 2
 LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
 MOST_LIMITED = 0.5
 """Share of the time that a limit may hold a rotor."""
@@ -111,7 +110,7 @@ def commanded_path(
     for _, form in chain:
         steps.append((form.stage, form.apply, values[at : at + len(form.parameters)]))
         at += len(form.parameters)
-    steps.append((3, shifted if holds else moved, np.array([shift_s])))
+    steps.append((DELAY, shifted if holds else moved, np.array([shift_s])))
     for _, apply, own in sorted(steps, key=lambda s: s[0]):
         path = replace(path, speed=apply(path, own))
     return path.speed
@@ -353,7 +352,7 @@ class SpeedSearch:
     def starts(self, form: SpeedForm) -> list[np.ndarray]:
         """Starting values of a form: of a limit shares of the way from the usual command to the outermost (nothing acts
         beyond it, and nothing says there which way to go)."""
-        if form.stage != LIMIT_STAGE:
+        if form.stage != LIMIT:
             return starts_of(form)
         shares = np.concatenate([s.command.ravel() for s in self.problem.segments]) / self.problem.full_speed
         middle = float(np.median(shares))
@@ -370,7 +369,7 @@ class SpeedSearch:
         """
         rich = {}
         for key, form in self.forms:
-            if key in before_the_rotors() and form.stage != LIMIT_STAGE and key not in rich:
+            if key in before_the_rotors() and form.stage != LIMIT and key not in rich:
                 rich[key] = form
         fit = self.problem.fit((), np.zeros(0))
         for key, form in rich.items():
@@ -395,7 +394,7 @@ class SpeedSearch:
         without = self.problem.raw(kept, values, fit.shift_s)
         noise = np.sqrt(np.mean([np.mean(w**2, axis=0) for w in with_it], axis=0))
         per = max(2, int(self.problem.rate_hz))
-        quantile = 1.0 if fit.of(key)[0].stage == LIMIT_STAGE else 0.9
+        quantile = 1.0 if fit.of(key)[0].stage == LIMIT else 0.9
         best = 0.0
         for a, b in zip(with_it, without, strict=True):
             count = len(a) // per
@@ -417,7 +416,7 @@ class SpeedSearch:
 
     def neutral(self, form: SpeedForm) -> np.ndarray:
         """Parameter values that change nothing; of a limit, the outermost command."""
-        if form.stage != LIMIT_STAGE:
+        if form.stage != LIMIT:
             return np.array(form.neutral)
         shares = [s.command / self.problem.full_speed for s in self.problem.segments]
         return np.clip(form.neutral, min(float(s.min()) for s in shares), max(float(s.max()) for s in shares))
@@ -483,11 +482,12 @@ class SpeedSearch:
 
     def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
         """A lag of one constant and nothing beside it: what most publications fit."""
-        if not {"motor_lag"} < {k for k, _ in fit.chain} & {"motor_lag", "delay", "throttle_curve"}:
+        lag = next((k for k, f in fit.chain if f.stage == LAG), None)
+        if lag is None or not any(f.stage in (CURVE, DELAY) for _, f in fit.chain):
             return None
-        form = next(f for k, f in self.forms if k == "motor_lag")
-        start = fit.of("motor_lag")[1].mean()
-        return self.problem.with_covariance(self.problem.fit((("motor_lag", form),), np.array([start])))
+        form = next(f for k, f in self.forms if k == lag)
+        start = fit.of(lag)[1].mean()
+        return self.problem.with_covariance(self.problem.fit(((lag, form),), np.array([start])))
 
     def responds(self, fit: SpeedFit) -> bool:
         """Whether rotors still follow their commands: a flat curve would explain any difference between them."""
@@ -498,9 +498,9 @@ class SpeedSearch:
         grid = np.linspace(low, high, 9)[:, None]
         path = SpeedPath(grid, 0.01 * np.arange(9.0), self.problem.full_speed)
         for key, form in fit.chain:
-            if form.stage == LIMIT_STAGE and self._always_limited(form, fit.values[fit.slice_of(key)]):
+            if form.stage == LIMIT and self._always_limited(form, fit.values[fit.slice_of(key)]):
                 return False
-            if form.stage == CURVE_STAGE:
+            if form.stage == CURVE:
                 speed = form.apply(path, fit.values[fit.slice_of(key)])
                 slope = np.diff(speed, axis=0) / np.maximum(np.diff(grid, axis=0), 1e-9)
                 if (slope < LEAST_RESPONSE * (speed / np.maximum(grid, 1e-9))[1:]).any():
@@ -522,8 +522,8 @@ class SpeedSearch:
         is a delay, too: what one takes back of the other is none.
         """
         form, values = fit.of(key)
-        delays = form.apply is shifted
-        least = 0.5 / self.problem.segments[0].rate_hz if delays or key == "motor_lag" else 0.0
+        delays = form.stage == DELAY
+        least = 0.5 / self.problem.segments[0].rate_hz if form.stage >= DELAY else 0.0
         away = values + fit.shift_s if delays else values
         limits = [max(p.negligible, least) for p in form.parameters]
         return all(abs(v - n) < limit for v, n, limit in zip(away, form.neutral, limits, strict=True))

@@ -8,26 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue, ids_of, ids_of_stage
+from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.throttle_curve import SLOPE
 from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z
 from rotorid.mismatch.delivered import Values
-from rotorid.mismatch.findings import Analysis, Estimate, Finding
+from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.wrench import WrenchModel
 from rotorid.recordings import RecordingSet, Vehicle, columns
-
-IN_QUESTION = {
-    "payload": {
-        "mass_kg",
-        "thrust_coefficient_n_s2",
-        "torque_coefficient_n_m_s2",
-        *(f"inertia_{axis}_kg_m2" for axis in ("xx", "yy", "zz")),
-    },
-    "throttle_curve": {"thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s"},
-}
-"""Values that an id would change by itself; thrust and torque in a payload's are their ratios to mass and inertia."""
 
 
 def believed_value(vehicle: Vehicle, key: str) -> float:
@@ -139,7 +130,7 @@ def told_of_commands(findings: list[Finding], values: Values) -> Values:
     At which voltage the believed values hold is not stated (the largest in the set is only a guess), and a curve of the
     throttle has a slope of its own.
     """
-    if any(f.id == "battery_sag" and f.status in ("established", "ambiguous") for f in findings):
+    if any(f.id in ids_of_stage(SUPPLY) and f.status in CLAIMED for f in findings):
         values = without_common_scale(values)
     return without_scale_of_curve(findings, values)
 
@@ -149,7 +140,7 @@ def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
 
     Where rotor speeds are known from commands alone, a thrust coefficient larger by x is a scale larger by x/2.
     """
-    curve = next((f for f in findings if f.id == "throttle_curve" and f.status in ("established", "ambiguous")), None)
+    curve = next((f for f in findings if f.id in ids_of_stage(CURVE) and f.status in CLAIMED), None)
     has_scale = curve is not None and SLOPE in [p.symbol for p in curve.parameters]
     return without_common_scale(values) if has_scale else values
 
@@ -159,8 +150,9 @@ def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) 
 
     C_F and what the curve adds to it trade off against each other; their sum is what the recording knows.
     """
-    curve = next((f for f in findings if f.id == "thrust_curve" and f.status in ("established", "ambiguous")), None)
-    key = next((k for k in model.selection.active if model.search.terms[k].effect == "thrust_curve"), None)
+    curves = ids_of("curves_thrust")
+    curve = next((f for f in findings if f.id in curves and f.status in CLAIMED), None)
+    key = next((k for k in model.selection.active if model.search.terms[k].effect in curves), None)
     if curve is None or key is None:
         return findings, values
     fit, coefficient = model.selection.fit, believed_value(model.prepared.vehicle, "thrust")
@@ -183,7 +175,7 @@ def without_values_in_question(analysis: Analysis) -> Analysis:
     Asked once the words are final: a class that is only suggested questions nothing.
     """
     members = {i for f in analysis.findings if f.status == "ambiguous" for i in f.alternatives}
-    open_values = {name for i, names in IN_QUESTION.items() if i in members for name in names}
+    open_values = {name for i in members & set(catalogue()) for name in catalogue()[i].would_change}
     if not rules.VALUE_IN_QUESTION(bool(open_values & set(analysis.wrong_values))):
         return analysis
     kept = {k: v for k, v in analysis.values.items() if k not in open_values or k not in analysis.wrong_values}

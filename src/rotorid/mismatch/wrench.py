@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import catalogue, ids_of, moving_air
 from rotorid.effects.contract import Form
 from rotorid.mismatch import rules
 from rotorid.mismatch.closed_loop_bias import closed_loop_bias_s
@@ -544,16 +544,6 @@ def profile_cost(model: WrenchModel, terms: list[Term], rows: list[Rows], fixed_
     return square - float(cross @ np.linalg.solve(gram, cross))
 
 
-FEELS_THE_AIR = (
-    "rotor_drag",
-    "frame_drag",
-    "translational_lift",
-    "axial_inflow",
-    "flapping_moment",
-    "rotor_interference",
-)
-
-
 def in_wind(segments: list[Segment], wind: np.ndarray) -> list[Segment]:
     """Segments whose air moves over ground by `wind` (north, east), m/s."""
     air = np.array([wind[0], wind[1], 0.0])
@@ -567,17 +557,18 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
     part of the drag and lift to other names); then the search is repeated in that wind.
     """
     active = model.selection.active
-    wind_key = next((k for k in active if k.startswith("steady_wind/")), None)
-    felt = [k for k in active if model.search.terms[k].effect in FEELS_THE_AIR]
+    wind_id = moving_air("all the time").id
+    wind_key = next((k for k in active if model.search.terms[k].effect == wind_id), None)
+    felt = [k for k in active if model.search.terms[k].effect in ids_of("feels_air")]
     if wind_key is None or not felt:
         return model
     wind = first_wind(model, wind_key)
     if wind is None:
         return model
-    kept = [t for t in terms if t.effect != "steady_wind"]
+    kept = [t for t in terms if t.effect != wind_id]
     active = [k for k in active if k != wind_key]
     always = [t for t in terms if t.kind != "effect"]
-    wind_term = Term("wind", "wind", "steady_wind", size=2, prior_sd=(np.inf, np.inf))
+    wind_term = Term("wind", "wind", wind_id, size=2, prior_sd=(np.inf, np.inf))
     effects = [c for k, c in zip(model.selection.active, chosen(model), strict=True) if k != wind_key]
     rate = prepared.thinner.rate_hz
     for _ in range(4):
@@ -607,10 +598,10 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
         return model  # a wind that the fit through the drag does not see is none
     sd = np.sqrt(np.diag(fit.covariance)[-2:])
     again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
-    drags = ("rotor_drag", "frame_drag")
+    drags = ids_of("drag")
     had = {model.search.terms[k].effect for k in model.selection.active if model.search.terms[k].effect in drags}
     has = {again.search.terms[k].effect for k in again.selection.active}
-    if not has & set(FEELS_THE_AIR) or (had and not had & has):
+    if not has & ids_of("feels_air") or (had and not had & has):
         return model
     again.wind, again.wind_sd = wind, sd
     return again
@@ -620,14 +611,21 @@ def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
     """Wind (north, east), m/s, from a linear wind column and the drag beside it; None without a drag to divide by."""
     values = dict(zip(model.selection.active, chosen(model), strict=True))
     form, force = values[wind_key]
-    drag = next((values[k] for k in values if k.startswith("rotor_drag/")), None)
+    drag = linear_drag(model)
     speed = np.mean([r for s in model.prepared.segments for r in s.motion.rotor_speed.sum(axis=1)[::50]])
-    if form.name == "on the airframe":
+    if form.linear_drag == "of airspeed alone":
         force = force / speed
     if drag is not None:
-        k_d = np.mean(drag[1]) if "independent" not in drag[0].name else drag[1][0] / speed
+        k_d = np.mean(drag[1]) if drag[0].linear_drag == "times rotor speed" else drag[1][0] / speed
         return force / k_d if k_d > 0 else None
     return np.zeros(2) + 0.5 * np.sign(force)
+
+
+def linear_drag(model: WrenchModel) -> tuple[Form, np.ndarray] | None:
+    """The drag in proportion to airspeed that is in a model, with its values; None where there is none."""
+    pairs = zip(model.selection.active, chosen(model), strict=True)
+    drags = (c for k, c in pairs if model.search.terms[k].effect in ids_of("drag"))
+    return next((c for c in drags if c[0].linear_drag), None)
 
 
 def after_residual(model: WrenchModel) -> list[np.ndarray]:

@@ -12,8 +12,9 @@ from functools import partial
 
 import numpy as np
 
-from rotorid.effects.catalogue import before_the_rotors, catalogue
-from rotorid.effects.loading import CHANNELS, UNITS
+from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage
+from rotorid.effects.contract import CURVE, SUPPLY
+from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS
 from rotorid.mismatch import rules
 from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.analyse import throttle_or_thrust
@@ -30,7 +31,7 @@ from rotorid.mismatch.instrument.chain import (
     supply_reason,
     without_id,
 )
-from rotorid.mismatch.instrument.columns import NO_ROTORS, VALUE_NAMES, make_terms
+from rotorid.mismatch.instrument.columns import VALUE_NAMES, make_terms
 from rotorid.mismatch.instrument.curved_gain import curved_gains
 from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.mistakes import find_mistakes
@@ -49,7 +50,6 @@ from rotorid.mismatch.values import changed_vehicle, contract_values, names_of, 
 from rotorid.mismatch.within_trust import in_words, settled
 from rotorid.recordings import RecordingSet, Vehicle
 
-CURVES_OF_ONE_LOAD = ("load_nonlinearity", "thrust_curve")
 LOST_SHARE = 0.15
 """Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained."""
 SPEED_LEFT = "what was found between command and rotor speed does not carry over to the runs held out"
@@ -57,22 +57,22 @@ SPEED_LEFT = "what was found between command and rotor speed does not carry over
 
 def same_curve(chain: ChainResult) -> dict[str, str]:
     """Ids that beside a curve of the throttle only say again what it leaves, where speeds are known from it alone."""
-    if not any(f.id == "throttle_curve" and f.status in ("established", "ambiguous") for f in chain.findings):
+    if not any(f.id in ids_of_stage(CURVE) and f.status in CLAIMED for f in chain.findings):
         return {}
-    return dict.fromkeys(CURVES_OF_ONE_LOAD, "the curve between throttle and rotor speed takes it up")
+    return dict.fromkeys(sorted(ids_of("curve_of_load")), "the curve between throttle and rotor speed takes it up")
 
 
 def one_load(finding: Finding, setup: Setup) -> Finding:
     """Thrust and reading of one rotor that does not tilt are curves of one load: which of them is curved stays open."""
     alone = setup.recordings.vehicle.rotor_count == 1 and not setup.instrument.tilts
-    if not alone or finding.id not in CURVES_OF_ONE_LOAD or finding.status not in ("established", "ambiguous"):
+    if not alone or finding.id not in ids_of("curve_of_load") or finding.status not in CLAIMED:
         return finding
     if set(finding.channels) != {"force_z"}:
         return finding
     if not rules.ONE_LOAD(True):
         return finding
     return replace(
-        finding, status="ambiguous", alternatives=tuple(sorted({*CURVES_OF_ONE_LOAD, *finding.alternatives}))
+        finding, status="ambiguous", alternatives=tuple(sorted({*ids_of("curve_of_load"), *finding.alternatives}))
     )
 
 
@@ -118,7 +118,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         findings += chain.findings
         why = supply_reason(setup)
         if why is not None:
-            reasons["battery_sag"] = why
+            reasons |= dict.fromkeys(ids_of_stage(SUPPLY), why)
     values, refused = values_of(model.selection), set()
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import f as f_distribution
 
-from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import SpeedForm, SpeedPath
+from rotorid.effects.catalogue import catalogue, ids_of
+from rotorid.effects.contract import CURVE, DELAY, SUPPLY, SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
 from rotorid.mismatch.findings import Estimate, Finding, Trace
 from rotorid.mismatch.instrument.columns import form_reading
@@ -24,8 +24,6 @@ from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
 from rotorid.signal.kernels import causal
 
-TAKES_TIME_STAGE = 3
-"""Stage of a speed form from which it shows only while commands change: delays and lags."""
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
@@ -54,10 +52,6 @@ FAR = 0.05
 ALIKE = 12.0
 """Whitened squares within which another form explains as well."""
 
-WITH_A_SCALE = ("power of voltage, own reference", "affine", "quadratic")
-"""Forms that hold a scale of their own: with the full speed free they would hold it twice."""
-OF_A_SCALE = ("throttle_curve", "battery_sag")
-"""Ids with such forms."""
 
 Chain = tuple[tuple[str, SpeedForm], ...]
 
@@ -102,7 +96,8 @@ def unknown_courses(chain: Chain, dt_s: float) -> np.ndarray:
     if not takes_time(chain):
         return np.zeros(0)
     spread = dt_s**2 / 12.0
-    return np.array([spread]) if "delay" in dict(chain) else np.array([0.5 * dt_s, spread])
+    late = any(form.stage == DELAY for _, form in chain)
+    return np.array([spread]) if late else np.array([0.5 * dt_s, spread])
 
 
 def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, finer: int) -> np.ndarray:
@@ -271,9 +266,10 @@ class Problem:
     def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
-        for key, form in chain:
+        for _, form in chain:
             # Rotors do not turn before they are told: a wrench that is early beyond a sample is on another clock.
-            early = -SUB_SAMPLE / self.setup.instrument.rate_hz if key == "delay" and not self.measured else -np.inf
+            delays = form.stage == DELAY and not self.measured
+            early = -SUB_SAMPLE / self.setup.instrument.rate_hz if delays else -np.inf
             low += [max(p.low, early) for p in form.parameters]
             high += [p.high for p in form.parameters]
         reach = MOST_DOUBT * self.unknown(chain)
@@ -374,14 +370,14 @@ def candidates(setup: Setup) -> list[tuple[str, SpeedForm]]:
     out = []
     for key, effect in catalogue().items():
         for form in effect.speed_forms:
-            if setup.steady_points and form.stage >= TAKES_TIME_STAGE:
+            if setup.steady_points and form.stage >= DELAY:
                 continue
             if "voltage" in form.requires and any(x.motion.voltage is None for x in setup.loadings):
                 continue
-            if form.name == "drift in time" and all(x.motion.voltage is not None for x in setup.loadings):
+            if form.excited_by == "time" and all(x.motion.voltage is not None for x in setup.loadings):
                 continue
-            if setup.estimated_full_speed and form.name in WITH_A_SCALE:
-                continue
+            if setup.estimated_full_speed and form.own_scale:
+                continue  # with the full speed free it would be there twice
             out.append((key, form))
     return out
 
@@ -460,7 +456,7 @@ def without_mere_scale(problem: Problem, best: ChainFit, dropped: dict[str, str]
         scaled.scaled = True
         found = None
         for key, form in best.chain:
-            if key not in OF_A_SCALE:
+            if form.stage not in (CURVE, SUPPLY):
                 continue
             rest = tuple((k, f) for k, f in best.chain if k != key)
             kept = [best.theta[place_of(best.chain, k, False)] for k, _ in rest]
@@ -632,7 +628,7 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
     dt_s = 1.0 / setup.instrument.rate_hz
     for key, form in best.chain:
         where = place_of(best.chain, key, problem.scaled)
-        if key == "delay" and abs(best.theta[where][0]) <= SUB_SAMPLE * dt_s:
+        if form.stage == DELAY and abs(best.theta[where][0]) <= SUB_SAMPLE * dt_s:
             continue  # less than a sample: no finding
         values, deviation = best.theta[where], sd[where]
         p = p_value(values - np.array(form.neutral), covariance[where, where], count)
@@ -703,9 +699,8 @@ def rest_in_other_forms(problem: Problem, best: ChainFit, rest: Chain, forms) ->
 
 def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
-    rivals = {"motor_lag": ("amplifier_filter",), "delay": ("amplifier_filter", "delay")}.get(key, ())
-    out = ["thrust_curve"] if key == "throttle_curve" else []
-    for name in rivals:
+    out = sorted(ids_of("same_on_commands", key))
+    for name in catalogue()[key].like_of_reading:
         for form in forms_of(catalogue()[name], problem.setup.instrument):
             for p in form.parameters[0].starts:
                 others = problem.others

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
-from rotorid.effects.contract import Contribution, Form, not_testable_reason
-from rotorid.effects.loading import Loading, at_sensor, forms_of, weight
+from rotorid.effects.contract import Contribution, Effect, Form, not_testable_reason
+from rotorid.effects.loading import NO_ROTORS, Instrument, Loading, at_sensor, forms_of, weight
 from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
 from rotorid.mismatch.prepare import form_terms
 from rotorid.mismatch.rows import Rows, Term
@@ -26,13 +26,7 @@ VALUE_NAMES = {
     "gain_y": "reading_gain_y",
     "gain_z": "reading_gain_z",
 }
-TAKES_TIME = ("clock_skew", "delay", "amplifier_filter", "structural_resonance", "rotor_acceleration_torque", "creep")
-"""Ids that steady points cannot show."""
-QUICK = ("clock_skew", "delay", "amplifier_filter", "structural_resonance")
-"""Ids that show only in the moments after a change of load."""
 STILL = "the vehicle does not move on a stand"
-NO_ROTORS = "a bench has no rotors"
-MISTAKES = ("axis_sign", "unit_error", "rotor_order", "spin_direction", "sensor_dropout")
 OFFSET = "offset:load-reading"
 AtWork = Sequence[tuple[Form, np.ndarray]]
 """Forms with their parameter values."""
@@ -71,15 +65,15 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
         terms.append(Term(OFFSET, "nuisance", prior_sd=(0.5 / setup.instrument.rate_hz,)))
     empirical = [e for e in UNKNOWNS.values() if e.reading_forms]
     for effect in (*catalogue().values(), *empirical):
-        if effect.id in before_the_rotors() or effect.id in MISTAKES or effect.id == "quantisation":
+        if effect.id in before_the_rotors() or not effect.fitted:
             continue
-        if setup.instrument.by_hand and effect.id in QUICK:
+        if setup.instrument.by_hand and effect.shows == "after a change of load":
             reasons[effect.id] = "loads were put on by hand: their first moments are not known"
             continue
-        if setup.steady_points and effect.id in TAKES_TIME:
+        if setup.steady_points and effect.shows:
             reasons[effect.id] = "the recordings are steady points: nothing that takes time shows in them"
             continue
-        if effect.id == "unequal_rotors" and not any(c >= 3 for c in setup.instrument.channels):
+        if effect.shows_in_moments and not any(c >= 3 for c in setup.instrument.channels):
             reasons[effect.id] = "only forces are read: what each rotor gives shows in the moments"
             continue
         found, why = [], None
@@ -92,7 +86,7 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
             found += form_terms(effect.id, form)
         terms += found
         if not found and effect.id not in UNKNOWNS:
-            reasons[effect.id] = why or _reason(effect.id, setup)
+            reasons[effect.id] = why or nothing_to_test(effect, setup.instrument)
     return terms, reasons
 
 
@@ -104,34 +98,11 @@ def lacks(form: Form, setup: Setup) -> str | None:
     return reason
 
 
-def _reason(effect_id: str, setup: Setup) -> str:
-    """Why nothing of an id could be tested."""
-    vehicle = setup.vehicle
-    stand_only = (
-        "wall_interference",
-        "sensor_origin",
-        "com_offset",
-        "cable_stiffness",
-        "mount_tilt",
-        "unequal_rotors",
-    )
-    if setup.instrument.bench and (catalogue()[effect_id].reading_forms is None or effect_id in stand_only):
-        return NO_ROTORS if effect_id not in ("sensor_origin",) else "no moment is read"
-    if effect_id == "com_offset":
-        return "the weight was zeroed away" if vehicle.tared else "no mass is stated or no moment is read"
-    if effect_id == "cable_stiffness":
-        return "zeroed in each attitude" if vehicle.tared else "the mount is never tilted"
-    if effect_id == "sensor_origin":
-        return "no moment is read"
-    if effect_id == "hysteresis":
-        return "the load never comes back from above to a value other than none"
-    if effect_id == "compliance" and not setup.instrument.bench:
-        return "a stand has no known load whose direction could be seen to turn"
-    if effect_id in ("crosstalk", "mount_tilt", "compliance"):
-        return "one channel only is read"
-    if effect_id in ("amplifier_filter", "structural_resonance", "creep", "zero_drift", "wall_interference"):
-        return "the recordings are too short or too slow to show it"
-    return STILL
+def nothing_to_test(effect: Effect, instrument: Instrument) -> str:
+    """Why an instrument's recordings have no form of an effect to test."""
+    if effect.lack_on is not None:
+        return effect.lack_on(instrument)
+    return NO_ROTORS if instrument.bench else STILL
 
 
 def reading_of(added: Contribution, loading: Loading, vehicle: Vehicle) -> np.ndarray:

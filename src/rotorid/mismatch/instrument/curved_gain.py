@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorid.effects.catalogue import ids_of
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import SMALLEST_CHANGE
 from rotorid.mismatch.delivered import Values
@@ -21,7 +22,7 @@ def curved_gains(model: ReadingModel, values: Values) -> set[str]:
     so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both.
     """
     instrument = model.setup.instrument
-    if not any(model.search.terms[k].effect == "load_nonlinearity" for k in model.selection.active):
+    if not any(model.search.terms[k].effect in characteristics() for k in model.selection.active):
         return set()
     out = set()
     for key, (change, _) in values.items():
@@ -34,10 +35,15 @@ def curved_gains(model: ReadingModel, values: Values) -> set[str]:
     return out if rules.CURVED_GAIN(bool(out)) else set()
 
 
+def characteristics() -> frozenset[str]:
+    """Ids of a sensor's curves."""
+    return ids_of("curve_of_load") & ids_of("kind", "sensor")
+
+
 def slope_of(model: ReadingModel, channel: int, most: float) -> float:
     """Slope, less one, of a reading over loads up to `most` in size, less all effects but a curved characteristic."""
     fit, search = model.selection.fit, model.search
-    others = [k for k in model.selection.active if search.terms[k].effect != "load_nonlinearity"]
+    others = [k for k in model.selection.active if search.terms[k].effect not in characteristics()]
     known = np.isin(fit.columns, model.regression.columns(others))
     load, left = [], []
     for rows, loads in zip(model.rows, loads_of_rows(model), strict=True):

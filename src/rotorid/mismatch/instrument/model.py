@@ -43,8 +43,6 @@ MEMORY = 4
 """Blocks over which the noise of a sensor may be alike beyond what whitening takes away: 1/f noise has no end."""
 ROWS_PER_COLUMN = 8
 STRONGEST = 0.9
-TARE_MARGIN = 2.0
-"""A tare comes from a few samples and is only as good as their mean: an offset must be this much larger."""
 ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
@@ -269,10 +267,9 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
 
 
 def size_function(regression: Regression, of_columns):
-    """Size of a term by channel, in units of the noise, (6,), less for a tare by what its margin is."""
-    margin = {t.key: TARE_MARGIN if t.effect == "tare_offset" else 1.0 for t in regression.terms}
-    margin |= {t.key: 2 * TARE_MARGIN for t in regression.terms if t.key == "tare_offset/own in each run"}
-    return lambda key, beta: of_columns(regression.columns([key]), beta) / margin[key]
+    """Size of a term by channel, in units of the noise and of its form's resolution, (6,)."""
+    resolution = {t.key: t.form.resolution if t.form else 1.0 for t in regression.terms}
+    return lambda key, beta: of_columns(regression.columns([key]), beta) / resolution[key]
 
 
 def whitened(model: ReadingModel, values: list[np.ndarray]) -> list[np.ndarray]:
