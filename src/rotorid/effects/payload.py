@@ -45,7 +45,7 @@ def slung_in_air(motion, vehicle, values):
 
 
 def slung_starts(parts, vehicle):
-    """The likeliest lengths of a cable, each with a guess of its damping."""
+    """The likeliest lengths of a cable, each with its damping."""
     stretches = []
     for motion, left in parts:
         velocity = np.zeros_like(motion.specific_force) if motion.velocity is None else motion.velocity
@@ -55,8 +55,7 @@ def slung_starts(parts, vehicle):
             pulls.append(np.cross(left["moment"], [0.0, 0.0, 1.0]))
         world = [np.einsum("nij,nj->ni", motion.rotation, x)[:, :2] for x in (velocity, *pulls)]
         stretches.append((motion.time_s, hanging_acceleration(motion), world[0], world[1:]))
-    found = likely_lengths(stretches, LENGTHS_M, DAMPING_RATIO, vehicle.gravity_m_s2)
-    return tuple((length, DAMPING_RATIO) for length in found)
+    return likely_lengths(stretches, LENGTHS_M, DAMPING_RATIO, vehicle.gravity_m_s2)
 
 
 def aboard(motion):

@@ -1,9 +1,12 @@
 """A pendulum below a vehicle: how it swings, and how long its cable may be."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 from math import exp, sqrt
 
 import numpy as np
+
+from rotorid.compiling import compiled
 
 SWING_RATE_HZ = 100.0
 """Rate of the pendulum's own steps: thirty a radian for the shortest cable allowed."""
@@ -11,9 +14,17 @@ SCAN_RATE_HZ = 20.0
 """Rate at which lengths are tried: a swing has less than 2 Hz."""
 SHORTEST_SCAN = 40
 """Instants that a stretch must have to say anything about a length."""
+PIECE_S = 10.0
+"""Pieces that are scanned each by itself, two swings of the longest cable: what swings wildly in one manoeuvre, or hung
+otherwise before, does not drown the others."""
 LENGTHS_TRIED = 180
 """Steps of two in a hundred: the phase of what rings for a minute tells its length so well."""
 MOST_LIKELY = 3
+LEAST_EXPLAINED = 0.1
+"""Share of the pulls' squares that small swings must explain for a length to be looked at more closely."""
+NEAR, LENGTHS_NEAR = 1.12, 17
+"""A length of large swings is off by less in the scan of small ones; steps of 1.4 %."""
+RATIOS_TRIED = (0.005, 0.03)
 LEAST_HANG = 0.3
 """Share of gravity that must pull down for the small angles of the scan."""
 
@@ -43,75 +54,151 @@ def swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2):
 def _swung(hanging, start_x, start_y, start_z, dt, length_m, damping):
     """As `_leapfrog`, remembered: each column that a payload has asks for the same swing."""
     return _leapfrog(
-        np.frombuffer(hanging).reshape(-1, 3), np.array([start_x, start_y, start_z]), dt, length_m, damping
+        np.frombuffer(hanging).reshape(-1, 3).copy(), np.array([start_x, start_y, start_z]), dt, length_m, damping
     )
 
 
+@compiled()
 def _leapfrog(hanging, start, dt, length_m, damping):
     """Direction and squared rate of a pendulum at even instants, (n, 4), from rest along `start`."""
-    # Plain numbers: a step of an array of three costs ten times as much.
     kept = exp(-damping * dt)
     pull = sqrt(kept) * dt / length_m
-    length = sqrt(float(start @ start))
-    x, y, z = (start / length).tolist() if length > 0 else (0.0, 0.0, 1.0)
+    x, y, z = 0.0, 0.0, 1.0
+    length = sqrt(start[0] ** 2 + start[1] ** 2 + start[2] ** 2)
+    if length > 0.0:
+        x, y, z = start[0] / length, start[1] / length, start[2] / length
     # Rates live half a step behind: a half step back from rest.
-    u, v, w = (-0.5 * pull * (hanging[0] - (hanging[0] @ (x, y, z)) * np.array((x, y, z)))).tolist()
+    along = hanging[0, 0] * x + hanging[0, 1] * y + hanging[0, 2] * z
+    u = -0.5 * pull * (hanging[0, 0] - along * x)
+    v = -0.5 * pull * (hanging[0, 1] - along * y)
+    w = -0.5 * pull * (hanging[0, 2] - along * z)
     before = u * u + v * v + w * w
-    states = []
-    for e_x, e_y, e_z in hanging.tolist():
+    states = np.empty((len(hanging), 4))
+    for i in range(len(hanging)):
+        e_x, e_y, e_z = hanging[i, 0], hanging[i, 1], hanging[i, 2]
         along = e_x * x + e_y * y + e_z * z
         u = kept * u + pull * (e_x - along * x)
         v = kept * v + pull * (e_y - along * y)
         w = kept * w + pull * (e_z - along * z)
         after = u * u + v * v + w * w
-        states.append((x, y, z, 0.5 * (before + after)))
+        states[i] = x, y, z, 0.5 * (before + after)
         before = after
         x, y, z = x + dt * u, y + dt * v, z + dt * w
         longer = sqrt(x * x + y * y + z * z)
         x, y, z = x / longer, y / longer, z / longer
         # The rate is carried along the sphere: it turns with the direction and keeps its size.
         u, v, w = u * longer - dt * after * x, v * longer - dt * after * y, w * longer - dt * after * z
-    return np.array(states)
+    return states
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece of a stretch at SCAN_RATE_HZ, in world axes."""
+
+    stretch: int
+    first: int
+    """Block of the stretch that it begins with."""
+    since_s: np.ndarray
+    """Time from its first instant, (n,)."""
+    lean: np.ndarray
+    """Slope of what hangs the payload, (n, 2)."""
+    others: np.ndarray
+    """What is left to others, north and east, (2, n, 3): a constant, the slope itself, the velocity."""
+    pulls: np.ndarray
+    """Residuals that the swing may be seen in, in units of their own size, (ways, n, 2)."""
+
+
+def pieces_of(parts, gravity_m_s2):
+    """Stretches (time_s (n,), hanging (n, 3), velocity (n, 2), pulls (n, 2) each) as pieces of PIECE_S."""
+    out = []
+    for stretch, (time_s, *columns, pulls) in enumerate(parts):
+        if len(time_s) < 2:
+            continue
+        step, columns, pulls = in_blocks(time_s, [*columns, *pulls], len(columns))
+        hanging, velocity = columns
+        slope = hanging[:, :2] / np.maximum(hanging[:, 2:], LEAST_HANG * gravity_m_s2)
+        size = max(1, round(PIECE_S / step))
+        for first in range(0, max(len(hanging) - size, 0) + 1, size):
+            cut = slice(first, first + size)
+            count = len(hanging[cut])
+            if count < SHORTEST_SCAN:
+                continue
+            own = np.stack([p[cut] - p[cut].mean(axis=0) for p in pulls])
+            own /= np.maximum(np.sqrt((own**2).sum(axis=(1, 2), keepdims=True)), 1e-300)
+            others = np.stack([np.column_stack([np.ones(count), slope[cut, a], velocity[cut, a]]) for a in (0, 1)])
+            out.append(Piece(stretch, first, np.arange(count) * step, slope[cut], others, own))
+    return out
+
+
+def in_blocks(time_s, columns, keep):
+    """Step in s of blocks at SCAN_RATE_HZ, and means over them: the first `keep` columns (n, k), and the rest."""
+    step = float(np.median(np.diff(time_s)))
+    block = max(1, round(1.0 / (SCAN_RATE_HZ * step)))
+    count = len(time_s) // block
+    means = [x[: count * block].reshape(count, block, -1).mean(axis=1) for x in columns]
+    return block * step, means[:keep], means[keep:]
+
+
+def explained(piece, swings, others):
+    """Share of a piece's pulls that columns (n, 2), each by itself beside `others` (k, axis), explain: (columns,)."""
+    own, shared = np.zeros(len(swings)), np.zeros((len(piece.pulls), len(swings)))
+    for axis in (0, 1):
+        for k, swing in enumerate(swings):
+            base = np.linalg.qr(others(k, axis))[0]
+            column = swing[:, axis] - base @ (base.T @ swing[:, axis])
+            own[k] += column @ column
+            shared[:, k] += piece.pulls[:, :, axis] @ column
+    return (shared**2).sum(axis=0) / np.maximum(own, 1e-300)
 
 
 def likely_lengths(parts, bounds_m, damping_ratio, gravity_m_s2):
-    """Lengths of a cable, m, at which a small pendulum explains most of what is left: the best peaks of a scan.
+    """Lengths of a cable, m, at which a pendulum explains most of what is left, each with a damping ratio.
 
     `parts` are (time_s (n,), hanging (n, 3), velocity (n, 2), pulls) of stretches in world axes; `pulls` are residuals
     (n, 2) that the swing may be seen in (a force; a moment turned to the force that it is of), each counted by its own
-    size. What follows the hanging itself and the velocity is left to others, and the swing from before the first
-    instant to the cable's own free motion.
+    size in pieces of PIECE_S. What follows the hanging itself and the velocity is left to others, and the swing from
+    before the first instant of a piece to the cable's own free motion. The best peaks of a scan with small swings are
+    looked at once more as they swing through the whole stretch, where the first explains something.
     """
     lengths = np.geomspace(*bounds_m, LENGTHS_TRIED)
-    ways = min((len(pulls) for *_, pulls in parts), default=0)
-    own, shared, whole = np.zeros((ways, LENGTHS_TRIED)), np.zeros((ways, LENGTHS_TRIED)), np.zeros(ways)
-    for time_s, *columns, pulls in parts:
-        step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
-        block = max(1, round(1.0 / (SCAN_RATE_HZ * step)))
-        count = len(time_s) // block
-        if count < SHORTEST_SCAN:
-            continue
-        hanging, velocity, *pulls = (
-            x[: count * block].reshape(count, block, -1).mean(axis=1) for x in (*columns, *pulls)
-        )
-        pulls = [p - p.mean(axis=0) for p in pulls]
-        whole += [float((p**2).sum()) for p in pulls]
-        slope = hanging[:, :2] / np.maximum(hanging[:, 2:], LEAST_HANG * gravity_m_s2)
-        spectrum = np.fft.rfft(slope - slope.mean(axis=0), 2 * count, axis=0)
-        omega = 2 * np.pi * np.fft.rfftfreq(2 * count, block * step)
-        since = np.arange(count) * block * step
-        for k, length in enumerate(lengths):
-            ring = sqrt(gravity_m_s2 / length)
-            answer = ring**2 / (ring**2 - omega**2 + 2j * damping_ratio * ring * omega)
-            lean = np.fft.irfft(spectrum * answer[:, None], 2 * count, axis=0)[:count]
-            fading = np.exp(-damping_ratio * ring * since)
-            free = (fading * np.cos(ring * since), fading * np.sin(ring * since))
-            for axis in (0, 1):
-                others = np.column_stack([np.ones(count), slope[:, axis], velocity[:, axis], *free])
-                base = np.linalg.qr(others)[0]
-                column = lean[:, axis] - base @ (base.T @ lean[:, axis])
-                own[:, k] += column @ column
-                shared[:, k] += [column @ p[:, axis] for p in pulls]
-    gain = (shared**2 / np.maximum(own, 1e-300) / np.maximum(whole, 1e-300)[:, None]).sum(axis=0)
+    pieces = pieces_of(parts, gravity_m_s2)
+    if not pieces:
+        return ()
+    gain = np.zeros(LENGTHS_TRIED)
+    for piece in pieces:
+        count, step = len(piece.since_s), piece.since_s[1]
+        spectrum = np.fft.rfft(piece.lean - piece.lean.mean(axis=0), 2 * count, axis=0)
+        omega = 2 * np.pi * np.fft.rfftfreq(2 * count, step)
+        ring = np.sqrt(gravity_m_s2 / lengths)[:, None]
+        answer = ring**2 / (ring**2 - omega**2 + 2j * damping_ratio * ring * omega)
+        swings = np.fft.irfft(spectrum * answer[:, :, None], 2 * count, axis=1)[:, :count]
+        fading = np.exp(-damping_ratio * ring * piece.since_s)
+        free = np.stack([fading * np.cos(ring * piece.since_s), fading * np.sin(ring * piece.since_s)], axis=2)
+        gain += explained(piece, swings, lambda k, a, p=piece, f=free: np.hstack([p.others[a], f[k]]))
+    gain /= len(pieces)
     inner = np.flatnonzero((gain[1:-1] > gain[:-2]) & (gain[1:-1] >= gain[2:])) + 1
-    return tuple(float(lengths[k]) for k in inner[np.argsort(-gain[inner])][:MOST_LIKELY])
+    best = inner[np.argsort(-gain[inner])][:MOST_LIKELY]
+    return tuple(
+        nearest_swing(parts, pieces, lengths[k], gravity_m_s2)
+        if gain[k] > LEAST_EXPLAINED
+        else (float(lengths[k]), damping_ratio)
+        for k in best
+    )
+
+
+def nearest_swing(parts, pieces, length_m, gravity_m_s2):
+    """Length, m, near `length_m` and damping ratio by which the swing through whole stretches explains most."""
+    found = []
+    for length in length_m * np.geomspace(1 / NEAR, NEAR, LENGTHS_NEAR):
+        for ratio in RATIOS_TRIED:
+            pulls = []
+            for time_s, hanging, *_ in parts:
+                direction, square = swing(hanging, time_s, length, ratio, gravity_m_s2)
+                tension = np.maximum(np.einsum("ni,ni->n", hanging, direction) + length * square, 0.0)
+                pulls.append(in_blocks(time_s, [tension[:, None] * direction[:, :2]], 1)[1][0])
+            gain = 0.0
+            for piece in pieces:
+                own = pulls[piece.stretch][piece.first : piece.first + len(piece.since_s)]
+                gain += float(explained(piece, own[None], lambda k, a, p=piece: p.others[a])[0])
+            found.append((gain, float(length), ratio))
+    return max(found)[1:]

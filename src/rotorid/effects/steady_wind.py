@@ -1,11 +1,15 @@
 """Steady wind: a force constant in world axes, or drag built on airspeed instead of ground speed."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
 from rotorid.effects.scale import scale
 
 IN_PLANE = np.array([1.0, 1.0, 0.0])
+MOST_WIND_M_S = 30.0
 MOST_WEIGHTS = 2.0
 """No multirotor holds its place against a wind that pushes with more weights than this."""
 
@@ -71,6 +75,28 @@ def forms(vehicle):
             kernel=kernel_world_force,
         ),
     )
+
+
+def through_drag(drags: Sequence[tuple[Form, np.ndarray]]) -> Form:
+    """F = Σ F_j(v − Rᵀ w) − F_j(v): what a wind adds to effects that feel the air, forms with their values.
+
+    To first order in w, by differences over a metre a second about the air as it is.
+    """
+
+    def contribution(motion, vehicle, values):
+        wind = np.zeros(3) if motion.wind is None else motion.wind
+        step = 0.5 * np.array([*values, 0.0])
+        force, moment = np.zeros((motion.size, 3)), np.zeros((motion.size, 3))
+        for sign in (1.0, -1.0):
+            moved = replace(motion, wind=wind + sign * step)
+            for form, own in drags:
+                part = form.contribution(moved, vehicle, own)
+                force += 0.0 if part.force is None else sign * part.force
+                moment += 0.0 if part.moment is None else sign * part.moment
+        return Contribution(force=force, moment=moment)
+
+    parameters = tuple(Parameter(f"w_{d}", "m/s", -MOST_WIND_M_S, MOST_WIND_M_S) for d in ("north", "east"))
+    return Form("through the drag", "v_air = v − Rᵀ w", parameters, contribution, ("rotation", "velocity"))
 
 
 EFFECT = Effect(

@@ -28,6 +28,7 @@ from rotorid.mismatch.wrench import (
     block_seconds,
     chosen,
     model_filters,
+    with_linear,
     wrench_model,
 )
 
@@ -370,15 +371,6 @@ def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Ter
             step, covariances[term.key] = step_of(regression, fit, term)
             winds[term.key] = (term, winds[term.key][1] + np.clip(step, -LARGEST_STEP_M_S, LARGEST_STEP_M_S))
     return winds, covariances
-
-
-def with_linear(effect, regression: Regression, fit: Fit, term: Term):
-    """A form with its linear values as fitted."""
-    form, values = effect
-    if form.linear:
-        values = values.copy()
-        values[list(form.linear)] = fit.beta[np.isin(fit.columns, regression.columns([term.key]))]
-    return form, values
 
 
 def step_of(regression: Regression, fit: Fit, term: Term) -> tuple[np.ndarray, np.ndarray]:

@@ -10,13 +10,14 @@ from scipy.optimize import minimize_scalar
 
 from rotorid.effects.catalogue import catalogue, ids_of, moving_air
 from rotorid.effects.contract import Form
+from rotorid.effects.steady_wind import through_drag
 from rotorid.mismatch import rules
 from rotorid.mismatch.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import coefficients, relative_change
 from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
+from rotorid.mismatch.prepare import Prepared, assemble_rows, form_terms, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
     VALUE_LIMITS,
@@ -61,6 +62,8 @@ MEMORY_GRID = 37
 
 MOST_P_OF_WIND = 1e-3
 """p-value up to which a wind is seen by the fit through the drag."""
+WIND_ROUNDS = 3
+"""Searches in a wind at most: in moving air another drag may explain more, and through it the wind is another."""
 SURE_Z = 3.0
 """Standard errors by which a nuisance must differ from nothing to be delivered."""
 MOST_INFLATION = 2.0
@@ -553,58 +556,105 @@ def in_wind(segments: list[Segment], wind: np.ndarray) -> list[Segment]:
 def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
     """The model with drag and lift built on airspeed, where a steady wind and drag were both found.
 
-    The wind is fitted by Gauss-Newton through every effect that feels the air (a linear wind column would leave
-    part of the drag and lift to other names); then the search is repeated in that wind.
+    Where only drag was, a wind that shows through it alone is looked for: through a drag that grows with the square of
+    the airspeed a wind is no force that is constant in world axes.
+    """
+    wind_id = moving_air("all the time").id
+    effects = [model.search.terms[k].effect for k in model.selection.active]
+    if not ids_of("feels_air") & set(effects):
+        return model
+    if wind_id in effects:
+        return blown_by(prepared, model, segments, noisy, terms)
+    felt = with_felt_wind(prepared, model, segments, noisy)
+    blown = felt if felt is model else blown_by(prepared, felt, segments, noisy, terms)
+    return model if blown.wind is None else blown
+
+
+def with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> WrenchModel:
+    """The model with a wind that shows through the drag alone, to first order, where the search takes it."""
+    active, wind, forms = model.selection.active, moving_air("all the time"), chosen(model)
+    effects = [model.search.terms[k].effect for k in active]
+    known = all(s.motion.rotation is not None and s.motion.velocity is not None for s in segments)
+    if not known or not ids_of("drag") & set(effects):
+        return model
+    always = [t for t in model.terms if t.kind != "effect"]
+    asked = [*always, *[model.search.terms[k] for k in active], wind_term()]
+    if fitted_wind(prepared, asked, forms, np.zeros(2), segments, model_filters(model), steps=1) is None:
+        return model
+    felt = through_drag([f for effect, f in zip(effects, forms, strict=True) if effect in ids_of("feels_air")])
+    terms = [*model.terms, *form_terms(wind.id, felt)]
+    again = wrench_model(prepared, terms, forms, active, segments, noisy)
+    return again if any(again.search.terms[k].effect == wind.id for k in again.selection.active) else model
+
+
+def wind_term() -> Term:
+    """Columns of one metre a second more wind, north and east, through every effect that feels the air."""
+    return Term("wind", "wind", moving_air("all the time").id, size=2, prior_sd=(np.inf, np.inf))
+
+
+def blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
+    """The model with its steady wind fitted through every effect that feels the air, and the search repeated in it.
+
+    A linear wind column would leave part of the drag and lift to other names. The same model where the wind does not
+    show through them, or no drag is left beside it.
     """
     active = model.selection.active
-    wind_id = moving_air("all the time").id
-    wind_key = next((k for k in active if model.search.terms[k].effect == wind_id), None)
-    felt = [k for k in active if model.search.terms[k].effect in ids_of("feels_air")]
-    if wind_key is None or not felt:
-        return model
+    wind_key = next(k for k in active if model.search.terms[k].effect == wind_term().effect)
     wind = first_wind(model, wind_key)
     if wind is None:
         return model
-    kept = [t for t in terms if t.effect != wind_id]
+    kept = [*(t for t in terms if t.effect != wind_term().effect), wind_term()]
+    effects = [c for k, c in zip(active, chosen(model), strict=True) if k != wind_key]
     active = [k for k in active if k != wind_key]
-    always = [t for t in terms if t.kind != "effect"]
-    wind_term = Term("wind", "wind", wind_id, size=2, prior_sd=(np.inf, np.inf))
-    effects = [c for k, c in zip(model.selection.active, chosen(model), strict=True) if k != wind_key]
-    rate = prepared.thinner.rate_hz
-    for _ in range(4):
-        moved = in_wind(segments, wind)
-        own = [*always, *[model.search.terms[k] for k in active], wind_term]
-        rows = assemble_rows(prepared, own, moved, effects)
-        regression = build(
-            rows, own, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
-        )
-        fit = regression.fit([t.key for t in own], jackknife=True)
+    drags, always = ids_of("drag"), [t for t in terms if t.kind != "effect"]
+    had = any(model.search.terms[k].effect in drags for k in active)
+    for _ in range(WIND_ROUNDS):
+        own = [*always, *[model.search.terms[k] for k in active], wind_term()]
+        found = fitted_wind(prepared, own, effects, wind, segments, model_filters(model))
+        if found is None:
+            return model
+        wind, sd, effects = found
+        again = wrench_model(prepared, kept, effects, active, in_wind(segments, wind), in_wind(noisy, wind))
+        has = {again.search.terms[k].effect for k in again.selection.active}
+        if not has & ids_of("feels_air") or (had and not drags & has):
+            return model
+        if set(again.selection.active) == set(active):
+            break
+        active, effects = again.selection.active, chosen(again)
+    again.wind, again.wind_sd = wind, sd
+    return again
+
+
+def fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters, steps: int = 4):
+    """A steady wind (north, east), m/s, its one-sigma, and `effects` with their linear values beside it.
+
+    By Gauss-Newton from `wind`; None for a wind that the fit through the drag does not see. `terms` end with those of
+    `effects` and the wind's own.
+    """
+    rate, own = prepared.thinner.rate_hz, terms[-1 - len(effects) : -1]
+    for _ in range(steps):
+        rows = assemble_rows(prepared, terms, in_wind(segments, wind), effects)
+        rule = training_rule(prepared.split, segments)
+        regression = build(rows, terms, filters, rule, block_seconds(rows, rate), rate)
+        fit = regression.fit([t.key for t in terms], jackknife=True)
         step = fit.beta[-2:]
         wind = wind + np.clip(step, -3.0, 3.0)
-        at = len(fit.beta) - 2 - sum(model.search.terms[k].size for k in active)
-        updated = []
-        for k, (form, values) in zip(active, effects, strict=True):
-            size = model.search.terms[k].size
-            values = values.copy()
-            if form.linear:
-                values[list(form.linear)] = fit.beta[at : at + size]
-            updated.append((form, values))
-            at += size
-        effects = updated
+        effects = [with_linear(e, regression, fit, t) for e, t in zip(effects, own, strict=True)]
         if np.abs(step).max() < 0.01:
             break
     blown = replace(fit, beta=np.append(fit.beta[:-2], wind))  # the last step from it is all that the fit holds
     if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > MOST_P_OF_WIND:
-        return model  # a wind that the fit through the drag does not see is none
-    sd = np.sqrt(np.diag(fit.covariance)[-2:])
-    again = wrench_model(prepared, [*kept, wind_term], effects, active, in_wind(segments, wind), in_wind(noisy, wind))
-    drags = ids_of("drag")
-    had = {model.search.terms[k].effect for k in model.selection.active if model.search.terms[k].effect in drags}
-    has = {again.search.terms[k].effect for k in again.selection.active}
-    if not has & ids_of("feels_air") or (had and not had & has):
-        return model
-    again.wind, again.wind_sd = wind, sd
-    return again
+        return None
+    return wind, np.sqrt(np.diag(fit.covariance)[-2:]), effects
+
+
+def with_linear(effect: tuple[Form, np.ndarray], regression: Regression, fit: Fit, term: Term):
+    """A form with its linear values as fitted."""
+    form, values = effect
+    if form.linear:
+        values = values.copy()
+        values[list(form.linear)] = fit.beta[np.isin(fit.columns, regression.columns([term.key]))]
+    return form, values
 
 
 def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
@@ -613,6 +663,8 @@ def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
     form, force = values[wind_key]
     drag = linear_drag(model)
     speed = np.mean([r for s in model.prepared.segments for r in s.motion.rotor_speed.sum(axis=1)[::50]])
+    if not form.linear_drag:
+        return force  # it is the wind itself
     if form.linear_drag == "of airspeed alone":
         force = force / speed
     if drag is not None:

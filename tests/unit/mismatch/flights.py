@@ -41,13 +41,15 @@ def smooth(rng: np.random.Generator, count: int, size: float, highest_hz: float)
     return size * values / values.std()
 
 
-def slowed(acceleration: np.ndarray, rotation: np.ndarray, wind: np.ndarray, drag: float) -> np.ndarray:
-    """Velocity (n, 3) of what accelerates (n, 3) and is slowed across its third axis; `drag` per sample."""
+def slowed(acceleration: np.ndarray, rotation: np.ndarray, wind: np.ndarray, drag: float, square: float) -> np.ndarray:
+    """Velocity (n, 3) of what accelerates (n, 3) and is slowed: across its third axis by `drag` per sample, along its
+    way through the air by `square` per sample and m/s."""
     across = drag * (np.eye(3) - np.einsum("ni,nj->nij", rotation[:, :, 2], rotation[:, :, 2]))
-    gained = acceleration / DENSE_HZ + np.einsum("nij,nj->ni", across, wind)
+    gained = acceleration / DENSE_HZ
     velocity = np.zeros_like(acceleration)
     for k in range(1, len(velocity)):
-        velocity[k] = velocity[k - 1] + gained[k] - across[k] @ velocity[k - 1]
+        air = velocity[k - 1] - wind[k]
+        velocity[k] = velocity[k - 1] + gained[k] - across[k] @ air - square * np.sqrt(air @ air) * air
     return velocity
 
 
@@ -61,9 +63,12 @@ class Flight:
         drag: float = 0.0,
         excitation: float = 1.0,
         gust: tuple[float, float, float, float] | None = None,
+        square_drag: float = 0.0,
+        wind: tuple[float, float] = (0.0, 0.0),
     ):
         """`drag` is a deceleration across the rotors' axis per airspeed, 1/s; `gust` its start and stop, s, and the
-        wind north and east, m/s, that comes and goes within 0.3 s."""
+        wind north and east, m/s, that comes and goes within 0.3 s; `square_drag` a deceleration per airspeed squared,
+        1/m, and `wind` blows all the time, m/s."""
         rng = np.random.default_rng(seed)
         self.vehicle = quad()
         count = int((duration_s + 2.0) * DENSE_HZ)
@@ -85,16 +90,17 @@ class Flight:
             axis=1,
         )
         thrust = self.vehicle.mass_kg * GRAVITY * (1 + smooth(rng, count, 0.08 * excitation, 3.0))
-        wind = np.zeros((count, 3))
+        air = np.zeros((count, 3))
+        air[:, :2] = wind
         if gust is not None:
             start, stop = gust[0] + 1.0, gust[1] + 1.0  # recordings begin one second in
-            wind[:, :2] = np.interp(t, [start, start + 0.3, stop - 0.3, stop], [0, 1, 1, 0])[:, None] * gust[2:]
+            air[:, :2] += np.interp(t, [start, start + 0.3, stop - 0.3, stop], [0, 1, 1, 0])[:, None] * gust[2:]
         force = np.stack([np.zeros(count), np.zeros(count), -thrust / self.vehicle.mass_kg], axis=1)
         acceleration = rotation.apply(force) + np.array([0.0, 0.0, GRAVITY])
         # With a drag the horizontal velocity stays bounded by itself.
-        acceleration -= acceleration.mean(axis=0) * ((0.0, 0.0, 1.0) if drag else 1.0)
-        if drag:
-            velocity = slowed(acceleration, rotation.as_matrix(), wind, drag / DENSE_HZ)
+        acceleration -= acceleration.mean(axis=0) * ((0.0, 0.0, 1.0) if drag or square_drag else 1.0)
+        if drag or square_drag:
+            velocity = slowed(acceleration, rotation.as_matrix(), air, drag / DENSE_HZ, square_drag / DENSE_HZ)
         else:
             velocity = cumulative_trapezoid(acceleration, t, axis=0, initial=0.0)
             velocity -= velocity.mean(axis=0)
