@@ -59,6 +59,9 @@ class Motion:
     """Battery voltage, (n,), V."""
     carried: np.ndarray | None = None
     """Share of a payload that is on board, (n,), 0 or 1; None where it is carried all the time."""
+    hung: np.ndarray | None = None
+    """How a slung payload hung at some instants, (k, 7): time in s, direction of the cable downward and its rate in
+    1/s, both in world axes; None for one that starts at rest."""
     tilt_gravity: np.ndarray | None = None
     """Gravity on a stand, (n, 3), m/s2, sensor axes (kind `stand` only)."""
 
@@ -90,7 +93,7 @@ class Motion:
         """The same flight at selected instants."""
         picked = {}
         for name, value in self.__dict__.items():
-            keep = value is None or (name == "wind" and value.ndim == 1)
+            keep = value is None or name == "hung" or (name == "wind" and value.ndim == 1)
             picked[name] = value if keep else value[index]
         return replace(self, **picked)
 
@@ -181,6 +184,8 @@ class Form:
     linear_drag: Literal["", "times rotor speed", "of airspeed alone"] = ""
     """Of a force in proportion to the horizontal velocity through the air (or of a wind's part of it), how its
     coefficient hangs on the rotors; empty for any other force."""
+    swings: bool = False
+    """Whether it swings: how it hung in a run is read from the run (`Motion.hung`)."""
     comes_and_goes: bool = False
     """Whether it may be there for a part of a run alone (`Motion.carried`)."""
     resolution: float = 1.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
-from rotorid.effects.pendulum import likely_lengths, swing
+from rotorid.effects.pendulum import cable_pull, likely_lengths
 from rotorid.effects.scale import scale
 
 LENGTHS_M = (0.15, 6.0)
@@ -14,9 +14,9 @@ def slung(motion, vehicle, values):
     """F = m_p (e·n + L |n'|²) n, n the cable's direction downward, e = g − a what hangs it; M = z ẑ × F.
 
     The hook is z below the centre of mass, moved by it alone; `values` are m_p (kg), m_p z (kg m), L (m) and ζ. Needs
-    many instants in a row. How it hung before the first is not known: it starts at rest along the mean of e with
-    weights 1 − ω t/π (to zero), and what that misses fades with the damping. A cable does not push: where it would,
-    the force is zero.
+    many instants in a row. How it hung before the first is not known: unless the motion says so it starts at rest along
+    the mean of e with weights 1 − ω t/π (to zero), and what that misses fades with the damping. A cable does not push:
+    where it would, the force is zero.
     """
     return _pull(motion, vehicle, values, hanging_acceleration(motion))
 
@@ -24,9 +24,8 @@ def slung(motion, vehicle, values):
 def _pull(motion, vehicle, values, hanging):
     """Wrench in body axes of what hangs by the accelerations `hanging` (n, 3)."""
     mass_kg, hook_kg_m, length_m, damping_ratio = values
-    direction, rate_square = swing(hanging, motion.time_s, length_m, damping_ratio, vehicle.gravity_m_s2)
-    tension = np.maximum(np.einsum("ni,ni->n", hanging, direction) + length_m * rate_square, 0.0)
-    pull = np.einsum("nji,nj->ni", motion.rotation, tension[:, None] * direction)
+    world = cable_pull(hanging, motion.time_s, length_m, damping_ratio, vehicle.gravity_m_s2, motion.hung)
+    pull = np.einsum("nji,nj->ni", motion.rotation, world)
     pull = aboard(motion) * pull
     return Contribution(force=mass_kg * pull, moment=hook_kg_m * np.cross([0.0, 0.0, 1.0], pull))
 
@@ -151,6 +150,7 @@ def forms(vehicle):
             slung,
             ("specific_force", "rotation"),
             memory=True,
+            swings=True,
             excited_by=("always",),
             guess=slung_starts,
         ),
@@ -161,6 +161,7 @@ def forms(vehicle):
             slung_in_air,
             ("specific_force", "rotation", "velocity"),
             memory=True,
+            swings=True,
             excited_by=("always",),
             guess=slung_starts,
         ),

@@ -29,11 +29,25 @@ LEAST_HANG = 0.3
 """Share of gravity that must pull down for the small angles of the scan."""
 
 
-def swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2):
-    """Direction (n, 3) and squared rate (n,), rad²/s², of a spherical pendulum in world axes.
+def cable_pull(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=None):
+    """Pull of a payload of one kilogram on its hook, (n, 3), N, world axes; as `swing`. A cable does not push."""
+    direction, rate_square = swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung)
+    tension = np.maximum(np.einsum("ni,ni->n", hanging, direction) + length_m * rate_square, 0.0)
+    return tension[:, None] * direction
+
+
+def swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=None):
+    """Direction (n, 3) and squared rate (n,), rad²/s², of a pendulum in world axes; as `swing_states`."""
+    states = swing_states(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung)
+    return states[:, :3], states[:, 3]
+
+
+def swing_states(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=None):
+    """Direction, squared rate (rad²/s²) and rate of the direction (1/s), (n, 7), of a spherical pendulum in world axes.
 
     n'' = (e − (e·n) n)/L − |n'|² n − 2 ζ ω n', ω² = g/L, e = `hanging` (n, 3), m/s2, by leapfrog on blocks of
-    instants, which are averaged before and interpolated between afterwards.
+    instants, which are averaged before and interpolated between afterwards. It takes the states `hung` (as
+    `Motion.hung`) at their instants, or starts at rest.
     """
     size = len(hanging)
     dt = float(np.median(np.diff(time_s))) if size > 1 else 1.0 / SWING_RATE_HZ
@@ -42,46 +56,51 @@ def swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2):
     counts = np.diff(np.append(edges, size))[:, None]
     coarse, instants = np.add.reduceat(hanging, edges) / counts, np.add.reduceat(time_s, edges) / counts[:, 0]
     omega = sqrt(gravity_m_s2 / length_m)
-    recent = np.maximum(1.0 - omega * block * dt * np.arange(len(coarse)) / np.pi, 0.0)
-    start = recent @ coarse / recent.sum()
-    states = _swung(coarse.tobytes(), *start.tolist(), block * dt, length_m, 2 * damping_ratio * omega)
-    states = np.stack([np.interp(time_s, instants, column) for column in states.T], axis=1)
-    direction = states[:, :3] / np.maximum(np.linalg.norm(states[:, :3], axis=1, keepdims=True), 1e-12)
-    return direction, states[:, 3]
+    if hung is None:
+        recent = np.maximum(1.0 - omega * block * dt * np.arange(len(coarse)) / np.pi, 0.0)
+        hung = np.array([[time_s[0], *(recent @ coarse / recent.sum()), 0.0, 0.0, 0.0]])
+    firsts = [0, *np.searchsorted(instants, hung[1:, 0]).tolist(), len(coarse)]
+    parts = [
+        _swung(coarse[a:b].tobytes(), tuple(state[1:].tolist()), block * dt, length_m, 2 * damping_ratio * omega)
+        for a, b, state in zip(firsts[:-1], firsts[1:], hung, strict=True)
+        if b > a
+    ]
+    states = np.stack([np.interp(time_s, instants, column) for column in np.concatenate(parts).T], axis=1)
+    states[:, :3] /= np.maximum(np.linalg.norm(states[:, :3], axis=1, keepdims=True), 1e-12)
+    return states
 
 
-@lru_cache(maxsize=32)
-def _swung(hanging, start_x, start_y, start_z, dt, length_m, damping):
+@lru_cache(maxsize=256)
+def _swung(hanging, state, dt, length_m, damping):
     """As `_leapfrog`, remembered: each column that a payload has asks for the same swing."""
-    return _leapfrog(
-        np.frombuffer(hanging).reshape(-1, 3).copy(), np.array([start_x, start_y, start_z]), dt, length_m, damping
-    )
+    return _leapfrog(np.frombuffer(hanging).reshape(-1, 3).copy(), np.array(state), dt, length_m, damping)
 
 
 @compiled()
 def _leapfrog(hanging, start, dt, length_m, damping):
-    """Direction and squared rate of a pendulum at even instants, (n, 4), from rest along `start`."""
+    """Direction, squared rate and rate of a pendulum at even instants, (n, 7), from direction and rate `start` (6,)."""
     kept = exp(-damping * dt)
     pull = sqrt(kept) * dt / length_m
     x, y, z = 0.0, 0.0, 1.0
     length = sqrt(start[0] ** 2 + start[1] ** 2 + start[2] ** 2)
     if length > 0.0:
         x, y, z = start[0] / length, start[1] / length, start[2] / length
-    # Rates live half a step behind: a half step back from rest.
+    # Rates live half a step behind.
     along = hanging[0, 0] * x + hanging[0, 1] * y + hanging[0, 2] * z
-    u = -0.5 * pull * (hanging[0, 0] - along * x)
-    v = -0.5 * pull * (hanging[0, 1] - along * y)
-    w = -0.5 * pull * (hanging[0, 2] - along * z)
+    u = start[3] - 0.5 * pull * (hanging[0, 0] - along * x)
+    v = start[4] - 0.5 * pull * (hanging[0, 1] - along * y)
+    w = start[5] - 0.5 * pull * (hanging[0, 2] - along * z)
     before = u * u + v * v + w * w
-    states = np.empty((len(hanging), 4))
+    states = np.empty((len(hanging), 7))
     for i in range(len(hanging)):
         e_x, e_y, e_z = hanging[i, 0], hanging[i, 1], hanging[i, 2]
         along = e_x * x + e_y * y + e_z * z
+        u_0, v_0, w_0 = u, v, w
         u = kept * u + pull * (e_x - along * x)
         v = kept * v + pull * (e_y - along * y)
         w = kept * w + pull * (e_z - along * z)
         after = u * u + v * v + w * w
-        states[i] = x, y, z, 0.5 * (before + after)
+        states[i] = x, y, z, 0.5 * (before + after), 0.5 * (u_0 + u), 0.5 * (v_0 + v), 0.5 * (w_0 + w)
         before = after
         x, y, z = x + dt * u, y + dt * v, z + dt * w
         longer = sqrt(x * x + y * y + z * z)
@@ -157,8 +176,8 @@ def likely_lengths(parts, bounds_m, damping_ratio, gravity_m_s2):
     `parts` are (time_s (n,), hanging (n, 3), velocity (n, 2), pulls) of stretches in world axes; `pulls` are residuals
     (n, 2) that the swing may be seen in (a force; a moment turned to the force that it is of), each counted by its own
     size in pieces of PIECE_S. What follows the hanging itself and the velocity is left to others, and the swing from
-    before the first instant of a piece to the cable's own free motion. The best peaks of a scan with small swings are
-    looked at once more as they swing through the whole stretch, where the first explains something.
+    before the first instant of a piece to the cable's own free motion. The best peaks of a scan with small swings that
+    explain something are looked at once more as they swing through the whole stretch, and come in that order.
     """
     lengths = np.geomspace(*bounds_m, LENGTHS_TRIED)
     pieces = pieces_of(parts, gravity_m_s2)
@@ -178,27 +197,24 @@ def likely_lengths(parts, bounds_m, damping_ratio, gravity_m_s2):
     gain /= len(pieces)
     inner = np.flatnonzero((gain[1:-1] > gain[:-2]) & (gain[1:-1] >= gain[2:])) + 1
     best = inner[np.argsort(-gain[inner])][:MOST_LIKELY]
-    return tuple(
-        nearest_swing(parts, pieces, lengths[k], gravity_m_s2)
-        if gain[k] > LEAST_EXPLAINED
-        else (float(lengths[k]), damping_ratio)
-        for k in best
-    )
+    near = [nearest_swing(parts, pieces, lengths[k], gravity_m_s2) for k in best if gain[k] > LEAST_EXPLAINED]
+    far = [(float(lengths[k]), damping_ratio) for k in best if gain[k] <= LEAST_EXPLAINED]
+    return (*((length, ratio) for _, length, ratio in sorted(near, reverse=True)), *far)
 
 
 def nearest_swing(parts, pieces, length_m, gravity_m_s2):
-    """Length, m, near `length_m` and damping ratio by which the swing through whole stretches explains most."""
+    """What the swing through whole stretches explains at most for a length near `length_m`; that length, m, and the
+    damping ratio."""
     found = []
     for length in length_m * np.geomspace(1 / NEAR, NEAR, LENGTHS_NEAR):
         for ratio in RATIOS_TRIED:
             pulls = []
             for time_s, hanging, *_ in parts:
-                direction, square = swing(hanging, time_s, length, ratio, gravity_m_s2)
-                tension = np.maximum(np.einsum("ni,ni->n", hanging, direction) + length * square, 0.0)
-                pulls.append(in_blocks(time_s, [tension[:, None] * direction[:, :2]], 1)[1][0])
+                pull = cable_pull(hanging, time_s, length, ratio, gravity_m_s2)
+                pulls.append(in_blocks(time_s, [pull[:, :2]], 1)[1][0])
             gain = 0.0
             for piece in pieces:
                 own = pulls[piece.stretch][piece.first : piece.first + len(piece.since_s)]
                 gain += float(explained(piece, own[None], lambda k, a, p=piece: p.others[a])[0])
             found.append((gain, float(length), ratio))
-    return max(found)[1:]
+    return max(found)

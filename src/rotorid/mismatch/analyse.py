@@ -27,7 +27,7 @@ from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
-from rotorid.mismatch.payload_windows import on_board
+from rotorid.mismatch.payload_windows import loads, on_board
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.refitted import refitted
 from rotorid.mismatch.regime import regime_variables
@@ -120,6 +120,9 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     windows = tuple(g.window for g in seen.gusts)
     blown = ids_of("air_moves", "in windows") if seen.gusts else ()
     findings = [replace(f, windows=windows) if f.id in blown else f for f in findings]
+    if aboard := on_board(seen.segments):
+        comes_and_goes = {t.effect for t in loads(model)}
+        findings = [carried_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in findings]
     delivered = residuals_of(seen, fit)
     before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
     left = leftover(
@@ -182,9 +185,6 @@ def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
         model.noise,
         nonlinear_intervals(prepared, model, model.segments),
     )
-    if aboard := on_board(model.segments):
-        comes_and_goes = {t.effect for t in model.search.terms.values() if t.form and t.form.comes_and_goes}
-        findings = [carried_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in findings]
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 

@@ -26,6 +26,7 @@ from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.speedpath import SpeedResult
+from rotorid.mismatch.swinging import hung, like, price, swinging_term
 from rotorid.mismatch.within_trust import beyond_trust
 from rotorid.mismatch.wrench import (
     WrenchModel,
@@ -136,6 +137,7 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     model = with_own_scales(prepared, segments, noisy)
     if rules.CARRIED(bool(windows := carried_windows(model))):
         segments, noisy, model = with_payload(prepared, model, windows)
+    segments, noisy, model = with_swing(prepared, model)
     terms = list(model.terms)
     for _ in range(
         ROUNDS if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
@@ -143,6 +145,8 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         refined = refine_nonlinear(prepared, model, segments)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
         before = model
+        if segments[0].motion.hung is not None:
+            segments, noisy = hung_anew(model, terms) or (segments, noisy)
         model = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
         if converged(before, model):
             break
@@ -184,6 +188,30 @@ def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows])
     if carries and cost_of(with_it, filters) + price < cost_of(model, filters):
         return *both, with_it
     return segments, noisy, model
+
+
+def with_swing(prepared: Prepared, model: WrenchModel):
+    """Segments, their noisy copies and the model with a payload that hung as each run says, if that explains more."""
+    same = model.segments, model.noisy_segments, model
+    term = swinging_term(model)
+    segments = None if term is None else hung(model, model.segments, model.rows, term)
+    if segments is None:
+        return same
+    noisy = like(segments, model.noisy_segments)
+    with_it = with_own_scales(prepared, segments, noisy)
+    swings = any(with_it.search.terms[k].form.swings for k in with_it.selection.active)
+    filters = model.regression.filters
+    if swings and cost_of(with_it, filters) + price(segments) < cost_of(model, filters):
+        return segments, noisy, with_it
+    return same
+
+
+def hung_anew(model: WrenchModel, terms: Sequence[Term]):
+    """Segments and their noisy copies with a payload that hung as a model with other lengths of the cable says."""
+    active = {k for k in model.selection.active if model.search.terms[k].form.swings}
+    term = next((t for t in terms if t.key in active), None)
+    segments = None if term is None else hung(model, model.segments, model.rows, term)
+    return None if segments is None else (segments, like(segments, model.noisy_segments))
 
 
 def changes_its_columns(form: Form) -> bool:

@@ -56,8 +56,12 @@ def carried_windows(model: WrenchModel) -> list[Windows]:
 
 
 def loads(model: WrenchModel) -> list[Term]:
-    """Terms of what may be there for a part of a run alone, the one of fewest parameters first."""
-    return sorted((t for t in model.search.terms.values() if t.form and t.form.comes_and_goes), key=lambda t: t.size)
+    """Terms of what may be there for a part of a run alone: the one in the model first, then that of fewest parameters.
+
+    Rows of runs held out have the columns of what is in the model alone.
+    """
+    found = (t for t in model.search.terms.values() if t.form and t.form.comes_and_goes)
+    return sorted(found, key=lambda t: (t.key not in model.selection.active, t.size))
 
 
 def unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.ndarray]]:

@@ -19,6 +19,7 @@ from rotorid.mismatch.payload_windows import carried_windows, laden
 from rotorid.mismatch.prepare import assemble_rows, prepare_like
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import RUN_SCALE, Rows, Term
+from rotorid.mismatch.swinging import hung, like, swinging_term
 from rotorid.mismatch.wrench import WrenchModel, in_wind, path_segments
 from rotorid.recordings import RecordingSet, Split
 
@@ -47,6 +48,9 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
     noisy = as_flown([n for _, n in pairs], found) if noisy else []
     if model.segments and model.segments[0].motion.carried is not None:
         own, noisy = carrying(model, own, noisy)
+    if model.segments and model.segments[0].motion.hung is not None:
+        own = hung(model, own, rows_of(model, own), swinging_term(model)) or own
+        noisy = like(own, noisy)
     gusts = ()
     if model.gusts:
         own, noisy, gusts = with_gusts_of_new_runs(model, own, noisy, rows_of(model, own))
@@ -91,8 +95,9 @@ def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:
 
 def carrying(model: WrenchModel, segments: list[Segment], noisy: list[Segment]):
     """Stretches that say when a payload is on board, found in their own loads."""
-    rows = rows_of(model, laden(segments, [((-np.inf, np.inf),)] * len(segments)))
-    windows = carried_windows(replace(model, rows=[*model.rows, *rows]))[len(model.rows) :]
+    every = [*model.segments, *segments]
+    rows = rows_of(model, laden(every, [((-np.inf, np.inf),)] * len(every)))
+    windows = carried_windows(replace(model, rows=rows))[len(model.segments) :]
     windows = windows or [()] * len(segments)
     return laden(segments, windows), laden(noisy, windows) if noisy else noisy
 

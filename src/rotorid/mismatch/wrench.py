@@ -472,7 +472,7 @@ def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: in
     high = np.log(min(parameter.high, start * 6) / start)
     if term.form.memory and len(parameter.starts) > 1:
         # What rings has several minima over its frequency: the search starts about the best of a grid.
-        grid = np.linspace(low, high, MEMORY_GRID)
+        grid = np.sort(np.append(np.linspace(low, high, MEMORY_GRID - 1), 0.0))
         best = int(np.argmin([cost(factor) for factor in grid]))
         low, high = grid[max(best - 1, 0)], grid[min(best + 1, MEMORY_GRID - 1)]
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
