@@ -118,3 +118,14 @@ def test_nothing_turned_into_other_axes_is_nothing():
     energy = np.where(value > 0.5, 1.0, 20.0) * rng.chisquare(20, 800) / 20
     _, _, low, high = _separation(energy, value)
     assert low == 0.0 and 0.0 <= high <= 1.1
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_what_the_accelerometer_alone_reads_is_located_nowhere(alone):
+    """A burst of six noises in the force, that the velocity does not show, or does."""
+    made = analysis(bursts=[("b", "force_y", 20.0, 23.0, 6.0)])
+    (burst,) = [t for t in made.traces if (t.run, t.channel) == ("b", "force_y")]
+    read = np.where((burst.time_s > 20.0) & (burst.time_s < 23.0), burst.after, 0.0) / made.improved.mass_kg
+    sensors = replace(burst, channel="accelerometer_y", unit="m/s2", before=read, refitted=read, after=read * alone)
+    found = locate(replace(made, force_source="accelerometer", between_sensors=(sensors,)))
+    assert [(f.run, f.channel) for f in found] == ([] if alone else [("b", "force_y")])
