@@ -14,8 +14,8 @@ import yaml
 
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.headline import headline, tiles
-from rotorid.mismatch.page import pretty
 from rotorid.mismatch.verdict import Verdict, main_channel
+from rotorid.page.make import pretty
 from rotorid.recordings import Vehicle, vehicle_of
 
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")

@@ -18,8 +18,8 @@ from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.predict import prove as prove_reading
 from rotorid.mismatch.ledger import ledger, text_of
 from rotorid.mismatch.locate import locate
-from rotorid.mismatch.page import make_page
 from rotorid.mismatch.verdict import Verdict, make_verdict
+from rotorid.page.make import make_page
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, write_vehicle
 from rotorid.recordings.sufficient import sufficient
 from rotorid.writing import all_or_none, rounded

@@ -139,10 +139,10 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         segments, noisy, model = with_payload(prepared, model, windows)
     segments, noisy, model = with_swing(prepared, model)
     terms = list(model.terms)
-    for _ in range(
+    for number in range(
         ROUNDS if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
     ):
-        refined = refine_nonlinear(prepared, model, segments)
+        refined = refine_nonlinear(prepared, model, segments, wide=number == 0)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
         before = model
         if segments[0].motion.hung is not None:

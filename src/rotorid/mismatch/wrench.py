@@ -439,8 +439,11 @@ def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:
     return found
 
 
-def refine_nonlinear(prepared: Prepared, model: WrenchModel, segments) -> dict[str, np.ndarray]:
-    """Best nonlinear parameters of the active terms by a profile over each (others linear, free), bounded."""
+def refine_nonlinear(prepared: Prepared, model: WrenchModel, segments, wide: bool) -> dict[str, np.ndarray]:
+    """Best nonlinear parameters of the active terms by a profile over each (others linear, free), bounded.
+
+    What rings is searched about the best of a grid where the search is `wide`, else about its start.
+    """
     active = model.selection.active
     refined = {}
     for key in active:
@@ -448,13 +451,13 @@ def refine_nonlinear(prepared: Prepared, model: WrenchModel, segments) -> dict[s
         others = [t for t in model.terms if t.kind != "effect" or (t.key in active and t.key != key)]
         values = np.array(term.values, float)
         for index in term.form.nonlinear:
-            values[index] = _profiled(prepared, model, others, term, values, index, segments)
+            values[index] = _profiled(prepared, model, others, term, values, index, segments, wide)
         if term.form.nonlinear:
             refined[key] = values
     return refined
 
 
-def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: int, segments) -> float:
+def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: int, segments, wide: bool) -> float:
     """The value of one nonlinear parameter that leaves the least, searched within a factor of six of its start."""
     parameter, start = term.form.parameters[index], values[index]
     training = [s for s in segments if s.run in prepared.split.training]
@@ -473,7 +476,7 @@ def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: in
     if term.form.memory and len(parameter.starts) > 1:
         # What rings has several minima over its frequency: the search starts about the best of a grid.
         grid = np.sort(np.append(np.linspace(low, high, MEMORY_GRID - 1), 0.0))
-        best = int(np.argmin([cost(factor) for factor in grid]))
+        best = int(np.argmin([cost(factor) for factor in grid])) if wide else int(np.searchsorted(grid, 0.0))
         low, high = grid[max(best - 1, 0)], grid[min(best + 1, MEMORY_GRID - 1)]
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
     return float(start * np.exp(found.x))

@@ -229,6 +229,6 @@ def test_what_is_no_mission_says_why() -> None:
 
 
 def test_the_page_that_is_written_has_the_section() -> None:
-    from rotorid.mismatch.page import page_file
+    from rotorid.page.make import page_file
 
     assert page.SECTION.search(page_file("page.html"))

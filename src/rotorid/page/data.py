@@ -13,11 +13,11 @@ import numpy as np
 
 from rotorid.mismatch.findings import Analysis, Trace
 from rotorid.mismatch.locate import REGIME_BLOCK_S
-from rotorid.mismatch.page_replay import replay
-from rotorid.mismatch.page_signals import fit_percent, measured
 from rotorid.mismatch.shares import fitted_part, segments_of
 from rotorid.mismatch.verdict import Verdict
 from rotorid.mismatch.words import FORWARD_WORDS, channel_words, regime_words
+from rotorid.page.replay import replay
+from rotorid.page.signals import fit_percent, measured
 
 BUDGET = 800_000
 """Values that the page may hold of all traces together; 800 000 are 2.2 MB."""

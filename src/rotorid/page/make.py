@@ -20,7 +20,6 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.findings import Analysis, Finding
 from rotorid.mismatch.headline import errors_of, headline, tiles
 from rotorid.mismatch.improve import form_of
-from rotorid.mismatch.page_data import page_data
 from rotorid.mismatch.verdict import (
     Channel,
     EffectVerdict,
@@ -41,6 +40,7 @@ from rotorid.mismatch.words import (
     regime_words,
     sure,
 )
+from rotorid.page.data import page_data
 
 WORDS = {
     "no_mismatch": "no mismatch",
@@ -59,7 +59,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 @cache
 def page_file(name: str) -> str:
     """A file of the page: template, style, script, library."""
-    return files("rotorid.mismatch").joinpath("page_files", name).read_text(encoding="utf-8")
+    return files("rotorid.page").joinpath("files", name).read_text(encoding="utf-8")
 
 
 def make_page(

@@ -11,11 +11,11 @@ import pytest
 
 from rotorid.mismatch.deliver import verdict_of, write_files
 from rotorid.mismatch.headline import MOST_WORDS, headline, tiles
-from rotorid.mismatch.page import by_share, make_page
-from rotorid.mismatch.page_data import packed
-from rotorid.mismatch.page_signals import fit_percent, measured
 from rotorid.mismatch.shares import segments_of
 from rotorid.mismatch.verdict import main_channel
+from rotorid.page.data import packed
+from rotorid.page.make import by_share, make_page
+from rotorid.page.signals import fit_percent, measured
 from tests.browser import CHROMIUM, Browser
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 

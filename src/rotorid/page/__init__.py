@@ -1,0 +1,1 @@
+"""The page of a verdict: one file that needs no network."""
