@@ -8,7 +8,7 @@ this belongs to a run and not to the vehicle; the mass, the cable and the dampin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -31,8 +31,70 @@ MOST_STEPS = 40
 LOUDEST = 3
 """Pieces that are looked at first: most flights have nothing that swings."""
 
-Sideways = tuple[np.ndarray, np.ndarray]
-"""Instants (m,), s, and what the other effects leave of the force to the north and east there, (m, 2), N."""
+
+@dataclass(frozen=True)
+class Cable:
+    """What a payload hangs by."""
+
+    length_m: float
+    damping_ratio: float
+    gravity_m_s2: float
+
+    @property
+    def rate(self) -> float:
+        """Of small swings, rad/s."""
+        return float(np.sqrt(self.gravity_m_s2 / self.length_m))
+
+    @property
+    def piece_s(self) -> float:
+        """How long a state of it is read, s."""
+        return max(PIECE_S, PERIODS * 2 * np.pi / self.rate)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """What a payload hung by, and the sideways force that other effects leave."""
+
+    hanging: np.ndarray
+    """(n, 3), m/s2, world axes."""
+    time_s: np.ndarray
+    at_s: np.ndarray
+    """Instants of the force, (m,), s."""
+    force: np.ndarray
+    """To the north and east, (m, 2), N."""
+
+    @property
+    def squares(self) -> float:
+        return float((self.force**2).sum())
+
+    def part(self, start_s: float, stop_s: float) -> Stretch:
+        """What lies from `start_s` to before `stop_s`."""
+        inside, seen = ((t >= start_s) & (t < stop_s) for t in (self.time_s, self.at_s))
+        return Stretch(self.hanging[inside], self.time_s[inside], self.at_s[seen], self.force[seen])
+
+    def pull(self, cable: Cable, state: np.ndarray) -> np.ndarray:
+        """Sideways pull of a kilogram that sets out from a state (6,) on this cable, (m, 2), N."""
+        hung = np.array([[self.time_s[0], *state]])
+        own = cable_pull(self.hanging, self.time_s, cable.length_m, cable.damping_ratio, cable.gravity_m_s2, hung)
+        return np.stack([np.interp(self.at_s, self.time_s, column) for column in own[:, :2].T], axis=1)
+
+    def end(self, cable: Cable, state: np.ndarray) -> np.ndarray:
+        """The state (6,) in which what sets out from `state` ends."""
+        hung = np.array([[self.time_s[0], *state]])
+        found = swing_states(self.hanging, self.time_s, cable.length_m, cable.damping_ratio, cable.gravity_m_s2, hung)
+        return found[-1, [0, 1, 2, 4, 5, 6]]
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How a payload hung in a stretch."""
+
+    states: np.ndarray
+    """As `Motion.hung`."""
+    masses_kg: np.ndarray
+    """What each piece suggests."""
+    left_n2: float
+    """Squares of the force that are left."""
 
 
 def swinging_term(model: WrenchModel) -> Term | None:
@@ -44,46 +106,18 @@ def swinging_term(model: WrenchModel) -> Term | None:
 
 def hung(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows], term: Term) -> list[Segment] | None:
     """Stretches that say how a payload with a term's length and damping hung; None where hardly any force does."""
-    vehicle = model.prepared.vehicle
-    length_m, ratio = (term.values[i] for i in term.form.nonlinear)
-    sideways = sideways_force(model, segments, rows)
-    if not sideways:
+    cable = Cable(*(term.values[i] for i in term.form.nonlinear), model.prepared.vehicle.gravity_m_s2)
+    stretches = stretches_of(model, segments, rows)
+    if not shows(loudest(stretches, cable), cable):
         return None
-    hanging = [hanging_acceleration(s.motion) for s in segments]
-    asked = [(e, s.motion.time_s, *f) for e, s, f in zip(hanging, segments, sideways, strict=True)]
-    cable = length_m, ratio, vehicle.gravity_m_s2
-    if not shows(loudest(asked, piece_of(length_m, vehicle.gravity_m_s2)), *cable):
-        return None
-    found = [states(*a, *cable, None) for a in asked]
-    masses = np.concatenate([m for _, m, _ in found])
+    masses = np.concatenate([swing_in(s, cable, None).masses_kg for s in stretches])
     mass_kg = float(np.median(masses)) if len(masses) else 0.0
     if mass_kg <= 0.0:
         return None
-    found = [states(*a, *cable, mass_kg) for a in asked]
-    if sum(rest for _, _, rest in found) > (1.0 - LEAST_SHARE) * sum(float((f**2).sum()) for _, f in sideways):
+    found = [swing_in(s, cable, mass_kg) for s in stretches]
+    if sum(f.left_n2 for f in found) > (1.0 - LEAST_SHARE) * sum(s.squares for s in stretches):
         return None
-    return [replace(s, motion=replace(s.motion, hung=h)) for s, (h, _, _) in zip(segments, found, strict=True)]
-
-
-def piece_of(length_m: float, gravity_m_s2: float) -> float:
-    """How long a state of a cable is read, s."""
-    return max(PIECE_S, PERIODS * 2 * np.pi * float(np.sqrt(length_m / gravity_m_s2)))
-
-
-def loudest(asked, piece_s: float):
-    """Of stretches (hanging, time_s, at_s, force) the LOUDEST pieces with the largest force."""
-    pieces = []
-    for hanging, time_s, at_s, force in asked:
-        for start in np.arange(time_s[0], time_s[-1] - piece_s, piece_s):
-            inside, seen = ((t >= start) & (t < start + piece_s) for t in (time_s, at_s))
-            pieces.append((hanging[inside], time_s[inside], at_s[seen], force[seen]))
-    return sorted(pieces, key=lambda p: -float((p[3] ** 2).sum()))[:LOUDEST]
-
-
-def shows(pieces, length_m: float, ratio: float, gravity_m_s2: float) -> bool:
-    """Whether a swing explains enough of the force of pieces, each by itself."""
-    left = sum(states(*p, length_m, ratio, gravity_m_s2, None)[2] for p in pieces)
-    return left <= (1.0 - LEAST_SHARE) * sum(float((p[3] ** 2).sum()) for p in pieces) and bool(pieces)
+    return [replace(s, motion=replace(s.motion, hung=f.states)) for s, f in zip(segments, found, strict=True)]
 
 
 def like(segments: Sequence[Segment], noisy: Sequence[Segment]) -> list[Segment]:
@@ -96,85 +130,97 @@ def price(segments: Sequence[Segment]) -> float:
     return COST_PER_EFFECT + COST_PER_PARAMETER * UNKNOWNS_OF_A_STATE * sum(len(s.motion.hung) for s in segments)
 
 
-def sideways_force(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows]) -> list[Sideways]:
-    """What effects that do not swing leave of the sideways force of every stretch; empty where it is not known."""
-    terms, regression, fit = model.search.terms, model.regression, model.selection.fit
+def stretches_of(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows]) -> list[Stretch]:
+    """Every stretch with what effects that do not swing leave of its sideways force; empty where it is not known."""
+    terms, fit = model.search.terms, model.selection.fit
     if any(s.motion.rotation is None for s in segments) or not all(np.isfinite(r.y[:, :3]).all() for r in rows):
         return []
     others = [k for k in model.selection.active if not terms[k].form.swings and not terms[k].run]
-    cols = regression.columns(others)
+    cols = model.regression.columns(others)
     beta, out = fit.beta[fit.places(cols)], []
+    per = max(1, round(model.prepared.thinner.rate_hz / RATE_HZ))
     for s, r in zip(segments, rows, strict=True):
         index = np.searchsorted(s.motion.time_s, r.time_s).clip(0, s.motion.size - 1)
         left = r.y[:, :3] - r.x[:, :3][:, :, cols] @ beta
         world = np.einsum("nij,nj->ni", s.motion.rotation[index], left)[:, :2]
-        per = max(1, round(model.prepared.thinner.rate_hz / RATE_HZ))
         count = len(world) // per
-        out.append(
-            (
-                r.time_s[: count * per].reshape(count, per).mean(axis=1),
-                world[: count * per].reshape(count, per, 2).mean(axis=1),
-            )
-        )
+        at_s = r.time_s[: count * per].reshape(count, per).mean(axis=1)
+        force = world[: count * per].reshape(count, per, 2).mean(axis=1)
+        out.append(Stretch(hanging_acceleration(s.motion), s.motion.time_s, at_s, force))
     return out
 
 
-def states(hanging, time_s, at_s, force, length_m: float, ratio: float, gravity_m_s2: float, mass_kg: float | None):
-    """States of a payload in a stretch, as `Motion.hung`; the mass that each piece suggests, kg; the squares left, N2.
+def loudest(stretches: Sequence[Stretch], cable: Cable) -> list[Stretch]:
+    """The LOUDEST pieces of stretches with the largest force."""
+    pieces = [
+        s.part(start, start + cable.piece_s)
+        for s in stretches
+        for start in np.arange(s.time_s[0], s.time_s[-1] - cable.piece_s, cable.piece_s)
+    ]
+    return sorted(pieces, key=lambda p: -p.squares)[:LOUDEST]
 
-    Each piece starts from where the one before ends and is moved to what explains most of its force; the mass is free
-    in each where it is None.
+
+def shows(pieces: Sequence[Stretch], cable: Cable) -> bool:
+    """Whether a swing explains enough of the force of pieces, each by itself."""
+    left = sum(swing_in(p, cable, None).left_n2 for p in pieces)
+    return bool(pieces) and left <= (1.0 - LEAST_SHARE) * sum(p.squares for p in pieces)
+
+
+def swing_in(stretch: Stretch, cable: Cable, mass_kg: float | None) -> Swing:
+    """How a payload hung in a stretch; its mass is free in each piece where it is None.
+
+    Each piece starts from where the one before ends and is moved to what explains most of its force.
     """
-    if len(at_s) == 0:
-        return np.array([[time_s[0], *hanging[0], 0.0, 0.0, 0.0]]), np.zeros(0), 0.0
-    omega = np.sqrt(gravity_m_s2 / length_m)
-    count = max(1, int((time_s[-1] - time_s[0]) / piece_of(length_m, gravity_m_s2)))
-    edges = np.linspace(time_s[0], time_s[-1] + 1e-9, count + 1)
-    state, out, masses, rest = np.array([*hanging[0] / np.linalg.norm(hanging[0]), 0.0, 0.0, 0.0]), [], [], 0.0
-    for start, stop in zip(edges, edges[1:], strict=False):
-        inside, seen = (time_s >= start) & (time_s < stop), (at_s >= start) & (at_s < stop)
-        e, t, wanted = hanging[inside], time_s[inside], force[seen]
-        if seen.sum() <= 2 * UNKNOWNS_OF_A_STATE or inside.sum() < 3:
-            out.append([start, *state])
-            continue
-        size = max(float(np.sqrt(np.mean(wanted**2))), 1e-9)
-
-        def pulled(move, e=e, t=t, state=state, seen=seen):
-            own = np.array([[t[0], *moved(state, move, omega)]])
-            pull = cable_pull(e, t, length_m, ratio, gravity_m_s2, own)[:, :2]
-            return np.stack([np.interp(at_s[seen], t, column) for column in pull.T], axis=1)
-
-        def gain(pull, wanted=wanted):
-            free = float((pull * wanted).sum() / max(float((pull**2).sum()), 1e-12))
-            return max(free, 0.0) if mass_kg is None else mass_kg
-
-        def left(move, wanted=wanted, size=size):
-            pull = pulled(move)
-            return np.append(((wanted - gain(pull) * pull) / size).ravel(), move)
-
-        found = least_squares(left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", max_nfev=MOST_STEPS)
-        pull = pulled(found.x)
-        masses.append(gain(pull))
-        rest += float(((wanted - masses[-1] * pull) ** 2).sum())
-        own = moved(state, found.x, omega)
-        out.append([start, *own])
-        state = end_of(e, t, own, length_m, ratio, gravity_m_s2)
-    return np.array(out), np.array(masses), rest
+    start, stop = stretch.time_s[0], stretch.time_s[-1]
+    edges = np.linspace(start, stop + 1e-9, max(1, int((stop - start) / cable.piece_s)) + 1)
+    state, states, masses, left = at_rest(stretch.hanging[0]), [], [], 0.0
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        piece = stretch.part(first, last)
+        if len(piece.at_s) > 2 * UNKNOWNS_OF_A_STATE and len(piece.time_s) > 2:
+            state, mass, rest = fitted_piece(piece, cable, state, mass_kg)
+            masses.append(mass)
+            left += rest
+            states.append([first, *state])
+            state = piece.end(cable, state)
+        else:
+            states.append([first, *state])
+    return Swing(np.array(states), np.array(masses), left)
 
 
-def moved(state: np.ndarray, move: np.ndarray, omega: float) -> np.ndarray:
-    """A state (direction, rate) turned by two angles, and two rates in units of ω added to its own; `move` is (4,)."""
+def fitted_piece(piece: Stretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
+    """The state near `state` whose swing explains most of a piece's force; its mass, kg, and the squares left, N2.
+
+    One-sigma of the state is a radian, and a radian in 1/ω: what is not excited stays where it was.
+    """
+    size = max(float(np.sqrt(np.mean(piece.force**2))), 1e-9)
+
+    def mass_of(pull: np.ndarray) -> float:
+        if mass_kg is not None:
+            return mass_kg
+        return max(float((pull * piece.force).sum()) / max(float((pull**2).sum()), 1e-12), 0.0)
+
+    def left(move: np.ndarray) -> np.ndarray:
+        pull = piece.pull(cable, moved(state, move, cable.rate))
+        return np.append(((piece.force - mass_of(pull) * pull) / size).ravel(), move)
+
+    found = least_squares(left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", max_nfev=MOST_STEPS).x
+    own = moved(state, found, cable.rate)
+    pull = piece.pull(cable, own)
+    return own, mass_of(pull), float(((piece.force - mass_of(pull) * pull) ** 2).sum())
+
+
+def at_rest(hanging: np.ndarray) -> np.ndarray:
+    """The state (6,) of what hangs at rest along `hanging` (3,)."""
+    return np.array([*hanging / max(np.linalg.norm(hanging), 1e-9), 0.0, 0.0, 0.0])
+
+
+def moved(state: np.ndarray, move: np.ndarray, rate: float) -> np.ndarray:
+    """A state turned by two angles, and two rates in units of `rate` (1/s) added to its own; `move` is (4,)."""
     along = state[:3] / np.linalg.norm(state[:3])
     first = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.7 else [0.0, 1.0, 0.0])
     first /= np.linalg.norm(first)
     second = np.cross(along, first)
     direction = along + move[0] * first + move[1] * second
     direction /= np.linalg.norm(direction)
-    rate = state[3:] + omega * (move[2] * first + move[3] * second)
-    return np.concatenate([direction, rate - (rate @ direction) * direction])
-
-
-def end_of(hanging, time_s, state, length_m: float, ratio: float, gravity_m_s2: float) -> np.ndarray:
-    """Direction and rate in which a piece ends, (6,)."""
-    own = np.array([[time_s[0], *state]])
-    return swing_states(hanging, time_s, length_m, ratio, gravity_m_s2, own)[-1, [0, 1, 2, 4, 5, 6]]
+    turning = state[3:] + rate * (move[2] * first + move[3] * second)
+    return np.concatenate([direction, turning - (turning @ direction) * direction])

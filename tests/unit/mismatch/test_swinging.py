@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from rotorid.effects.pendulum import cable_pull, swing
-from rotorid.mismatch.swinging import end_of, loudest, moved, piece_of, shows, states
+from rotorid.mismatch.swinging import Cable, Stretch, loudest, moved, shows, swing_in
 
 G, LENGTH_M, RATIO, MASS_KG = 9.81, 0.6, 0.01, 0.2
+CABLE = Cable(LENGTH_M, RATIO, G)
 
 
 def shaken(seed: int, seconds: float = 30.0):
@@ -33,11 +34,11 @@ def sideways(hanging, time_s, start, noise_n: float, seed: int):
 def test_the_states_of_a_load_that_swings_far_are_read_piece_by_piece():
     hanging, time_s = shaken(1)
     at_s, force = sideways(hanging, time_s, moved(np.array([0.0, 0, 1, 0, 0, 0]), [0.7, -0.4, 0.5, 0.3], 4.0), 0.05, 2)
-    _, masses, left = states(hanging, time_s, at_s, force, LENGTH_M, RATIO, G, None)
-    assert np.median(masses) == pytest.approx(MASS_KG, rel=0.03)
-    hung, _, left = states(hanging, time_s, at_s, force, LENGTH_M, RATIO, G, MASS_KG)
-    assert hung.shape == (5, 7) and left == pytest.approx(0.05**2 * force.size, rel=0.2)
-    whole = MASS_KG * cable_pull(hanging, time_s, LENGTH_M, RATIO, G, hung)[9::20, :2][: len(force)]
+    stretch = Stretch(hanging, time_s, at_s, force)
+    assert np.median(swing_in(stretch, CABLE, None).masses_kg) == pytest.approx(MASS_KG, rel=0.03)
+    found = swing_in(stretch, CABLE, MASS_KG)
+    assert found.states.shape == (5, 7) and found.left_n2 == pytest.approx(0.05**2 * force.size, rel=0.2)
+    whole = MASS_KG * cable_pull(hanging, time_s, LENGTH_M, RATIO, G, found.states)[9::20, :2][: len(force)]
     from_rest = MASS_KG * cable_pull(hanging, time_s, LENGTH_M, RATIO, G)[9::20, :2][: len(force)]
     assert ((force - whole) ** 2).sum() < 0.1 * ((force - from_rest) ** 2).sum()
 
@@ -46,19 +47,20 @@ def test_noise_swings_not():
     hanging, time_s = shaken(3)
     at_s = time_s[10::20]
     force = 0.2 * np.random.default_rng(4).standard_normal((len(at_s), 2))
-    pieces = loudest([(hanging, time_s, at_s, force)], piece_of(LENGTH_M, G))
-    assert len(pieces) == 3 and not shows(pieces, LENGTH_M, RATIO, G)
-    assert not shows([], LENGTH_M, RATIO, G)
+    pieces = loudest([Stretch(hanging, time_s, at_s, force)], CABLE)
+    assert len(pieces) == 3 and not shows(pieces, CABLE)
+    assert not shows([], CABLE)
 
 
 def test_a_piece_goes_on_where_the_one_before_ends():
     hanging, time_s = shaken(5, 4.0)
     start = moved(np.array([0.0, 0, 1, 0, 0, 0]), [0.3, 0.2, 0.1, -0.2], 4.0)
-    middle = end_of(hanging[:401], time_s[:401], start, LENGTH_M, RATIO, G)
+    middle = Stretch(hanging[:401], time_s[:401], time_s[:0], np.zeros((0, 2))).end(CABLE, start)
     whole, _ = swing(hanging, time_s, LENGTH_M, RATIO, G, np.array([[0.0, *start]]))
     rest, _ = swing(hanging[400:], time_s[400:], LENGTH_M, RATIO, G, np.array([[time_s[400], *middle]]))
     assert np.abs(rest - whole[400:]).max() < 0.02
 
 
 def test_a_long_cable_is_read_for_two_swings():
-    assert piece_of(0.3, G) == 5.0 and piece_of(6.0, G) == pytest.approx(2 * 4.914, rel=0.001)
+    assert Cable(0.3, RATIO, G).piece_s == 5.0
+    assert Cable(6.0, RATIO, G).piece_s == pytest.approx(2 * 4.914, rel=0.001)
