@@ -70,6 +70,21 @@ def swing_states(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=No
     return states
 
 
+def moved(state: np.ndarray, move: np.ndarray, rate: float) -> np.ndarray:
+    """A state (direction, its rate) turned by two angles, and two rates in units of `rate` (1/s) added to its own.
+
+    `state` is (6,), `move` (4,).
+    """
+    along = state[:3] / np.linalg.norm(state[:3])
+    first = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.7 else [0.0, 1.0, 0.0])
+    first /= np.linalg.norm(first)
+    second = np.cross(along, first)
+    direction = along + move[0] * first + move[1] * second
+    direction /= np.linalg.norm(direction)
+    turning = state[3:] + rate * (move[2] * first + move[3] * second)
+    return np.concatenate([direction, turning - (turning @ direction) * direction])
+
+
 @lru_cache(maxsize=256)
 def _swung(hanging, state, dt, length_m, damping):
     """As `_leapfrog`, remembered: each column that a payload has asks for the same swing."""

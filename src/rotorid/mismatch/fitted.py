@@ -26,7 +26,7 @@ from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.speedpath import SpeedResult
-from rotorid.mismatch.swinging import hung, like, price, swinging_term
+from rotorid.mismatch.swinging import hung, like, price, swinging_term, with_likely_length
 from rotorid.mismatch.within_trust import beyond_trust
 from rotorid.mismatch.wrench import (
     WrenchModel,
@@ -193,17 +193,24 @@ def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows])
 def with_swing(prepared: Prepared, model: WrenchModel):
     """Segments, their noisy copies and the model with a payload that hung as each run says, if that explains more."""
     same = model.segments, model.noisy_segments, model
-    term = swinging_term(model)
+    start = swinging_term(model)
+    term = None if start is None else with_likely_length(model, start)
     segments = None if term is None else hung(model, model.segments, model.rows, term)
     if segments is None:
         return same
     noisy = like(segments, model.noisy_segments)
-    with_it = with_own_scales(prepared, segments, noisy)
+    terms = [replace(t, values=term.values) if is_like(t, start) else t for t in prepared.terms]
+    with_it = with_own_scales(replace(prepared, terms=terms), segments, noisy)
     swings = any(with_it.search.terms[k].form.swings for k in with_it.selection.active)
     filters = model.regression.filters
     if swings and cost_of(with_it, filters) + price(segments) < cost_of(model, filters):
         return segments, noisy, with_it
     return same
+
+
+def is_like(term: Term, other: Term) -> bool:
+    """Whether a term swings on the same cable as another."""
+    return bool(term.form and term.form.swings) and term.values == other.values
 
 
 def hung_anew(model: WrenchModel, terms: Sequence[Term]):

@@ -28,6 +28,7 @@ from rotorid.mismatch.rows import (
     project,
     residual,
     slope_column,
+    state_column,
     value_columns,
 )
 from rotorid.mismatch.rows import (
@@ -398,6 +399,8 @@ def assemble_rows(
                 yield from at_knots(columns, np.array(term.values), segment.motion.time_s) if term.run else columns
             elif term.kind == "slope":
                 yield slope_column(term, segment, vehicle, groups)
+            elif term.kind == "state":
+                yield state_column(term, segment, vehicle, groups)
             elif term.kind == "effect":
                 yield from form_columns(term.form, term.values, segment, vehicle, groups)
             elif term.kind == "value":

@@ -8,12 +8,13 @@ Both sides pass the same low-pass and are then thinned, so that the equation sta
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import upfirdn
 
 from rotorid.effects.contract import Contribution, Form, Motion
+from rotorid.effects.pendulum import moved
 from rotorid.mismatch.motion import Segment
 from rotorid.recordings import Vehicle
 from rotorid.signal import kernels
@@ -31,6 +32,10 @@ PARAMETER_NAMES = {
     "speed": "rotor_speed_limits_rad_s",
 }
 
+UNKNOWNS_OF_A_STATE = 4
+"""Of what swings, where a piece of a run begins: two angles and two rates."""
+STATE_STEP = 1e-3
+"""Of a slope by a state, rad."""
 SUSTAINED_S = 6.0
 """No vehicle keeps up an angular acceleration for longer: one-sigma of the mean in time that is taken away."""
 
@@ -42,7 +47,7 @@ class Term:
     key: str
     """Unique: `id/form` for an effect, a name of `PARAMETER_NAMES`, or `offset:…` for a nuisance."""
     kind: str
-    """`effect`, `value` (a believed number) or `nuisance`."""
+    """`effect`, `value` (a believed number), `nuisance`, `wind`, or, for intervals alone, `slope` and `state`."""
     effect: str = ""
     form: Form | None = None
     values: tuple[float, ...] = ()
@@ -54,7 +59,7 @@ class Term:
     window: tuple[str, float, float] | None = None
     """(run, start_s, stop_s) of an effect in part of the flight."""
     slope_of: int | None = None
-    """For the slope of a nonlinear parameter: its index in the form."""
+    """For the slope of a nonlinear parameter its index in the form, for that of a state its number, 0 to 3."""
 
     @property
     def once(self) -> str:
@@ -173,6 +178,43 @@ def slope_column(term: Term, segment: Segment, vehicle: Vehicle, groups) -> dict
     a = project(term.form.contribution(segment.motion, vehicle, up), segment, vehicle, groups)
     b = project(term.form.contribution(segment.motion, vehicle, down), segment, vehicle, groups)
     return {k: (a[k] - b[k]) / (2 * step) for k in a}
+
+
+def state_terms(segments: Iterable[Segment], term: Term) -> list[Term]:
+    """Slopes of a term by what its states may be off, in each piece: they widen the intervals of its numbers."""
+    return [
+        Term(
+            f"slope:{term.key}/{s.run}/{start_s:.3f}/{i}",
+            "state",
+            term.effect,
+            term.form,
+            term.values,
+            prior_sd=(1.0,),
+            run=s.run,
+            window=(s.run, float(start_s), float(start_s)),
+            slope_of=i,
+        )
+        for s in segments
+        if s.motion.hung is not None
+        for start_s in s.motion.hung[:, 0]
+        for i in range(UNKNOWNS_OF_A_STATE)
+    ]
+
+
+def state_column(term: Term, segment: Segment, vehicle: Vehicle, groups) -> dict[str, np.ndarray]:
+    """Derivative of what swings by one number of the state in which a piece of the stretch begins."""
+    motion, values = segment.motion, np.asarray(term.values, float)
+    pieces = np.flatnonzero(np.abs(motion.hung[:, 0] - term.window[1]) < 1e-6)
+    if not len(pieces):
+        return {}
+    rate = float(np.sqrt(vehicle.gravity_m_s2 / values[term.form.nonlinear[0]]))
+    parts = []
+    for step in (STATE_STEP, -STATE_STEP):
+        hung = motion.hung.copy()
+        hung[pieces[0], 1:] = moved(hung[pieces[0], 1:], step * np.eye(UNKNOWNS_OF_A_STATE)[term.slope_of], rate)
+        there = replace(motion, hung=hung)
+        parts.append(project(term.form.contribution(there, vehicle, values), segment, vehicle, groups))
+    return {k: (parts[0][k] - parts[1][k]) / (2 * STATE_STEP) for k in parts[0]}
 
 
 def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:

@@ -11,23 +11,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize_scalar
 
 from rotorid.effects.payload import hanging_acceleration
-from rotorid.effects.pendulum import cable_pull, swing_states
+from rotorid.effects.pendulum import cable_pull, moved, swing_states
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.rows import UNKNOWNS_OF_A_STATE, Rows, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.wrench import WrenchModel
 
 PIECE_S, PERIODS = 5.0, 2.0
 """A state is read for so long, and for so many swings at least."""
-UNKNOWNS_OF_A_STATE = 4
 RATE_HZ = 10.0
 """Rate at which the sideways force is looked at: a swing has less than 2 Hz."""
 LEAST_SHARE = 0.3
 """Share of the sideways force's squares that a swing must explain: four numbers of five seconds make 0.1 of noise."""
 MOST_STEPS = 40
+LENGTHS_APART, LENGTH_TO = 0.08, 0.002
+"""Logarithm of how far from its start the length is looked for with the states free, and how finely."""
 LOUDEST = 3
 """Pieces that are looked at first: most flights have nothing that swings."""
 
@@ -106,10 +107,8 @@ def swinging_term(model: WrenchModel) -> Term | None:
 
 def hung(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows], term: Term) -> list[Segment] | None:
     """Stretches that say how a payload with a term's length and damping hung; None where hardly any force does."""
-    cable = Cable(*(term.values[i] for i in term.form.nonlinear), model.prepared.vehicle.gravity_m_s2)
+    cable = cable_of(model, term)
     stretches = stretches_of(model, segments, rows)
-    if not shows(loudest(stretches, cable), cable):
-        return None
     masses = np.concatenate([swing_in(s, cable, None).masses_kg for s in stretches])
     mass_kg = float(np.median(masses)) if len(masses) else 0.0
     if mass_kg <= 0.0:
@@ -118,6 +117,29 @@ def hung(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows], 
     if sum(f.left_n2 for f in found) > (1.0 - LEAST_SHARE) * sum(s.squares for s in stretches):
         return None
     return [replace(s, motion=replace(s.motion, hung=f.states)) for s, f in zip(segments, found, strict=True)]
+
+
+def cable_of(model: WrenchModel, term: Term) -> Cable:
+    """What a payload hangs by with a term's values."""
+    return Cable(*(term.values[i] for i in term.form.nonlinear), model.prepared.vehicle.gravity_m_s2)
+
+
+def with_likely_length(model: WrenchModel, term: Term) -> Term | None:
+    """A term with the length near its own that explains most, the states free; None where nothing seems to swing."""
+    cable = cable_of(model, term)
+    stretches = stretches_of(model, model.segments, model.rows)
+    if not shows(loudest(stretches, cable), cable):
+        return None
+
+    def left(change: float) -> float:
+        other = replace(cable, length_m=cable.length_m * float(np.exp(change)))
+        return sum(swing_in(s, other, None).left_n2 for s in stretches)
+
+    reach = -LENGTHS_APART, LENGTHS_APART
+    change = minimize_scalar(left, bounds=reach, method="bounded", options={"xatol": LENGTH_TO}).x
+    values = list(term.values)
+    values[term.form.nonlinear[0]] *= float(np.exp(change))
+    return replace(term, values=tuple(values))
 
 
 def like(segments: Sequence[Segment], noisy: Sequence[Segment]) -> list[Segment]:
@@ -212,15 +234,3 @@ def fitted_piece(piece: Stretch, cable: Cable, state: np.ndarray, mass_kg: float
 def at_rest(hanging: np.ndarray) -> np.ndarray:
     """The state (6,) of what hangs at rest along `hanging` (3,)."""
     return np.array([*hanging / max(np.linalg.norm(hanging), 1e-9), 0.0, 0.0, 0.0])
-
-
-def moved(state: np.ndarray, move: np.ndarray, rate: float) -> np.ndarray:
-    """A state turned by two angles, and two rates in units of `rate` (1/s) added to its own; `move` is (4,)."""
-    along = state[:3] / np.linalg.norm(state[:3])
-    first = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.7 else [0.0, 1.0, 0.0])
-    first /= np.linalg.norm(first)
-    second = np.cross(along, first)
-    direction = along + move[0] * first + move[1] * second
-    direction /= np.linalg.norm(direction)
-    turning = state[3:] + rate * (move[2] * first + move[3] * second)
-    return np.concatenate([direction, turning - (turning @ direction) * direction])

@@ -27,7 +27,7 @@ from rotorid.mismatch.regression import (
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, winds_last
+from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, state_terms, winds_last
 from rotorid.mismatch.select import Questions, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
@@ -495,6 +495,8 @@ def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dic
     terms = [t for t in model.terms if t.kind != "effect"]
     fixed = []
     for term in active:
+        if term.form.swings:
+            terms += state_terms(segments, replace(term, values=tuple(float(v) for v in values[term.key])))
         at = tuple(float(v) for v in values[term.key])
         if term.form.linear:
             terms.append(replace(term, values=at))

@@ -53,6 +53,26 @@ def slowed(acceleration: np.ndarray, rotation: np.ndarray, wind: np.ndarray, dra
     return velocity
 
 
+def towing(thrust: np.ndarray, rotation: np.ndarray, mass: float, load: tuple[float, float]) -> np.ndarray:
+    """Velocity (n, 3) of what is pulled along its third axis by `thrust` (n,), N, and by a `load` (kg, m) on a cable at
+    its centre of mass, which is out to the side when it begins."""
+    ratio, length = load[0] / mass, load[1]
+    down = np.array([0.0, 0.0, GRAVITY])
+    cable, turning = np.array([0.5, 0.3, np.sqrt(1 - 0.34)]), np.zeros(3)
+    velocity = np.zeros((len(thrust), 3))
+    for k in range(1, len(thrust)):
+        alone = down - thrust[k] / mass * rotation[k, :, 2]
+        pull = ((down - alone) @ cable + length * turning @ turning) / (1.0 + ratio)
+        acceleration = alone + ratio * pull * cable
+        hanging = down - acceleration
+        turning = turning + (hanging - (hanging @ cable) * cable) / length / DENSE_HZ
+        cable = cable + turning / DENSE_HZ
+        cable /= np.linalg.norm(cable)
+        turning -= (turning @ cable) * cable
+        velocity[k] = velocity[k - 1] + acceleration / DENSE_HZ
+    return velocity
+
+
 class Flight:
     """True motion on a dense grid; `record` samples it as columns, each sensor at its own instants."""
 
@@ -65,10 +85,11 @@ class Flight:
         gust: tuple[float, float, float, float] | None = None,
         square_drag: float = 0.0,
         wind: tuple[float, float] = (0.0, 0.0),
+        load: tuple[float, float] | None = None,
     ):
         """`drag` is a deceleration across the rotors' axis per airspeed, 1/s; `gust` its start and stop, s, and the
         wind north and east, m/s, that comes and goes within 0.3 s; `square_drag` a deceleration per airspeed squared,
-        1/m, and `wind` blows all the time, m/s."""
+        1/m, and `wind` blows all the time, m/s. A `load` (kg, m) hangs on a cable."""
         rng = np.random.default_rng(seed)
         self.vehicle = quad()
         count = int((duration_s + 2.0) * DENSE_HZ)
@@ -99,7 +120,11 @@ class Flight:
         acceleration = rotation.apply(force) + np.array([0.0, 0.0, GRAVITY])
         # With a drag the horizontal velocity stays bounded by itself.
         acceleration -= acceleration.mean(axis=0) * ((0.0, 0.0, 1.0) if drag or square_drag else 1.0)
-        if drag or square_drag:
+        if load is not None:
+            turned = rotation.as_matrix()
+            thrust = (thrust + load[0] * GRAVITY) / turned[:, 2, 2]  # it keeps its height, more or less
+            velocity = towing(thrust, turned, self.vehicle.mass_kg, load)
+        elif drag or square_drag:
             velocity = slowed(acceleration, rotation.as_matrix(), air, drag / DENSE_HZ, square_drag / DENSE_HZ)
         else:
             velocity = cumulative_trapezoid(acceleration, t, axis=0, initial=0.0)
@@ -112,7 +137,7 @@ class Flight:
         at = self.vehicle.rotor_positions_m()
         lever = self.vehicle.torque_coefficient_n_m_s2 / self.vehicle.thrust_coefficient_n_s2
         mixer = np.stack([np.ones(4), -at[:, 1], at[:, 0], lever * self.vehicle.yaw_signs()])
-        lift = -exact[:, 2] * self.vehicle.mass_kg
+        lift = -exact[:, 2] * self.vehicle.mass_kg if load is None else thrust
         thrusts = np.linalg.solve(mixer, np.column_stack([lift, moment]).T).T
         speed = np.sqrt(np.maximum(thrusts, 1e-3) / self.vehicle.thrust_coefficient_n_s2)
         self.truth = {

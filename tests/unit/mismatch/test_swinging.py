@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from rotorid.effects.pendulum import cable_pull, swing
+from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.swinging import Cable, Stretch, loudest, moved, shows, swing_in
+
+from .flights import recorded
 
 G, LENGTH_M, RATIO, MASS_KG = 9.81, 0.6, 0.01, 0.2
 CABLE = Cable(LENGTH_M, RATIO, G)
@@ -64,3 +67,14 @@ def test_a_piece_goes_on_where_the_one_before_ends():
 def test_a_long_cable_is_read_for_two_swings():
     assert Cable(0.3, RATIO, G).piece_s == 5.0
     assert Cable(6.0, RATIO, G).piece_s == pytest.approx(2 * 4.914, rel=0.001)
+
+
+def test_a_load_on_a_cable_is_told_with_its_mass_and_length():
+    """80 g on 0.6 m below a vehicle of 652 g that is thrown about, out to the side when the recording begins."""
+    found = analyse(recorded(1, 2, 3, flight={"load": (0.08, 0.6), "excitation": 1.5}))
+    (payload,) = [f for f in found.findings if f.id == "payload" and f.status == "established"]
+    numbers = {p.symbol: p for p in payload.parameters}
+    assert payload.form.swings and found.unexplained_share < 0.01
+    for symbol, truth in (("m_p", 0.08), ("L", 0.6)):
+        assert numbers[symbol].low < truth < numbers[symbol].high
+        assert numbers[symbol].value == pytest.approx(truth, rel=0.02)
