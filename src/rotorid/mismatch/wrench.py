@@ -28,7 +28,7 @@ from rotorid.mismatch.regression import (
     full_fit_residuals,
 )
 from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, state_terms, winds_last
-from rotorid.mismatch.select import Questions, Search, Selection
+from rotorid.mismatch.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
     SpeedResult,
@@ -584,8 +584,11 @@ def with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> W
         return model
     always = [t for t in model.terms if t.kind != "effect"]
     asked = [*always, *[model.search.terms[k] for k in active], wind_term()]
-    if fitted_wind(prepared, asked, forms, np.zeros(2), segments, model_filters(model), steps=1) is None:
-        return model
+    regression = wind_regression(prepared, asked, forms, np.zeros(2), segments, model_filters(model))
+    keys = [t.key for t in asked]
+    seen = regression.compare(keys, keys[:-1])
+    if seen.promised.sum() <= LEAST_PROMISE or seen.transfer < LEAST_TRANSFER:
+        return model  # what asks for a wind here does not find it elsewhere
     felt = through_drag([f for effect, f in zip(effects, forms, strict=True) if effect in ids_of("feels_air")])
     terms = [*model.terms, *form_terms(wind.id, felt)]
     again = wrench_model(prepared, terms, forms, active, segments, noisy)
@@ -630,17 +633,21 @@ def blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: lis
     return again
 
 
-def fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters, steps: int = 4):
+def wind_regression(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters) -> Regression:
+    """The regression of terms in a steady wind (north, east), m/s; `effects` are the forms that it acts through."""
+    rows, rate = assemble_rows(prepared, terms, in_wind(segments, wind), effects), prepared.thinner.rate_hz
+    return build(rows, terms, filters, training_rule(prepared.split, segments), block_seconds(rows, rate), rate)
+
+
+def fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters):
     """A steady wind (north, east), m/s, its one-sigma, and `effects` with their linear values beside it.
 
     By Gauss-Newton from `wind`; None for a wind that the fit through the drag does not see. `terms` end with those of
     `effects` and the wind's own.
     """
-    rate, own = prepared.thinner.rate_hz, terms[-1 - len(effects) : -1]
-    for _ in range(steps):
-        rows = assemble_rows(prepared, terms, in_wind(segments, wind), effects)
-        rule = training_rule(prepared.split, segments)
-        regression = build(rows, terms, filters, rule, block_seconds(rows, rate), rate)
+    own = terms[-1 - len(effects) : -1]
+    for _ in range(4):
+        regression = wind_regression(prepared, terms, effects, wind, segments, filters)
         fit = regression.fit([t.key for t in terms], jackknife=True)
         step = fit.beta[-2:]
         wind = wind + np.clip(step, -3.0, 3.0)
