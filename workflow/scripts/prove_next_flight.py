@@ -86,7 +86,7 @@ def main(
 ) -> None:
     """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
 
-    `root` holds `tests`; rows of another `code` are made anew; `most` cases are taken at most.
+    `root` holds `tests`; a row of another `code` stays until the case is judged anew; `most` cases are taken at most.
     """
     sys.path.insert(0, root)
     warnings.simplefilter("ignore")
@@ -97,11 +97,10 @@ def main(
     kept = Path(so_far)
     kept.parent.mkdir(parents=True, exist_ok=True)
     rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
-    rows = [r for r in rows if str(r["judged_by"]) == code]
     # Where speeds are commands alone a set takes minutes: those come last.
     every = [*simulator.look_alikes(), *simulator.ambiguous()]
     cases = sorted(every, key=lambda case: "speed" not in case.settings.groups)[:most]
-    done = {r["case"] for r in rows}
+    done = {r["case"] for r in rows if str(r["judged_by"]) == code}
     for case in cases:
         if case.name in done:
             continue
@@ -109,7 +108,7 @@ def main(
         first = as_read(recording, simulator.write_set, "first")
         try:
             row = replace(row_of(case, answer, first, simulator, allowed), judged_by=code)
-            rows += proof.table([row]).to_dict("records")
+            rows = [r for r in rows if r["case"] != case.name] + proof.table([row]).to_dict("records")
         except InputError as error:
             print(f"{case.name}: {error}", file=sys.stderr)
             continue

@@ -9,9 +9,9 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.experiment.questions import Known
 from rotorid.experiment.separation import Information
-from rotorid.mismatch.decide import VALUE_FLOOR
 from rotorid.mismatch.regression import ridge_inverse
 from rotorid.mismatch.rows import PARAMETER_NAMES
+from rotorid.mismatch.select import VALUE_FLOOR
 
 
 @dataclass(frozen=True)

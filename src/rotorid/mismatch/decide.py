@@ -20,6 +20,7 @@ from rotorid.mismatch.select import (
     LEAST_TRANSFER,
     SHARE_OF_LARGEST,
     SMALLEST_SIZE,
+    VALUE_FLOOR,
     Search,
     Selection,
 )
@@ -33,8 +34,6 @@ LEAST_ROOM = 0.25
 would take physics up."""
 MOST_DISTRUST = 9.0
 WIDEST_TRUST = 0.1
-VALUE_FLOOR = 0.002
-"""Relative one-sigma that no estimate of a value here is better than (filters, timing)."""
 VALUE_P = 5e-4
 VALUE_Z = 3.5
 """A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""

@@ -33,6 +33,9 @@ INSTEAD_P = 1e-3
 MOST_EXTRA_PARAMETERS = 3
 """An alternative with more further parameters than this explains by its freedom, not by its cause."""
 MOST_EFFECTS = 10
+VALUE_FLOOR = 0.002
+"""Relative one-sigma that no estimate here is better than (filters, timing): of two effects that explain the same but
+for twice as much neither explains more."""
 MOST_TRIALS = 12
 """Exchanges looked at closely, the most promising first."""
 LEAST_TRANSFER = rules.TRANSFER["share"]
@@ -237,23 +240,26 @@ class Search:
         return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
-        """A model with one id in another's place, if it is worth more: the first to enter may be an imitation.
+        """A model with one id in another's place, if it is plainly worth more: the first to enter may be an imitation.
 
         The newcomer must hold by itself: what it displaces is not looked at again, and would be lost with it.
         """
         if not rules.EXCHANGE.on:
             return None
         taken = {self.terms[k].once for k in active} | set(dropped)
-        least = self.worth(active) + COST_PER_PARAMETER / 2
+        present, whole = self.worth(active), self.regression.explained(self.always + active)
         trials = []
         for gone in active:
             if self.terms[gone].run:
                 continue
+            own = whole - self.regression.explained(self.always + [k for k in active if k != gone])
+            least = present + max(COST_PER_PARAMETER / 2, (2 * VALUE_FLOOR) ** 2 * own)
             for other in self.terms.values():
                 if other.kind == "effect" and not other.run and other.once not in taken:
                     trial = [other.key if k == gone else k for k in active]
-                    trials.append((self.worth(trial), other.key, trial))
-        trials = sorted((t for t in trials if t[0] > least), key=lambda t: -t[0])
+                    if (worth := self.worth(trial)) > least:
+                        trials.append((worth, other.key, trial))
+        trials = sorted(trials, key=lambda t: -t[0])
         return next(
             (
                 trial

@@ -253,6 +253,7 @@ class WrenchOnly(SpeedProblem):
         self.shift_prior_s = float(np.hypot(self.shift_prior_s, closed_loop_bias_s))
         self.force_z = force_z
         self.rate_hz, self.residual_of, self.precision = rate_hz, residual_of, precision
+        self._known: tuple[np.ndarray, np.ndarray] | None = None
         self.columns = [residual_of(s, s.command, True)[1] for s in segments]
         rows = np.concatenate([residual_of(s, s.command, False)[0] for s in segments])
         self.scale = np.maximum(rows.std(axis=0), 1e-12)
@@ -265,6 +266,7 @@ class WrenchOnly(SpeedProblem):
 
     def refresh(self, fit: SpeedFit) -> None:
         """Recompute the believed values' columns at the path found."""
+        self._known = None
         self.columns = [
             self.residual_of(s, self.path(s, fit.chain, fit.values, fit.shift_s), True)[1] for s in self.segments
         ]
@@ -274,32 +276,37 @@ class WrenchOnly(SpeedProblem):
 
     def whitened(self, chain, values, shift_s):
         parts = self.raw(chain, values, shift_s)
-        rows, columns = self.white(parts), self._white_columns()
+        rows = self.white(parts)
         if self.lift_sd_n:
             rows = [*rows, np.concatenate(parts)[:, self.force_z].mean(keepdims=True)[:, None] / self.lift_sd_n]
-            own = np.concatenate(self.columns)[:, self.force_z].mean(axis=0) / self.lift_sd_n
-            columns = [*columns, own[None, None, :]]
-        size = columns[0].shape[-1]
-        gram = sum(np.einsum("ncp,ncq->pq", c, c) for c in columns) + np.diag(self.precision)
-        cross = sum(np.einsum("ncp,nc->p", c, r) for c, r in zip(columns, rows, strict=True))
-        beta = np.linalg.solve(gram + 1e-9 * np.trace(gram) / size * np.eye(size), cross)
+        columns, solved = self._believed()
+        flat = np.concatenate([r.ravel() for r in rows])
+        beta = solved @ flat
+        left = np.split(flat - columns @ beta, np.cumsum([r.size for r in rows])[:-1])
         # What a chain's gain and the believed values could share goes to the chain: the values pay for moving.
         moved = (np.sqrt(self.precision) * beta)[:, None]
-        return [*(r - c @ beta for r, c in zip(rows, columns, strict=True)), moved]
+        return [*(part.reshape(r.shape) for part, r in zip(left, rows, strict=True)), moved]
 
-    def _white_columns(self):
-        key = (id(self.filters), id(self.columns))
-        if getattr(self, "_cached_key", None) != key:
-            out = []
-            for part in self.columns:
-                if self.filters is None:
-                    out.append(part / self.scale[:, None])
-                    continue
-                longest = max(len(f) for f in self.filters) - 1
-                white = np.stack([causal(f, part[:, j]) for j, f in enumerate(self.filters)], axis=1)
-                out.append(white[longest:])
-            self._cached, self._cached_key = out, key
-        return self._cached
+    def _believed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Whitened columns of the believed values (rows, q), and what makes their values of a residual (q, rows)."""
+        if self._known is None:
+            parts = [self._white_column(part) for part in self.columns]
+            if self.lift_sd_n:
+                own = np.concatenate(self.columns)[:, self.force_z].mean(axis=0) / self.lift_sd_n
+                parts = [*parts, own[None, None, :]]
+            size = parts[0].shape[-1]
+            columns = np.concatenate([part.reshape(-1, size) for part in parts])
+            gram = columns.T @ columns + np.diag(self.precision)
+            solved = np.linalg.solve(gram + 1e-9 * np.trace(gram) / size * np.eye(size), columns.T)
+            self._known = (columns, solved)
+        return self._known
+
+    def _white_column(self, part: np.ndarray) -> np.ndarray:
+        """Columns of one segment, (n, c, q), whitened by the noise learnt."""
+        if self.filters is None:
+            return part / self.scale[:, None]
+        longest = max(len(f) for f in self.filters) - 1
+        return np.stack([causal(f, part[:, j]) for j, f in enumerate(self.filters)], axis=1)[longest:]
 
     def learn_noise(self, chain, values, shift_s):
         parts = self.raw(chain, values, shift_s)
@@ -313,6 +320,7 @@ class WrenchOnly(SpeedProblem):
             cross = cross + np.einsum("ncp,nc,c->p", c, r, weight**2)
         beta = np.linalg.solve(gram, cross)
         left = [r - c @ beta for r, c in zip(parts, self.columns, strict=True)]
+        self._known = None
         self.filters = [autoregression([p[:, j] for p in left]) for j in range(left[0].shape[1])]
 
 
@@ -342,12 +350,13 @@ class SpeedSearch:
         self.problem, self.forms = problem, forms
 
     def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
-        """The chain of `base` plus one form, from each of the form's starts; the cheapest."""
-        fits = []
-        ordered = sorted(self.starts(added), key=lambda s: self._quick(chain, np.append(base.values, s), base.shift_s))
-        for start in ordered[:1]:
-            fits.append(self.problem.fit(chain, np.append(base.values, start), base.shift_s))
-        return min(fits, key=lambda f: f.cost)
+        """The chain of `base` plus one form, from the one of the form's starts that leaves least."""
+
+        def left(start: np.ndarray) -> float:
+            parts = self.problem.whitened(chain, np.append(base.values, start), base.shift_s)
+            return sum(float((w**2).sum()) for w in parts)
+
+        return self.problem.fit(chain, np.append(base.values, min(self.starts(added), key=left)), base.shift_s)
 
     def starts(self, form: SpeedForm) -> list[np.ndarray]:
         """Starting values of a form: of a limit shares of the way from the usual command to the outermost (nothing acts
@@ -358,9 +367,6 @@ class SpeedSearch:
         middle = float(np.median(shares))
         outermost = float(self.neutral(form)[0])
         return [np.array([middle + way * (outermost - middle)]) for way in LIMIT_WAYS]
-
-    def _quick(self, chain, values, shift_s) -> float:
-        return sum(float((w**2).sum()) for w in self.problem.whitened(chain, values, shift_s))
 
     def rich_noise(self) -> None:
         """Learn the noise from the richest chain: one form of every id, of commands that hold or of smooth ones.

@@ -42,6 +42,7 @@ from rotorid.mismatch.two_sensors import refute
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 from rotorid.signal.kernels import causal
+from rotorid.vehicle.mixer import wrench_matrix
 
 LONGEST_BLOCKS = 400
 TRUSTED_SD = 1e-4
@@ -384,18 +385,23 @@ def speed_path(
             precision = np.append(precision, np.full(3, (STEADY_ARM * arm_m) ** -2.0))
         keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
 
+        # The rotors' wrench is linear in the squared speeds, and all else that is measured stays as it is.
+        still = {id(s): thinned_residual(at_speed(s, 0.0 * s.command), prepared, groups) for s in segments}
+        thrust, *moments = wrench_matrix(vehicle)
+        of_squares = np.stack([0 * thrust, 0 * thrust, -thrust, *moments])[keep].T
+
         def residual_of(segment: Segment, speed: np.ndarray, columns: bool):
-            moved = replace(segment, motion=replace(segment.motion, rotor_speed=speed))
             if columns:
+                moved = at_speed(segment, speed)
                 r = assemble_rows(prepared, terms, [moved], known)[0]
                 return r.y[:, keep], np.concatenate([r.x[:, keep], steady_moments(moved, prepared, groups)], axis=2)
-            parts = residual(moved, vehicle)
+            left = still[id(segment)] - prepared.thinner(speed**2) @ of_squares
             for form, values in known or []:
-                extra = form.contribution(moved.motion, vehicle, values)
-                for name in groups:
-                    if getattr(extra, name) is not None:
-                        parts[name] = parts[name] - getattr(extra, name)
-            return np.concatenate([prepared.thinner(parts[g]) for g in groups], axis=1), None
+                extra = form.contribution(at_speed(segment, speed).motion, vehicle, values)
+                for k, name in enumerate(groups):
+                    if (part := getattr(extra, name)) is not None:
+                        left[:, 3 * k : 3 * k + 3] -= prepared.thinner(part)
+            return left, None
 
         force_z = 2 if "force" in groups else None
         rate_hz = prepared.thinner.rate_hz
@@ -409,6 +415,17 @@ def speed_path(
         problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
     forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
     return SpeedSearch(problem, forms).run(), full_speed, full_voltage
+
+
+def at_speed(segment: Segment, speed: np.ndarray) -> Segment:
+    """A segment whose rotors turn at other speeds (n, k), rad/s."""
+    return replace(segment, motion=replace(segment.motion, rotor_speed=speed))
+
+
+def thinned_residual(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:
+    """Measured minus baseline of a segment, (m, 3 groups), filtered and thinned."""
+    parts = residual(segment, prepared.vehicle)
+    return np.concatenate([prepared.thinner(parts[g]) for g in groups], axis=1)
 
 
 def steady_moments(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -528,7 +528,8 @@ INERTIAL = ("gyroscope", "accelerometer")
 
 
 def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], sigmas: float, filter_s: float):
-    """The largest set of a group's sensors that agree, without those of it that a filter of their own makes late.
+    """The largest set of a group's sensors of which each two agree, without those of it that a filter of their own
+    makes late.
 
     `least` is what each may be off in any case; an inertial sensor is late by its own filter's `filter_s` at most.
     """
@@ -540,9 +541,12 @@ def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], si
     def filtered(n: str, c: str) -> bool:
         return n in INERTIAL and c not in INERTIAL and 0.0 < solved.over(n, [c])[0] < filter_s
 
+    # Each two: one that is known badly is near to all, and would join sensors that surely part.
+    alike = {pair for pair in combinations(group, 2) if near(*pair)}
+    sets = [s for size in range(len(group), 0, -1) for s in combinations(group, size) if alike >= {*combinations(s, 2)}]
     best = None
     for candidate in group:
-        own = [n for n in group if near(n, candidate)]
+        own = list(next(s for s in sets if candidate in s))
         late = [n for n in group if n not in own and (filtered(n, candidate) or filtered(candidate, n))]
         preferred = -min((PREFERRED.index(n) for n in own if n in PREFERRED), default=len(PREFERRED))
         rank = (len(own) + len(late), len(own), preferred)
