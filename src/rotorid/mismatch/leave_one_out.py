@@ -107,16 +107,18 @@ def without_wind(segment, wind: np.ndarray) -> np.ndarray:
 
 
 def chain_without(found: Fitted, key: str):
-    """What lies between command and speed less one id, with full speed and voltage."""
+    """What lies between command and speed with one id less, with full speed and voltage.
+
+    Fitted anew where speeds are measured. Where commands alone are, forces and moments are fitted with the chain as it
+    is: it stays so but for the id, or the two would no longer belong together.
+    """
     result, *rest = found.chain
-    fit = result.fit
-    where = fit.slice_of(key)
-    kept = replace(
-        fit,
-        chain=tuple((k, f) for k, f in fit.chain if k != key),
-        values=np.delete(fit.values, np.arange(where.start, where.stop)),
-    )
-    return replace(result, fit=kept), *rest
+    if found.measured:
+        return replace(result, fit=result.without[key]), *rest
+    where = result.fit.slice_of(key)
+    chain = tuple((k, f) for k, f in result.fit.chain if k != key)
+    values = np.delete(result.fit.values, np.arange(where.start, where.stop))
+    return replace(result, fit=replace(result.fit, chain=chain, values=values)), *rest
 
 
 def made_by(model: WrenchModel, segments, fit: Fit) -> list[np.ndarray]:

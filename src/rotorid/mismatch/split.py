@@ -3,8 +3,9 @@
 About a third of the runs is held out. An effect can be shown on runs that excite it alone, so of all choices the one is
 taken in which the runs held out and those fitted share what is done (in flight speeds along each axis, turning, changes
 of the rotors, nearness of the ground, voltage; on a stand or bench loads along each axis, tilts, each rotor, warmth);
-where choices are alike, the runs held out are spread evenly in time. Only what was done decides, never how well a model
-describes it.
+where choices are alike, the runs held out are spread evenly in time. Where a third cannot hold some of everything (a
+bench with two runs along each of three axes) up to a half is held out. Only what was done decides, never how well a
+model describes it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ HELD_OUT_SHARE = 1 / 3
 MOST_CHOICES = 500
 WORTH_MOVING = 0.05
 """Gain of a choice over the even one, beside the best possible score of 1, from which it is taken."""
+LEAST_SHARE = 0.5
+"""Of its even share: with less of some kind held out, or fitted, up to half of the runs are held out instead."""
 NEAR_GROUND_M = 0.3
 
 
@@ -57,8 +60,17 @@ def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
         both = [min(h / HELD_OUT_SHARE, 1.0) + min((1.0 - h) / (1.0 - HELD_OUT_SHARE), 1.0) for h in held]
         return float(np.mean(both)) / 2.0
 
+    def lacking(choice: tuple[int, ...]) -> bool:
+        """Whether hardly anything of some kind is done on one of the two sides."""
+        held = np.array([share[list(choice)].sum() for share in groups])
+        return bool(
+            (held < LEAST_SHARE * HELD_OUT_SHARE).any() or (1 - held < LEAST_SHARE * (1 - HELD_OUT_SHARE)).any()
+        )
+
     best = max(choices(total, count), key=score)
-    return best if score(best) > score(even) + WORTH_MOVING else even
+    chosen = best if score(best) > score(even) + WORTH_MOVING else even
+    more = (max(choices(total, n), key=score) for n in range(count + 1, total // 2 + 1))
+    return next((choice for choice in (chosen, *more) if not lacking(choice)), chosen)
 
 
 def choices(total: int, count: int) -> list[tuple[int, ...]]:

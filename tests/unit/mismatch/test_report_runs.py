@@ -146,6 +146,18 @@ def test_the_runs_held_out_share_what_was_flown():
     assert split_runs(whole) == split_runs(whole)
 
 
+def test_of_two_runs_along_each_axis_one_each_is_held_out():
+    """A third of six runs would leave an axis out on one of the two sides: nothing of it could be shown."""
+    time_s = np.arange(0.0, 20.0, 0.1)
+    runs = []
+    for number, axis in enumerate("xyzxyz"):
+        load = {f"reference_force_{a}_n": (a == axis) * np.sin(time_s) for a in "xyz"}
+        runs.append(Run(f"run{number}", pd.DataFrame({"time_s": time_s, **load})))
+    vehicle = Vehicle.model_validate({"name": "bench", "kind": "bench"})
+    held = split_runs(RecordingSet("made", vehicle, tuple(runs))).held_out
+    assert sorted("xyzxyz"[int(name[3:])] for name in held) == ["x", "y", "z"]
+
+
 def test_the_ledger_says_which_rule_decided_on_what():
     entries = ledger(analysed(30.0), verdict_of(analysed(30.0)))
     lowered = {e["on"]: e for e in entries}["rotor_drag"]

@@ -215,3 +215,17 @@ def test_a_term_that_turns_a_value_from_one_side_of_its_belief_to_the_other_stra
     base, fit = search.regression.fit(["thrust"]), search.regression.fit(["thrust", "curve/form"])
     turned = replace(fit, beta=np.array([0.25, -0.4]))
     assert search.strains(turned, base) and not search.strains(replace(fit, beta=np.array([-0.1, 0.0])), base)
+
+
+def test_of_two_that_explain_the_same_to_what_filters_are_known_the_first_stays():
+    """A copy that is off by 0.2 % of a strong contribution is no better for it; one that is off by 2 % is."""
+    rng = np.random.default_rng(6)
+    noise, x = case(rng, 2)
+
+    def search_beside(share: float) -> Search:
+        columns = [[one, one + share * other] for one, other in x]
+        y = [n + 80.0 * copy for n, (_, copy) in zip(noise, columns, strict=True)]
+        return search_of([term("there"), term("copy")], y, columns)
+
+    assert search_beside(0.002).swapped(["there/form"], {}) is None
+    assert search_beside(0.02).swapped(["there/form"], {}) == ["copy/form"]
