@@ -36,6 +36,7 @@ from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.speedpath import SpeedResult, commanded_path
 from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.value_sides import sides_of_values
 from rotorid.mismatch.values import (
     changed_vehicle,
     contract_values,
@@ -207,7 +208,7 @@ def not_testable(prepared: Prepared, chain: Chain | None, findings: list[Finding
 
 def instead_of(model: WrenchModel, values: Values) -> dict[str, tuple[str, ...]]:
     """Contract name of a wrong value to others, in words, that would explain as much in its place."""
-    found = exchangeable(model.search.regression, model.selection, values)
+    found = exchangeable(sides_of_values(model).judging, model.selection, values)
     return {PARAMETER_NAMES[key]: within_trust.in_words(others) for key, others in found.items()}
 
 

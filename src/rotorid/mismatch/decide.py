@@ -29,7 +29,7 @@ from rotorid.mismatch.unknowns import UNKNOWNS
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
 MOST_VALUES = 3
-LEAST_ROOM = 0.25
+LEAST_ROOM = 0.6
 """A value that is asked whether it is wrong may be so by this share at least; in the search it has less room, or it
 would take physics up."""
 MOST_DISTRUST = 9.0
@@ -182,21 +182,21 @@ def fails_elsewhere(
 
 def wrong_values(
     regression: Regression,
-    search: Search,
     selection: Selection,
     reverse: Regression | None,
     size_of: Callable[[str, float], float],
     moving: bool = True,
     refused: Collection[str] = (),
+    measured_moment: bool = True,
 ) -> dict[str, tuple[float, float]]:
     """The fewest believed values that must change: relative change and one-sigma.
 
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
     counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
-    sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other
-    side (`reverse`: measured moments as regressors) agrees, where it survives on the held-out part, and where it
-    matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is False
-    on a stand, where a mass only weighs; `refused` values are not called wrong.
+    sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other side
+    (`reverse`, with `measured_moment` that with measured moments as regressors) agrees, where it survives on the
+    held-out part, and where it matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative
+    change)`). `moving` is False on a stand, where a mass only weighs; `refused` values are not called wrong.
     """
     regression = regression.with_room(LEAST_ROOM)
     reverse = None if reverse is None else reverse.with_room(LEAST_ROOM)
@@ -251,11 +251,18 @@ def wrong_values(
     if not named:
         return {}
     fit = regression.fit(always + named, jackknife=True, loose=loose)
+    other = fit if reverse is None else reverse.fit(always + named, loose=loose)
     out = {}
     for key in named:
         beta, covariance = coefficients(regression, fit, key)
-        sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
-        out[key] = relative_change(key, float(beta[0]), sd) if moving else (float(beta[0]), sd)
+        change, sd = float(beta[0]), float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
+        if moving:
+            change, sd = relative_change(key, change, sd)
+            check = float(coefficients(reverse or regression, other, key)[0][0])
+            apart = change - relative_change(key, check, 0.0, reverse is not None and measured_moment)[0]
+            # The truth lies between the two sides: as a uniform distribution has it, a twelfth of the square.
+            sd = float(np.hypot(sd, apart / np.sqrt(12)))
+        out[key] = change, sd
     return out
 
 
@@ -293,12 +300,13 @@ def exchangeable(
     return out
 
 
-def relative_change(key: str, coefficient: float, sd: float) -> tuple[float, float]:
+def relative_change(key: str, coefficient: float, sd: float, measured_moment: bool = False) -> tuple[float, float]:
     """Relative change of a believed value, and its one-sigma, from its coefficient.
 
     The columns of a mass and an inertia m hold the acceleration F / m of the believed one: their coefficient is
-    1 − m_believed / m.
+    1 − m_believed / m. With measured moments as regressors it is those of an arm and a torque that hold the true one.
     """
-    if key == "mass" or key.startswith("inertia"):
+    turned = key in ("arm", "torque") if measured_moment else key.startswith("inertia")
+    if key == "mass" or turned:
         return coefficient / (1.0 - coefficient), sd / (1.0 - coefficient) ** 2
     return coefficient, sd

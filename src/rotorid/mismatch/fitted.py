@@ -27,6 +27,7 @@ from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.speedpath import SpeedResult
 from rotorid.mismatch.swinging import hung, like, price, swinging_term, with_likely_length
+from rotorid.mismatch.value_sides import sides_of_values
 from rotorid.mismatch.within_trust import beyond_trust
 from rotorid.mismatch.wrench import (
     WrenchModel,
@@ -34,7 +35,6 @@ from rotorid.mismatch.wrench import (
     chosen,
     path_segments,
     refine_nonlinear,
-    reverse_regression,
     speed_path,
     with_wind,
     wrench_model,
@@ -245,9 +245,10 @@ def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
 
 def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
     """Believed values that the model's recordings contradict, less those refused."""
-    reverse, search = reverse_regression(model.prepared, model, model.segments), model.search
-    size = size_of_value(model)
-    return wrong_values(search.regression, search, model.selection, reverse, size, refused=refused)
+    sides, size = sides_of_values(model), size_of_value(model)
+    return wrong_values(
+        sides.judging, model.selection, sides.agreeing, size, refused=refused, measured_moment=sides.measured_moment
+    )
 
 
 def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:

@@ -27,7 +27,7 @@ from rotorid.mismatch.regression import (
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, state_terms, winds_last
+from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, state_terms
 from rotorid.mismatch.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.speedpath import (
     MeasuredSpeed,
@@ -718,20 +718,3 @@ def after_residual(model: WrenchModel) -> list[np.ndarray]:
 def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
     """Whitening filters that the model's regression was built with."""
     return model.regression.filters
-
-
-def reverse_regression(prepared: Prepared, model: WrenchModel, segments) -> Regression:
-    """The values and selected effects with the measured moments as regressors instead of the predicted ones.
-
-    Noise in the rotor speeds pulls the usual estimate one way, noise in the body rates pulls this one the other
-    way: the truth lies between (Frisch bounds).
-    """
-    active = [model.search.terms[k] for k in model.selection.active]
-    always = [t for t in model.terms if t.kind != "effect"]
-    terms = winds_last([*always, *active])
-    rows = assemble_rows(prepared, terms, segments, chosen(model), measured_moment=True)
-    rate = prepared.thinner.rate_hz
-    regression = build(
-        rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
-    )
-    return regression.without_winds()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,6 +12,7 @@ from rotorid.mismatch.mistakes import dropout, find_mistakes, lagged
 from rotorid.mismatch.mistakes.lagged import Blocks
 from rotorid.mismatch.mistakes.timing import Lateness, in_agreement, one_quantity
 from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.signal.kernels import gaussian
 
 from .flights import COLUMNS, quad, recorded, with_table
 
@@ -90,8 +93,8 @@ def test_units(sound, sensor, factor, word):
     finding = one(findings, "unit_error")
     assert f" hold {word}," in finding.sentence
     estimate = finding.parameters[0]
-    # The measured ratio carries the believed values' error; the factor itself lies within a few percent.
-    assert estimate.value == pytest.approx(factor, rel=0.05)
+    # The unit's own factor; what the recording itself gives carries the believed values' error and is in the interval.
+    assert estimate.value == pytest.approx(factor) and estimate.low < factor < estimate.high
     for name in COLUMNS[sensor]:
         assert column(fixed, name) == pytest.approx(column(sound, name), rel=1e-9)
 
@@ -430,6 +433,22 @@ def test_a_drifting_clock_in_short_runs(sensor):
     finding = next(f for f in find_mistakes(bad)[1] if f.id == "clock_skew")
     estimate = finding.parameters[0]
     assert min(abs(estimate.low), abs(estimate.high)) <= 0.002 <= max(abs(estimate.low), abs(estimate.high))
+
+
+@pytest.mark.parametrize("factor", [1.0, 180 / np.pi])
+def test_a_gyroscope_in_degrees_beside_nothing_but_a_throttle_that_the_motors_follow_late(short, factor):
+    """A lag of 50 ms takes three quarters of a quick moment away: a factor of 57 would look like one of 15."""
+
+    def spoil(table):
+        rotors = table[list(COLUMNS["rotors"])].to_numpy()
+        early = rotors + 0.05 * np.gradient(gaussian(rotors, 3.0), table["time_s"], axis=0)
+        table = without_attitude(table).drop(columns=list(COLUMNS["rotors"]))
+        table[list(COLUMNS["gyroscope"])] *= factor
+        return table.assign(**{f"throttle_{k + 1}": early[:, k] / 2000.0 for k in range(4)})
+
+    thrown = with_table(short, spoil)
+    _, findings, _ = find_mistakes(replace(thrown, vehicle=quad(rotor_speed_limits_rad_s=(0.0, 2000.0))))
+    assert ids(findings) == (["unit_error"] if factor > 1 else [])
 
 
 def test_an_exchanged_gyroscope_without_attitude_may_be_two_exchanged_rotors(short):

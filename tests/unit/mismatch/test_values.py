@@ -14,7 +14,7 @@ from rotorid.mismatch.decide import (
 )
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import Questions, Search, Selection
+from rotorid.mismatch.select import Selection
 
 from .synthetic import coloured
 from .test_regression import RATE_HZ
@@ -31,11 +31,6 @@ def columns(size: int, rng) -> np.ndarray:
     x[:, 5, 1] = coloured(size, 1.0, rng, pole=0.9)
     x[:, 5, 3] = coloured(size, 1.0, rng, pole=0.9)
     return x
-
-
-def not_asked(columns, coefficients) -> np.ndarray:
-    """Joint sizes, which are not asked for here."""
-    return np.ones(12)
 
 
 def judged(changes: dict[str, float], seed: int = 0, reverse: bool = True, size: int = 4000, refused=()) -> dict:
@@ -58,8 +53,7 @@ def judged(changes: dict[str, float], seed: int = 0, reverse: bool = True, size:
         column = x[:, :, list(TRUST).index(key)]
         return float(np.sqrt((column**2).mean(axis=0)).max() * abs(change) / NOISE)
 
-    search = Search(made, Questions(lambda key, b: np.full(12, size_of(key, b[0])), not_asked))
-    return wrong_values(made, search, Selection([], made.fit(list(TRUST))), back, size_of, refused=refused)
+    return wrong_values(made, Selection([], made.fit(list(TRUST))), back, size_of, refused=refused)
 
 
 def test_a_wrong_torque_coefficient_is_named_with_its_interval():
@@ -132,8 +126,7 @@ def test_a_value_that_one_run_alone_needs_is_not_called_wrong():
         rows.append(Rows(name, np.arange(4000) / RATE_HZ, y, x))
     terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
     made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: True, 1.0, RATE_HZ)
-    search = Search(made, Questions(lambda key, b: np.ones(12), not_asked))
-    assert wrong_values(made, search, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
+    assert wrong_values(made, Selection([], made.fit(list(TRUST))), None, lambda key, change: 1.0) == {}
 
 
 def test_a_value_in_doubt_makes_room_for_the_one_that_is_plainly_wrong():
@@ -159,10 +152,9 @@ def test_a_value_in_doubt_makes_room_for_the_one_that_is_plainly_wrong():
         )
         for part in (x, seen)
     )
-    search = Search(made, Questions(lambda key, b: np.ones(12), not_asked))
     nothing = Selection([], made.fit(list(TRUST)))
-    assert list(wrong_values(made, search, nothing, None, lambda key, change: 1.0)) == ["inertia_zz"]
-    found = wrong_values(made, search, nothing, back, lambda key, change: 1.0)
+    assert list(wrong_values(made, nothing, None, lambda key, change: 1.0)) == ["inertia_zz"]
+    found = wrong_values(made, nothing, back, lambda key, change: 1.0)
     assert list(found) == ["torque"]
     assert found["torque"][0] == pytest.approx(0.12, abs=0.01)
 

@@ -296,7 +296,11 @@ def _gyroscope_units(recordings: RecordingSet, signals: list[Signals]) -> Result
     sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
     if sensor is None or sensor == "throttle" and not recordings.vehicle.rotor_speed_limits_rad_s:
         return Result(recordings)
-    fit = lagged.fit(compare.rolling(signals, recordings.vehicle, sensor))
+    blocks = compare.rolling(signals, recordings.vehicle, sensor)
+    if blocks is not None and sensor != "rotors":
+        # The motors' lag takes most of a quick moment away.
+        _, blocks = lagged.through_motor(blocks)
+    fit = lagged.fit(blocks)
     if fit is None or np.min(fit.explained) < LEAST_EXPLAINED:
         return Result(recordings)
     gain = np.abs(np.diag(fit.gain))

@@ -8,7 +8,7 @@ are; covariances are sandwiches over blocks of time, so that they hold whatever 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal.windows import hann
@@ -29,6 +29,10 @@ PIECE_BINS = 6
 pieces of a block are nearly independent. Short flights have too few blocks to be judged by: what stands at eight
 standard errors is no chance, and yet 1 in 20,000 by Student's t of eight blocks."""
 LONGEST_LAG_S = 0.15
+MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
+DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
+UNDECIDED = 12.0
+"""Motor lags within this log-likelihood are not told apart."""
 
 
 @dataclass(frozen=True)
@@ -303,3 +307,45 @@ def loss_by_block(blocks: Blocks, found: LaggedFit, gain: np.ndarray, lag_s) -> 
     """Weighted squares that a given M and delay leave in every block, (b, q); N as found."""
     model = (blocks.x * delay(blocks.frequency_hz, lag_s)[:, :, None]) @ gain.T + blocks.z @ found.nuisance.T
     return np.sum(found.weight.T[None] * np.abs(blocks.y - model) ** 2, axis=1)
+
+
+def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
+    """Commands replaced by what a first-order motor makes of them, its time constant fitted beside the delay."""
+    base = fit(blocks)
+    if base is None:
+        return 0.0, blocks
+    trials = {}
+
+    def attempt(tau):
+        through = 1.0 / (1.0 + 2j * np.pi * blocks.frequency_hz * tau)
+        trial = replace(blocks, x=blocks.x * through[None, :, None])
+        found = fit(trial, DEAD_TIMES_S)
+        left = float(np.sum(loss_by_block(trial, weighted_as(found, base), found.gain, found.lag_s)))
+        trials[float(tau)] = (left, abs(found.lag_s), trial)
+
+    for tau in MOTOR_LAGS_S:
+        attempt(tau)
+    for width in (0.09, 0.03):
+        best = min(trials, key=lambda tau: trials[tau][0])
+        for factor in (1 - width, 1 - width / 2, 1 + width / 2, 1 + width):
+            attempt(best * factor)
+    best = min(trials, key=lambda tau: trials[tau][0])
+    # Slow motion cannot tell a lag from a dead time: where it fits as well with hardly any, there is none.
+    plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + UNDECIDED]
+    least = min(plausible, key=lambda tau: trials[tau][1])
+    chosen = least if trials[least][1] < 0.5 * trials[best][1] else best
+    return chosen, trials[chosen][2]
+
+
+def weighted_as(found: LaggedFit, base: LaggedFit) -> LaggedFit:
+    """A fit's numbers under another fit's weights, so that fits can be compared."""
+    return LaggedFit(
+        found.lag_s,
+        found.lag_sd,
+        found.gain,
+        found.gain_sd,
+        found.explained,
+        base.weight,
+        found.nuisance,
+        found.block_count,
+    )

@@ -60,11 +60,7 @@ LARGEST_SKEW = 1.2e-2
 LONGEST_DRIFT_S = 0.4
 COARSE_SKEWS = 6
 COARSE_LAGS_S = np.arange(-0.12, 0.121, 0.01)
-MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 LAG_STEP_S = 0.001
-DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
-UNDECIDED = 12.0
-"""Motor lags within this log-likelihood are not told apart."""
 LATE_FLOOR_S = 2e-5
 BAND_STEP, LEAST_BAND = 1.5, 5.0
 """Ratio of the bands that are tried, and of the narrowest's ends (0.4 to 2 Hz)."""
@@ -171,7 +167,7 @@ def comparisons(
         shares: Shares = ((over, 1.0),)
         motor_s = 0.0
         if over in ("commands", "throttle"):
-            motor_s, blocks = _through_motor(blocks)
+            motor_s, blocks = lagged.through_motor(blocks)
         if over == "gyroscope" or (late == "velocity" and source == "accelerometer"):
             blocks = one_quantity(blocks, [2] if (late, over) == ("velocity", source) else range(blocks.y.shape[2]))
             if blocks is None:
@@ -233,48 +229,6 @@ def _late(signals: Signals, sensor: str, steps: int) -> Signals:
     values = np.full_like(signals.values[sensor], np.nan)
     values[steps:] = signals.values[sensor][:-steps]
     return replace(signals, values={**signals.values, sensor: values})
-
-
-def _through_motor(blocks: Blocks) -> tuple[float, Blocks]:
-    """Commands replaced by what a first-order motor makes of them, its time constant fitted beside the delay."""
-    base = lagged.fit(blocks)
-    if base is None:
-        return 0.0, blocks
-    trials = {}
-
-    def attempt(tau):
-        through = 1.0 / (1.0 + 2j * np.pi * blocks.frequency_hz * tau)
-        trial = replace(blocks, x=blocks.x * through[None, :, None])
-        found = lagged.fit(trial, DEAD_TIMES_S)
-        left = float(np.sum(lagged.loss_by_block(trial, _weighted(found, base), found.gain, found.lag_s)))
-        trials[float(tau)] = (left, abs(found.lag_s), trial)
-
-    for tau in MOTOR_LAGS_S:
-        attempt(tau)
-    for width in (0.09, 0.03):
-        best = min(trials, key=lambda tau: trials[tau][0])
-        for factor in (1 - width, 1 - width / 2, 1 + width / 2, 1 + width):
-            attempt(best * factor)
-    best = min(trials, key=lambda tau: trials[tau][0])
-    # Slow motion cannot tell a lag from a dead time: where it fits as well with hardly any, there is none.
-    plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + UNDECIDED]
-    least = min(plausible, key=lambda tau: trials[tau][1])
-    chosen = least if trials[least][1] < 0.5 * trials[best][1] else best
-    return chosen, trials[chosen][2]
-
-
-def _weighted(found: LaggedFit, base: LaggedFit) -> LaggedFit:
-    """A fit's numbers under another fit's weights, so that fits can be compared."""
-    return LaggedFit(
-        found.lag_s,
-        found.lag_sd,
-        found.gain,
-        found.gain_sd,
-        found.explained,
-        base.weight,
-        found.nuisance,
-        found.block_count,
-    )
 
 
 def difference(

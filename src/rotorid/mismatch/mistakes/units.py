@@ -150,8 +150,9 @@ def corrected(recordings: RecordingSet, error: UnitError) -> RecordingSet:
 
 
 def as_finding(error: UnitError) -> Finding:
-    """The finding of one unit error."""
-    low, high = error.measured * np.exp(-error.spread), error.measured * np.exp(error.spread)
+    """The finding of one unit error: the unit's own factor, and in its interval what the recording itself gives."""
+    half = max(error.spread, abs(float(np.log(error.measured / error.factor))))
+    low, high = error.factor * np.exp(-half), error.factor * np.exp(half)
     return Finding(
         id="unit_error",
         status="established" if error.certain else "ambiguous",
@@ -159,7 +160,7 @@ def as_finding(error: UnitError) -> Finding:
             f"{error.what[0].upper()}{error.what[1:]} ({error.columns[0]} …) hold {error.unit}, not {error.expected}: "
             f"corrected by dividing by {error.factor:.6g}."
         ),
-        parameters=(Estimate("factor", error.measured, "1", float(low), float(high)),),
+        parameters=(Estimate("factor", error.factor, "1", float(low), float(high)),),
         p_value=error.p_value,
         channels=error.columns,
     )
