@@ -76,7 +76,8 @@ def score_truth(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth:
 
 def _told(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth: Truth) -> str:
     if truth.ratio is not None:
-        stated = set(verdict.get("parameters", {}))
+        # Silence on a value that the untouched flight calls wrong tells, too: what was planted put it right.
+        stated = set(verdict.get("parameters", {})) | set(untouched.get("parameters", {}))
         if not stated & (truth.names | truth.fair):
             return NOT_TOLD
         moved = log_ratio(verdict, truth.ratio)[0] - log_ratio(untouched, truth.ratio)[0]
