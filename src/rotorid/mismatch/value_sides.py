@@ -23,6 +23,8 @@ from rotorid.signal.kernels import low_pass
 VALUE_BAND = (0.2, 0.6)
 """Shares of the cutoff. Below, disturbances and what the controller does about them; above, mostly the noise of the
 body rates' derivative, and their sensor's own filter."""
+LEAST_REACHED = 0.5
+"""Share of the rows in stretches longer than the band-pass, without which all frequencies judge."""
 MOMENTS = (3, 4, 5)
 """Channels of the moments."""
 
@@ -101,7 +103,7 @@ def regression_of_values(
 
 
 def band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np.ndarray]:
-    """To each moment's channel the band-pass that makes its residual noise of one sigma.
+    """To each moment's channel the band-pass that makes its residual noise of one sigma; none for short stretches.
 
     Not whitened beside: a filter learnt where a slow disturbance is by far the largest is hardly one for the band.
     """
@@ -110,9 +112,11 @@ def band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np.
     middle = np.convolve(np.eye(len(slow))[len(slow) // 2] - slow, quick)
     # Samples of a band are as many as are independent of each other, and copies between.
     copies = thinner.rate_hz / (2 * (band[1] - band[0]) * thinner.cutoff_hz)
+    parts = [part for part in after_residual(model) if len(part) > len(middle)]
+    if sum(len(part) for part in parts) < LEAST_REACHED * sum(len(r.y) for r in model.rows):
+        return {}
     out = {}
     for c in set(MOMENTS) & set(model_filters(model)):
-        left = [np.convolve(part[:, c], middle, "valid") for part in after_residual(model) if len(part) > len(middle)]
-        if left:
-            out[c] = middle / (np.sqrt(copies) * np.concatenate(left).std())
+        left = np.concatenate([np.convolve(part[:, c], middle, "valid") for part in parts])
+        out[c] = middle / (np.sqrt(copies) * left.std())
     return out
