@@ -77,9 +77,13 @@ class LogWriter:
             raise full from error
 
     def _take_ballast(self) -> None:
-        path = self.path.with_name(self.path.name + ".ballast")
-        self._ballast = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
-        path.unlink()
+        try:
+            # Never with a name, however early this program is killed.
+            self._ballast = os.open(self.path.parent, os.O_WRONLY | os.O_TMPFILE, 0o600)
+        except (AttributeError, OSError):  # not every system, nor every file system, has such files
+            path = self.path.with_name(self.path.name + ".ballast")
+            self._ballast = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
+            path.unlink()
         data = bytes(BALLAST_BYTES)
         while data:
             data = data[os.write(self._ballast, data) :]
