@@ -268,35 +268,43 @@ def wrong_values(
 
 def exchangeable(
     regression: Regression, selection: Selection, values: Iterable[str]
-) -> dict[str, dict[str, tuple[float, float]]]:
-    """To each value called wrong others that would explain as much in its place: relative change and one-sigma.
+) -> dict[str, list[dict[str, tuple[float, float]]]]:
+    """To each value called wrong what would explain as much in its place: relative changes and one-sigmas.
 
     Often a recording knows a ratio alone (thrust over mass, torque over inertia); which of two is called wrong rests
-    then on what the user trusts. As much: beside the other it explains less than a further value must, or than any form
-    is wrong by.
+    then on what the user trusts. As much: beside the others it explains less than a further value must, or than any
+    form is wrong by. Where no other value does so alone, the two that leave it least (an arm is both inertias as well).
     """
     named = list(values)
     regression = regression.with_room(VALUE_LIMITS[1])
     always = regression.keys_of("nuisance", "wind") + selection.active
     loose = dict.fromkeys(regression.keys_of("value"), WIDEST_TRUST)
+    unnamed = [k for k in loose if k not in named]
 
     def fitted(keys: list[str]) -> Fit:
         return regression.fit([*always, *keys], loose=loose)
 
-    out: dict[str, dict[str, tuple[float, float]]] = {}
-    for key in named:
-        rest = [k for k in named if k != key]
-        alone = fitted(named).gain - fitted(rest).gain
-        for other in loose:
-            if other in named:
-                continue
-            fit = fitted([*rest, other])
+    def replaced(key: str, others: tuple[str, ...]) -> tuple[float, dict[str, tuple[float, float]]]:
+        """What a value still explains beside others (infinite where one is at its limit), and their changes."""
+        fit = fitted([*(k for k in named if k != key), *others])
+        changes = {}
+        for other in others:
             beta, covariance = coefficients(regression, fit, other)
-            pinned = abs(beta[0]) > 0.98 * regression.limit[regression.start[other]]
-            still = fitted([*named, other]).gain - fit.gain
-            if not pinned and still < max(COST_PER_VALUE, SHARE_OF_LARGEST**2 * alone):
-                sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
-                out.setdefault(key, {})[other] = relative_change(other, float(beta[0]), sd)
+            if abs(beta[0]) > 0.98 * regression.limit[regression.start[other]]:
+                return np.inf, {}
+            sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
+            changes[other] = relative_change(other, float(beta[0]), sd)
+        return fitted([*named, *others]).gain - fit.gain, changes
+
+    out: dict[str, list[dict[str, tuple[float, float]]]] = {}
+    for key in named:
+        alone = fitted(named).gain - fitted([k for k in named if k != key]).gain
+        most = max(COST_PER_VALUE, SHARE_OF_LARGEST**2 * alone)
+        found = [replaced(key, (other,)) for other in unnamed]
+        if not any(still < most for still, _ in found):
+            found = sorted((replaced(key, two) for two in combinations(unnamed, 2)), key=lambda f: f[0])[:1]
+        if as_well := [changes for still, changes in found if still < most]:
+            out[key] = as_well
     return out
 
 

@@ -176,6 +176,22 @@ def test_what_would_explain_as_much_is_told():
     """12 % more torque or 12 % less of the inertia's coefficient: 1/(1 + 0.12) − 1 = −10.7 % of it."""
     made = fitted(0.001)
     found = exchangeable(made, Selection([], made.fit(list(TRUST))), ["torque", "mass"])
-    assert {k: list(v) for k, v in found.items()} == {"torque": ["inertia_zz"], "mass": ["thrust"]}
-    assert found["torque"]["inertia_zz"][0] == pytest.approx(-0.107, abs=0.005)
+    as_well = {key: [list(others) for others in v] for key, v in found.items()}
+    assert as_well == {"torque": [["inertia_zz"]], "mass": [["thrust"]]}
+    assert found["torque"][0]["inertia_zz"][0] == pytest.approx(-0.107, abs=0.005)
     assert exchangeable(fitted(0.3), Selection([], made.fit(list(TRUST))), ["torque"]) == {}
+
+
+def test_both_inertias_explain_as_much_as_an_arm_and_neither_alone():
+    rng = np.random.default_rng(8)
+    x, y = np.zeros((4000, 12, 3)), np.full((4000, 12), np.nan)
+    for axis, channel in enumerate((3, 4)):
+        moment = coloured(4000, 1.0, rng, pole=0.9)
+        x[:, channel, 0], x[:, channel, 1 + axis] = moment, -moment
+        y[:, channel] = 0.2 * moment + coloured(4000, NOISE, rng, pole=0.0)
+    terms = [Term(key, "value", prior_sd=(0.1,)) for key in ("arm", "inertia_xx", "inertia_yy")]
+    filters = {c: np.array([1.0 / NOISE]) for c in (3, 4)}
+    rows = [Rows("a", np.arange(4000) / RATE_HZ, y, x)]
+    made = build(rows, terms, filters, lambda run, t: True, 1.0, RATE_HZ)
+    found = exchangeable(made, Selection([], made.fit(["arm"])), ["arm"])
+    assert [list(others) for others in found["arm"]] == [["inertia_xx", "inertia_yy"]]
