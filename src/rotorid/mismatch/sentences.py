@@ -134,7 +134,8 @@ def _causes(told: Told) -> str:
     wrong = list(analysis.wrong_values.items())
     for name, values in wrong[: max(1, MOST_NAMES - len(names))]:
         words, unit = parameter_words(name)
-        clauses.append(f"the {words} is {number(values[1], 3)} {unit}, not {number(values[0], 3)}".replace("  ", " "))
+        refitted = f"{number(values[1], 3)} {unit}".rstrip()
+        clauses.append(f"the {words} is {refitted}, not {number(values[0], 3)}")
     if len(wrong) > max(1, MOST_NAMES - len(names)):
         clauses.append(f"{len(wrong) - max(1, MOST_NAMES - len(names))} more values are wrong")
     return listed(clauses)
