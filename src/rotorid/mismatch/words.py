@@ -70,7 +70,7 @@ PARAMETER_WORDS = {
     "reading_gain_x": ("gain of the reading along x", ""),
     "reading_gain_y": ("gain of the reading along y", ""),
     "reading_gain_z": ("gain of the reading along z", ""),
-    "arm_scale": ("rotors' distances, as a factor on those believed,", ""),
+    "arm_scale": ("scale of the rotors' distances", ""),
     "rotor_speed_limits_rad_s": ("rotor speed at full throttle", "rad/s"),
 }
 
