@@ -282,10 +282,12 @@ def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
 
 
 def _left_out(finding: Finding, share: float | None) -> str:
-    """An established effect with its numbers and the share of the error that it takes away."""
+    """An established effect, or a fault of the recording, with its numbers and the share of the error that it takes."""
     named, sentence, parameters = capital(effect_words(finding.id)), finding.sentence.rstrip("."), _parameters(finding)
     carries = "" if share is None else f", {100 * share:.0f} % of the error that goes"
     numbers = f" ({parameters}{carries})" if parameters else f" ({carries[2:]})" if carries else ""
+    if _concerns_the_recording(finding):
+        return f"{named}: {sentence}{numbers}."
     return f"{named} was left out{f': {sentence}' if sentence else ''}{numbers}."
 
 

@@ -1,7 +1,9 @@
-"""Numbers as they are read."""
+"""Numbers and sentences as they are read."""
 
 import pytest
 
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.sentences import _left_out
 from rotorid.mismatch.words import channel_words, listed, number, plus_minus, regime_words, sure
 
 
@@ -33,3 +35,9 @@ def test_words():
     assert regime_words("cargo_bay_temperature_c") == ("cargo bay temperature", "°C")
     assert listed(["a", "b", "c"], "or") == "a, b or c"
     assert sure(1e-9) == "more than 99.9 % sure" and sure(0.02) == "98.0 % sure"
+
+
+def test_a_fault_of_the_recording_was_not_left_out():
+    said = "The rotor columns are in another order than vehicle.yaml: put in order."
+    told = _left_out(Finding(id="rotor_order", status="established", sentence=said), None)
+    assert told == f"Rotor columns in the wrong order: {said}"
