@@ -208,6 +208,8 @@ def not_testable(prepared: Prepared, chain: Chain | None, findings: list[Finding
 
 def instead_of(model: WrenchModel, values: Values) -> dict[str, tuple[str, ...]]:
     """Contract name of a wrong value to others, in words, that would explain as much in its place."""
+    if not values:
+        return {}
     found = exchangeable(sides_of_values(model).judging, model.selection, values)
     return {
         PARAMETER_NAMES[key]: tuple(filter(None, (" with ".join(within_trust.in_words(x)) for x in as_well)))
