@@ -26,12 +26,13 @@ LEAST_LOUDER, MOST_LOUDER = 1.2, 10.0
 
 def noise_factors(
     segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, thinner: Thinner
-) -> dict[str, float]:
-    """Sensor (`rotors`, `gyroscope`) to the factor by which its noise in the band exceeds that of the `noisy` copies.
+) -> dict[str, np.ndarray]:
+    """Sensor (`rotors`, `gyroscope`) to the factors by which its noise in the band exceeds that of the `noisy` copies.
 
-    Sensors without a word here are as loud as assumed, or move too much in the band to tell.
+    The gyroscope's are of its axes, (3,); of the rotors, which are alike, one, (1,). Sensors without a word here are
+    as loud as assumed, or move too much in the band to tell.
     """
-    squares: dict[str, list[float]] = {"rotors": [], "gyroscope": []}
+    squares = {"rotors": np.full(3, np.nan), "gyroscope": np.full(3, np.nan)}
     sides = [(_sides(a, vehicle, thinner), _sides(b, vehicle, thinner)) for a, b in zip(segments, noisy, strict=True)]
     sides = [pair for pair in sides if None not in pair]
     if not sides:
@@ -46,9 +47,12 @@ def noise_factors(
             power, assumed = band_power(own, rate_hz, band), band_power(added, rate_hz, band)
             found = min(sign * band_power(left, rate_hz, band, own), whole)
             if assumed > 0 and found > MOSTLY_NOISE * power:
-                squares[sensor].append(found / assumed)
-    factors = {sensor: float(np.sqrt(np.median(found))) for sensor, found in squares.items() if found}
-    return {sensor: factor for sensor, factor in factors.items() if LEAST_LOUDER < factor < MOST_LOUDER}
+                squares[sensor][c] = found / assumed
+    told = {"gyroscope": squares["gyroscope"], "rotors": squares["rotors"][np.isfinite(squares["rotors"])]}
+    told["rotors"] = np.median(told["rotors"], keepdims=True) if len(told["rotors"]) else np.ones(1)
+    factors = {sensor: np.sqrt(found) for sensor, found in told.items()}
+    plain = {s: np.where((f > LEAST_LOUDER) & (f < MOST_LOUDER), f, 1.0) for s, f in factors.items()}
+    return {sensor: factor for sensor, factor in plain.items() if (factor > 1.0).any()}
 
 
 def _sides(segment: Segment, vehicle: Vehicle, thinner: Thinner) -> tuple[np.ndarray, np.ndarray] | None:

@@ -19,7 +19,7 @@ from rotorid.effects.contract import Contribution, Form, Motion
 from rotorid.errors import InputError
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.improve import Model, improved_vehicle, model_of
-from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.motion import Segment, SensorNoise
 from rotorid.mismatch.prepare import sensor_noise
 from rotorid.mismatch.shares import fitted_part, segments_of
 from rotorid.mismatch.speedpath import commanded_path
@@ -213,7 +213,7 @@ def window_errors(segment: Segment, inputs: Inputs, states: States, model: Model
     return WindowErrors(segment.run, time_s[:, 0], time_s[:, -1], {n: v for n, v in channels.items() if v.size})
 
 
-def noise_floor(segments: Sequence[Segment], model: Model, noise: dict[str, float]) -> dict[str, float]:
+def noise_floor(segments: Sequence[Segment], model: Model, noise: SensorNoise) -> dict[str, float]:
     """Error of each channel that sensor noise alone makes, in the channel's unit."""
     rng = np.random.default_rng(0)
     squares: dict[str, list[np.ndarray]] = {}
@@ -251,5 +251,5 @@ def _unit(quaternion: np.ndarray | None) -> np.ndarray | None:
     return None if quaternion is None else quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
 
 
-def _shaken(values: np.ndarray | None, sigma: float | None, rng) -> np.ndarray | None:
-    return values if values is None or not sigma else values + sigma * rng.standard_normal(values.shape)
+def _shaken(values: np.ndarray | None, sigma: np.ndarray | None, rng) -> np.ndarray | None:
+    return values if values is None or sigma is None else values + sigma * rng.standard_normal(values.shape)

@@ -14,6 +14,8 @@ from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.signal import kernels
 
+SensorNoise = dict[str, np.ndarray]
+"""One-sigma per sample of white noise of each column of a sensor, (columns,), by the sensor's key."""
 LONGEST_BRIDGED_SAMPLES = 6
 """A hole of up to this many of a column's own periods is interpolated; a longer one splits the run."""
 SHORTEST_SEGMENT_S = 2.0
@@ -192,7 +194,7 @@ def build_segments(
     rate_hz: float,
     cutoff_hz: float,
     shift_s: dict[str, float] | None = None,
-    noise: dict[str, float] | None = None,
+    noise: SensorNoise | None = None,
     rng: np.random.Generator | None = None,
     full_speed_rad_s: float | None = None,
 ) -> list[Segment]:
@@ -200,7 +202,8 @@ def build_segments(
 
     `shift_s` moves a sensor's columns in time: a positive value says that the sensor's stamps are late by it.
     Keys: `accelerometer`, `gyroscope`, `attitude`, `velocity`, `position`, `rotors`. `noise` adds white noise of
-    that one-sigma per sample to a sensor's columns (same keys), to learn what noise does to the analysis. A throttle
+    that one-sigma per sample to each of a sensor's columns (same keys), to learn what noise does to the analysis. A
+    throttle
     is one of `full_speed_rad_s` (`full_speed` of the run alone where None).
     """
     shift_s, noise = shift_s or {}, noise or {}
@@ -215,7 +218,7 @@ def build_segments(
         if key == "attitude":
             values = continuous(values / np.linalg.norm(values, axis=1, keepdims=True))
         out = _resample(t - shift_s.get(key, 0.0), values, grid, smooth)
-        if noise.get(key):
+        if np.any(noise.get(key, 0.0)):
             out = out + noise[key] * rng.standard_normal(out.shape)
         return None if np.isfinite(out).all(axis=1).sum() < 4 else out
 

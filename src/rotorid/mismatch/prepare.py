@@ -14,7 +14,7 @@ from rotorid.effects.contract import Form, not_testable_reason
 from rotorid.mismatch import rules
 from rotorid.mismatch.estimated_velocity import made_from_accelerometer
 from rotorid.mismatch.excess_noise import noise_factors
-from rotorid.mismatch.motion import Segment, analysis_rate_hz, build_segments, full_speed
+from rotorid.mismatch.motion import Segment, SensorNoise, analysis_rate_hz, build_segments, full_speed
 from rotorid.mismatch.rows import (
     OFFSETS,
     PARAMETER_NAMES,
@@ -114,10 +114,11 @@ def own_rate_hz(run: Run, column: str) -> float:
     return count / max(float(run.time_s[-1] - run.time_s[0]), 1e-9)
 
 
-def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.inf) -> dict[str, float]:
+def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.inf) -> SensorNoise:
     """White noise per sample of each sensor, one sigma in the columns' own unit, from the data themselves.
 
-    It is read below NOISE_REACH times the cutoff of the analysis, at each sensor's own rate.
+    It is read below NOISE_REACH times the cutoff of the analysis, at each sensor's own rate. Each axis has its own:
+    rotors shake a frame unlike about its axes. Rotors are alike, and the components of an attitude mix as it turns.
     """
     groups = {
         "rotors": c.rotor_columns("rotor_speed", vehicle.rotor_count),
@@ -129,12 +130,14 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.
     }
     levels = {}
     for key, names in groups.items():
-        found = []
-        for run in runs:
-            if names and run.has(*names):
-                found += [white_level(run.column(n), own_rate_hz(run, n), NOISE_REACH * cutoff_hz) for n in names]
+        found = [
+            [white_level(run.column(n), own_rate_hz(run, n), NOISE_REACH * cutoff_hz) for n in names]
+            for run in runs
+            if names and run.has(*names)
+        ]
         if found:
-            levels[key] = float(np.median(found))
+            alike = key in ("rotors", "attitude")
+            levels[key] = np.full(len(names), np.median(found)) if alike else np.median(found, axis=0)
     return levels
 
 
@@ -161,7 +164,7 @@ class Prepared:
     segments: list[Segment]
     noisy_segments: list[Segment]
     thinner: Thinner
-    noise: dict[str, float]
+    noise: SensorNoise
     terms: list[Term]
     not_testable: dict[str, str] = field(default_factory=dict)
     unseen: tuple[str, ...] = ()

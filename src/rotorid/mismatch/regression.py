@@ -12,7 +12,7 @@ Fuller, Measurement Error Models, 1987, ch. 2).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,6 +100,30 @@ class Fit:
         return [at.index(c) for c in columns]
 
 
+@dataclass(frozen=True)
+class Apart:
+    """Products of some channels alone, by which the coefficients of some terms are estimated.
+
+    The normal equations of those terms hold these products; all others see every channel, with those terms as they
+    come out. What the model of the other channels lacks cannot reach them then (Plummer, Cuts in Bayesian graphical
+    models, Statistics and Computing 25, 2015).
+    """
+
+    columns: np.ndarray
+    """Columns of the terms, (m,), ascending."""
+    gram: np.ndarray
+    """Their products with all columns, (blocks, m, K)."""
+    cross: np.ndarray
+    """(blocks, m)."""
+    bias_gram: np.ndarray
+    """(m, K), as in `Regression`."""
+    bias_cross: np.ndarray
+
+    def before(self, kept: int) -> Apart:
+        """The same without the columns from `kept` on."""
+        return replace(self, gram=self.gram[:, :, :kept], bias_gram=self.bias_gram[:, :kept])
+
+
 @dataclass
 class Regression:
     """Gram matrices of all terms over blocks of time."""
@@ -132,6 +156,8 @@ class Regression:
     """Length of a block, s."""
     blocks_of_rows: tuple[np.ndarray, ...] = ()
     """Of every stretch the block that each of its rows is in, (n,); -1 where it is in none."""
+    apart: Apart | None = None
+    """Terms that some of the channels alone estimate; None where all channels estimate all."""
 
     def keys_of(self, *kinds: str) -> list[str]:
         """Keys of the terms of some kinds."""
@@ -146,6 +172,10 @@ class Regression:
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
         self._total_gram = self.gram[self.training].sum(axis=0)
         self._total_cross = self.cross[self.training].sum(axis=0)
+        self._place_apart = np.full(len(self._total_cross), -1)
+        if self.apart is not None:
+            self._place_apart[self.apart.columns] = np.arange(len(self.apart.columns))
+            self._total_apart = self.apart.gram[self.training].sum(axis=0), self.apart.cross[self.training].sum(axis=0)
         self.limit = np.full(len(self._total_cross), np.inf)
         for term in self.terms:
             if term.kind == "value":
@@ -196,7 +226,32 @@ class Regression:
             precision=self.precision[:kept],
             bias_gram=bias_gram,
             bias_cross=bias_cross,
+            # No wind of a single run acts in the channels of which others are estimated apart.
+            apart=None if self.apart is None else self.apart.before(kept),
         )
+
+    def _apart(self, cols: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which of some columns are estimated apart, and where they stand among those that are."""
+        place = self._place_apart[cols]
+        return np.flatnonzero(place >= 0), place[place >= 0]
+
+    def _equations(self, cols: np.ndarray, mask: np.ndarray):
+        """What `_normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
+        gram, cross, bias, bias_cross = self._normal(cols, mask)
+        where, own = self._apart(cols)
+        if len(where):
+            share, grid = mask.sum() / len(mask), np.ix_(own, cols)
+            if mask is self.training:
+                gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
+            else:
+                gram[where] = self.apart.gram[mask][:, own[:, None], cols].sum(axis=0)
+                cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
+            noise = self.apart.bias_gram[grid] * share
+            at = np.arange(len(where))
+            most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[at, where], 1e-300)
+            bias[where] = noise * np.minimum(1.0, most)[:, None]
+            bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
+        return gram, cross, bias, bias_cross
 
     def _normal(self, cols: np.ndarray, mask: np.ndarray):
         share = mask.sum() / len(mask)
@@ -233,7 +288,8 @@ class Regression:
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
         cols = self.columns(keys)
-        gram, cross, bias, bias_cross = self._normal(cols, mask)
+        gram, cross, bias, bias_cross = self._equations(cols, mask)
+        where, own = self._apart(cols)
         precision = self.precision
         if loose:
             precision = precision.copy()
@@ -246,20 +302,28 @@ class Regression:
         count = int(mask.sum())
         every, explained = self.gram[:, cols[:, None], cols], self.cross[:, cols]
         pull = every @ beta
-        scores = (explained - pull)[mask] - (bias_cross - bias @ beta) / count
+        scores, blocks = (explained - pull)[mask], every[mask]
+        if len(where):
+            blocks[:, where] = self.apart.gram[mask][:, own[:, None], cols]
+            scores[:, where] = self.apart.cross[mask][:, own] - blocks[:, where] @ beta
+        scores -= (bias_cross - bias @ beta) / count
         if jackknife:
             eye = np.eye(len(cols))
-            scores = np.linalg.solve(eye[None] - (every[mask] - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
+            scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
         spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
-        robust = inverse @ spread @ inverse
+        robust = inverse @ spread @ inverse.T
         # With the ridge, or two columns that are copies of each other would seem to be known.
-        plain = inverse @ (gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))) @ inverse
+        noise = gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))
+        noise[:, where] = noise[where].T
+        plain = inverse @ noise @ inverse.T
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
         uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
         values = np.isfinite(self.limit[cols])
         shift = trusted(DOUBT_OF_CORRECTION * (beta - uncorrected), normal, values, precision[cols])
         covariance = at_least(robust, plain) + np.outer(shift, shift)
         # What the regressors' noise adds to a block is no misfit: left in, a model that shrinks them all would be best.
+        if len(where):
+            bias, bias_cross = self._normal(cols, mask)[2:]
         added = float(beta @ bias @ beta - 2 * beta @ bias_cross) / count
         rss = self.square - 2 * explained @ beta + pull @ beta - added
         gain = float((self.square - rss)[mask].sum())
@@ -294,9 +358,11 @@ class Regression:
 
     def _explains(self, keys: tuple[str, ...]) -> float:
         cols = self.columns(keys)
-        gram, cross, bias, bias_cross = self._normal(cols, self.training)
+        gram, cross, bias, bias_cross = self._equations(cols, self.training)
         normal = gram - bias + np.diag(self.precision[cols])
         beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
+        if len(self._apart(cols)[0]):
+            gram, cross, bias, bias_cross = self._normal(cols, self.training)
         return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
 
     def folds(self, whole_runs: bool) -> np.ndarray:
@@ -337,7 +403,7 @@ class Regression:
         found, inverses = [], []
         for out in range(fold.max() + 1):
             mask = self.training & (fold != out)
-            gram, cross, bias, bias_cross = self._normal(cols, mask)
+            gram, cross, bias, bias_cross = self._equations(cols, mask)
             normal = gram - bias + np.diag(precision[cols])
             beta, inverse = bounded(normal, cross - bias_cross, self.limit[cols])[:2]
             found.append(beta)
@@ -436,9 +502,11 @@ class Regression:
         cols = self.columns([key])
         where = fit.places(cols)
         rest = [i for i in range(len(fit.columns)) if i not in where]
-        owns = self.gram[:, cols[:, None], cols]
-        lefts = self.cross[:, cols] - self.gram[:, cols[:, None], fit.columns[rest]] @ fit.beta[rest]
-        every = np.diag(self._total_gram)[cols]
+        apart, own = self._apart(cols)
+        source, at = (self.apart, own) if len(apart) else (self, cols)
+        owns = source.gram[:, at[:, None], cols]
+        lefts = source.cross[:, at] - source.gram[:, at[:, None], fit.columns[rest]] @ fit.beta[rest]
+        every = np.diag(owns[self.training].sum(axis=0))
         estimates, variances = [], []
         for run in np.unique(self.run[self.training]):
             mask = self.training & (self.run == run)
@@ -580,8 +648,8 @@ def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
         held[worst] = HOLD * max(normal[worst, worst], 1e-300)
         at[worst] = np.sign(solution[worst]) * limit[worst]
         # One more number on the diagonal is a change of rank one (Sherman and Morrison).
-        column = inverse[:, worst]
-        inverse = inverse - np.outer(column, column) * (held[worst] / (1.0 + held[worst] * column[worst]))
+        column, row = inverse[:, worst], inverse[worst]
+        inverse = inverse - np.outer(column, row) * (held[worst] / (1.0 + held[worst] * column[worst]))
     return solution, inverse, held, at
 
 
@@ -695,10 +763,13 @@ def build(
     block_s: float,
     rate_hz: float,
     noisy: list[Rows] | None = None,
+    told_by: Collection[int] = (),
+    apart: Iterable[str] = (),
 ) -> Regression:
     """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
 
-    `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap.
+    `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap. The channels
+    `told_by` alone estimate the terms `apart` (`Apart`).
     """
     start, at = {}, 0
     for term in terms:
@@ -708,6 +779,8 @@ def build(
     longest = max(len(f) for f in filters.values()) - 1
     grams, crosses, squares, runs, training = [], [], [], [], []
     bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
+    own = np.sort([start[t.key] + i for t in terms if t.key in set(apart) for i in range(t.size)]).astype(int)
+    own_grams, own_crosses, own_bias, own_bias_cross = [], [], np.zeros((len(own), at)), np.zeros(len(own))
     names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
     blocks_of_rows = []
     for k, r in enumerate(rows):
@@ -720,22 +793,36 @@ def build(
             blocks_of_rows[-1][longest + part] = len(runs) + b
         blocks_of_rows[-1][:longest] = len(runs)
         gram, cross, square = np.zeros((len(parts), at, at)), np.zeros((len(parts), at)), np.zeros(len(parts))
+        own_gram, own_cross = np.zeros((len(parts), len(own), at)), np.zeros((len(parts), len(own)))
         for channel, taps in filters.items():
             y, x = whiten(r, channel, taps, longest)
             again = None if noisy is None else whiten(noisy[k], channel, taps, longest)
             # Many columns say nothing in a channel (a moment in a force): they are left out of the products.
             used = np.flatnonzero(x.any(axis=0) | (False if again is None else again[1].any(axis=0)))
             x, grid = x[:, used], np.ix_(used, used)
+            # Of the columns used those that this channel estimates apart: where they stand among them, and in `own`.
+            ours = np.flatnonzero(np.isin(used, own)) if channel in told_by else np.zeros(0, int)
+            ours_at = np.searchsorted(own, used[ours])
+            ours_grid = np.ix_(ours_at, used)
             if again is not None:
                 shift = again[1][:, used] - x
-                bias_gram[grid] += shift.T @ shift
-                bias_cross[used] += shift.T @ (again[0] - y)
+                noise, with_y = shift.T @ shift, shift.T @ (again[0] - y)
+                bias_gram[grid] += noise
+                bias_cross[used] += with_y
+                own_bias[ours_grid] += noise[ours]
+                own_bias_cross[ours_at] += with_y[ours]
             for b, part in enumerate(parts):
-                gram[b][grid] += x[part].T @ x[part]
-                cross[b, used] += x[part].T @ y[part]
+                products, with_y = x[part].T @ x[part], x[part].T @ y[part]
+                gram[b][grid] += products
+                cross[b, used] += with_y
+                if len(ours):
+                    own_gram[b][ours_grid] += products[ours]
+                    own_cross[b, ours_at] += with_y[ours]
                 square[b] += float(y[part] @ y[part])
         grams.append(gram)
         crosses.append(cross)
+        own_grams.append(own_gram)
+        own_crosses.append(own_cross)
         squares.append(square)
         runs += [names[r.run]] * len(parts)
         middles = [r.time_s[min(len(r.time_s) - 1, longest + int(part.mean()))] for part in parts]
@@ -757,4 +844,7 @@ def build(
         names,
         block_s=per_block / rate_hz,
         blocks_of_rows=tuple(blocks_of_rows),
+        apart=Apart(own, np.concatenate(own_grams), np.concatenate(own_crosses), own_bias, own_bias_cross)
+        if len(own)
+        else None,
     )

@@ -127,7 +127,6 @@ TRANSFER = rule(
     won=(0.7, "beside the share of environments expected of its strength: effects at work gained in 0.88 to 1.00"),
     promise=(25.0, "whitened squares: less may fail by chance"),
 )
-TWO_SENSORS = rule("two_sensors", "An error of a sensor shows in the comparison with the sensor beside it, too.")
 STEADY = rule(
     "steady",
     "A coefficient of a flight is the same in every run.",

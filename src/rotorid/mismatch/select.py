@@ -88,8 +88,6 @@ class Questions:
     """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
     known_sizes: np.ndarray = field(default_factory=lambda: np.zeros(12))
     """The same of effects that are in the model already (between command and rotor speed), (12,)."""
-    contradicted: Callable[[str, Fit], bool] | None = None
-    """Whether a second sensor shows that an error of the first is none."""
 
 
 class Search:
@@ -383,12 +381,7 @@ class Search:
         return int(rules.COMPOUND_LAST(later)) if candidate.named else 2
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
-        """A term that another sensor, other environments or another term speak against, with the reason."""
-        if self.ask.contradicted is not None:
-            fit = self.regression.fit(self.always + active)
-            none = next((k for k in active if self.ask.contradicted(k, fit)), None)
-            if rules.TWO_SENSORS(none is not None):
-                return none, Reason("two_sensors", "the comparison of two sensors shows nothing of it")
+        """A term that other environments or another term speak against, with the reason."""
         if rules.TRANSFER((failed := self.refuted_elsewhere(active)) is not None):
             return failed, Reason("transfer", "where it was not fitted it does not keep what it promises")
         if rules.STEADY((unsteady := self.unsteady(active)) is not None):
@@ -485,6 +478,4 @@ class Search:
         if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
             return False
         beside = self.regression.fit(self.always + rest + [other])
-        if self.ask.contradicted is not None and self.ask.contradicted(other, beside):
-            return False
         return self.judge(own.key, [*rest, other], beside).p_value > ALTERNATIVE_P

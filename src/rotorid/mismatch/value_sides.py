@@ -17,6 +17,7 @@ from rotorid.mismatch.prepare import assemble_rows, training_rule
 from rotorid.mismatch.regression import VALUE_LIMITS, Regression, build
 from rotorid.mismatch.rows import winds_last
 from rotorid.mismatch.select import VALUE_FLOOR
+from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.wrench import SURE_Z, WrenchModel, after_residual, block_seconds, chosen, model_filters
 from rotorid.signal.kernels import low_pass
 
@@ -98,6 +99,7 @@ def regression_of_values(
         block_seconds(rows, rate_hz),
         rate_hz,
         noisy or None,
+        *compared_alone(terms, rows),
     )
     return regression.without_winds()
 

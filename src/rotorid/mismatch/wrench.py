@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from rotorid.effects.catalogue import catalogue, ids_of, moving_air
+from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.effects.contract import Form
 from rotorid.effects.steady_wind import through_drag
 from rotorid.mismatch import rules
@@ -38,7 +38,7 @@ from rotorid.mismatch.speedpath import (
     commanded_path,
     smoothed_acceleration,
 )
-from rotorid.mismatch.two_sensors import refute
+from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 from rotorid.signal.kernels import causal
@@ -229,7 +229,14 @@ def searched(
         noise[c] = np.hypot(np.concatenate([r[:, c] for r in left]).std(), floor[c])
     rate = prepared.thinner.rate_hz
     regression = build(
-        rows, terms, filters, training_rule(prepared.split, segments), block_seconds(rows, rate), rate, noisy
+        rows,
+        terms,
+        filters,
+        training_rule(prepared.split, segments),
+        block_seconds(rows, rate),
+        rate,
+        noisy,
+        *compared_alone(terms, rows),
     )
     contributions = Contributions(rows, noisy, rate)
     per = max(2, int(rate))
@@ -245,15 +252,9 @@ def searched(
         cols, coefficients = regression.beyond(values, key, beta) if key not in values else (own, beta)
         return seconds.sizes(cols, coefficients, 1.0 if short else 0.9)
 
-    errors = {t.key for t in terms if t.effect in catalogue() and catalogue()[t.effect].kind == "sensor"}
-    fitted_rows = [r for r in rows if r.run in prepared.split.training]
-
-    def contradicted(key: str, fit: Fit) -> bool:
-        return key in errors and refute(fitted_rows, fit, regression.columns([key]), noise)
-
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
     known = np.zeros(12) if known_sizes is None else known_sizes
-    ask = Questions(sizes_of, seconds.sizes, known, contradicted)
+    ask = Questions(sizes_of, seconds.sizes, known)
     search = Search(regression.without_winds(), ask)
     selection = search.run(start)
     if (wide := search.values_alone(selection)) is not None:

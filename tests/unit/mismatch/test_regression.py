@@ -348,3 +348,47 @@ def test_the_noise_of_a_regressor_is_no_misfit():
     assert fit.gain / size == pytest.approx(np.var(x), abs=0.08)
     assert made.explained(["x"]) == pytest.approx(fit.gain, rel=1e-9)
     assert made.shown("x").all()
+
+
+# --- terms that some channels alone estimate
+
+
+def two_channels(seed: int, apart: tuple[str, ...]) -> Regression:
+    """A sensor's error of 0.05 in the comparison (channel 9) and, with as much noise, in a moment (channel 3) that also
+    holds what nobody modelled: −0.4 of the same signal. A second term acts in the moment alone."""
+    rng, size = np.random.default_rng(seed), 8000
+    x = np.stack([coloured(size, 1.0, rng, pole=0.9) for _ in range(2)], axis=1)
+    y, columns = np.full((size, 12), np.nan), np.zeros((size, 12, 2))
+    columns[:, 3], columns[:, 9, 0] = x, x[:, 0]
+    y[:, 3] = (0.05 - 0.4) * x[:, 0] + 0.7 * x[:, 1] + coloured(size, 1.0, rng)
+    y[:, 9] = 0.05 * x[:, 0] + coloured(size, 1.0, rng)
+    filters = {c: np.array([1.25, -0.75]) for c in (3, 9)}
+    rows = [Rows("a", np.arange(size) / RATE_HZ, y, columns)]
+    return build(rows, terms_of("error", "other"), filters, lambda run, t: True, 1.0, RATE_HZ, None, (9,), apart)
+
+
+def test_what_the_model_of_other_channels_lacks_does_not_reach_a_term_estimated_apart():
+    joint, cut = two_channels(0, ()).fit(["error", "other"]), two_channels(0, ("error",)).fit(["error", "other"])
+    assert joint.beta[0] == pytest.approx(-0.15, abs=0.03)
+    assert cut.beta[0] == pytest.approx(0.05, abs=0.03)
+    assert cut.beta[1] == pytest.approx(0.7, abs=0.05)
+    # It is scored on all channels: what it leaves of the moment is no gain.
+    assert cut.gain < joint.gain
+
+
+def test_intervals_of_a_term_estimated_apart_hold():
+    away = []
+    for seed in range(60):
+        fit = two_channels(seed, ("error",)).fit(["error", "other"], jackknife=True)
+        away.append((fit.beta - [0.05, 0.7]) / np.sqrt(np.diag(fit.covariance)))
+    # Channel 9 alone knows the error: 95 % of 60 are 57 ± 1.7. The other takes up none of what the moment lacks.
+    assert 52 <= int((np.abs(np.array(away)[:, 0]) < 1.96).sum()) <= 60
+    assert 52 <= int((np.abs(np.array(away)[:, 1]) < 1.96).sum()) <= 60
+
+
+def test_left_out_runs_and_gains_use_the_same_coefficients():
+    whole = two_channels(3, ("error",))
+    keys = ["error", "other"]
+    assert whole.explained(keys) == pytest.approx(whole.fit(keys).gain, rel=1e-9)
+    _, betas = whole.left_out(keys, False)
+    np.testing.assert_allclose(betas.mean(axis=0), whole.fit(keys).beta, atol=0.01)

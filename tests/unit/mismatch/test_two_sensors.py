@@ -1,41 +1,53 @@
-"""A lever arm that the force asks for and the comparison of accelerometer and velocity does not show is none."""
+"""Which errors of sensors the comparison with another sensor estimates alone."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-import pytest
+import pandas as pd
 
-from rotorid.mismatch.regression import Fit
-from rotorid.mismatch.rows import Rows
-from rotorid.mismatch.two_sensors import COMPARISONS, refute, shown
+from rotorid.mismatch.decide import coefficients
+from rotorid.mismatch.prepare import prepare
+from rotorid.mismatch.two_sensors import compared_alone
+from rotorid.mismatch.wrench import wrench_model
+from rotorid.recordings import columns as c
 
-from .synthetic import coloured
-
-COLS = np.array([0])
-NOISE = np.where(np.isin(np.arange(12), (0, 6)), 1.0, np.nan)
-
-
-def seen(share: float, noise: float = 1.0, size: int = 4000) -> tuple[list[Rows], Fit]:
-    """A term of one sigma in force and comparison, the latter holding `share` of it under slow noise."""
-    rng = np.random.default_rng(2)
-    y, x = np.full((size, 12), np.nan), np.zeros((size, 12, 1))
-    x[:, 0, 0] = x[:, 6, 0] = coloured(size, 1.0, rng, pole=0.9)
-    y[:, 0] = x[:, 0, 0] + coloured(size, 1.0, rng, pole=0.9)
-    y[:, 6] = share * x[:, 6, 0] + noise * coloured(size, 1.0, rng, pole=0.9)
-    fit = Fit(COLS, np.ones(1), np.ones((1, 1)), np.zeros(1), 0.0)
-    return [Rows("a", np.arange(size) / 40.0, y, x)], fit
+from .flights import recorded, with_table
 
 
-def test_the_share_that_the_comparison_shows():
-    """Noise and term of one sigma and 0.9 a row: 4000 rows are worth 4000 · (1 − 0.81)/(1 + 0.81) = 420."""
-    rows, fit = seen(0.3)
-    share, error = shown(rows, fit, COLS, NOISE, COMPARISONS["accelerometer"])
-    assert error == pytest.approx(1 / np.sqrt(420), rel=0.3)
-    assert abs(share - 0.3) < 3 * error
-    assert shown(rows, fit, COLS, NOISE, COMPARISONS["gyroscope"]) is None
+def test_errors_of_the_sensors_that_are_compared_and_nothing_else():
+    prepared = prepare(recorded(1))
+    channels, keys = compared_alone(prepared.terms, wrench_model(prepared, prepared.terms).rows)
+    assert channels == [6, 7, 8, 9, 10, 11]
+    assert {"gyro_error/scale", "accelerometer_error/bias", "imu_lever_arm/lever arm"} <= set(keys)
+    assert not any(k.startswith(("rotor_drag", "com_offset", "offset:")) for k in keys)
 
 
-@pytest.mark.parametrize(("share", "noise", "refuted"), [(0.0, 1.0, True), (1.0, 1.0, False), (0.0, 10.0, False)])
-def test_only_a_comparison_that_could_have_shown_it_refutes(share, noise, refuted):
-    rows, fit = seen(share, noise)
-    assert refute(rows, fit, COLS, np.where(np.arange(12) == 6, noise, NOISE)) is refuted
+def test_without_an_attitude_no_error_of_the_gyroscope_is_compared():
+    def inertial(table: pd.DataFrame) -> pd.DataFrame:
+        return table.drop(columns=[*c.QUATERNION, *c.VELOCITY, *c.POSITION])
+
+    prepared = prepare(with_table(recorded(1), inertial))
+    channels, keys = compared_alone(prepared.terms, wrench_model(prepared, prepared.terms).rows)
+    assert (channels, keys) == ([], [])
+
+
+def test_a_scale_of_the_gyroscope_is_told_rightly_beside_inertias_that_are_far_off():
+    """The moments ask for another number: the believed inertias are a third too small."""
+
+    def scaled(table: pd.DataFrame) -> pd.DataFrame:
+        return table.assign(**{name: 1.08 * table[name] for name in c.ANGULAR_VELOCITY})
+
+    recordings = with_table(recorded(2), scaled)
+    vehicle = recordings.vehicle
+    light = {k: v / 1.5 for k, v in vehicle.inertia_kg_m2.model_dump().items()}
+    vehicle = vehicle.model_copy(update={"inertia_kg_m2": vehicle.inertia_kg_m2.model_copy(update=light)})
+    prepared = prepare(replace(recordings, vehicle=vehicle))
+    model = wrench_model(prepared, prepared.terms)
+    regression = model.search.regression
+    fit = regression.fit([*regression.keys_of("nuisance"), "gyro_error/scale"])
+    beta, covariance = coefficients(regression, fit, "gyro_error/scale")
+    # Ω_m = 1.08 Ω; columns hold the measured rates, so the coefficient is 0.08 / 1.08.
+    assert np.all(np.abs(beta - 0.08 / 1.08) < 3 * np.sqrt(np.diag(covariance)))
+    assert np.all(np.abs(beta - 0.08 / 1.08) < 0.02)
