@@ -31,6 +31,7 @@ from rotorid.mismatch.payload_windows import loads, on_board
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.refitted import refitted
 from rotorid.mismatch.regime import regime_variables
+from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.shares import fitted_part
@@ -102,7 +103,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         improved = improved.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
     plain_fit, plain_values = refitted(model)
 
-    findings = [*mistakes, *findings_of(found, prepared)]
+    findings = [*mistakes, *findings_of(found, prepared, fit)]
     findings = payload_or_offset(findings, {**moved, **values})
     findings += absorbed_findings(model, values, findings)
     findings, told = with_square_term(findings, told, model)
@@ -170,7 +171,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     return with_noise_held_out(without_values_in_question(weighed(analysis)))
 
 
-def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
+def findings_of(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:
     """A finding for everything that was fitted: winds, the chain from command to speed, forces and moments."""
     model = found.model
     findings = [] if model.wind is None else [wind_finding(model)]
@@ -185,6 +186,7 @@ def findings_of(found: Fitted, prepared: Prepared) -> list[Finding]:
         model.selection,
         model.noise,
         nonlinear_intervals(prepared, model, model.segments),
+        delivered,
     )
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 

@@ -61,19 +61,28 @@ def suggested(search: Search, active: list[str]) -> Fit | None:
 
 
 def estimates(
-    regression: Regression, fit: Fit, search: Search, key: str, suggested: Fit | None = None
+    regression: Regression,
+    fit: Fit,
+    search: Search,
+    key: str,
+    suggested: Fit | None = None,
+    delivered: Fit | None = None,
 ) -> tuple[Estimate, ...]:
-    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`."""
+    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`.
+
+    Stated is the number that is `delivered`; its interval holds the one found with the believed values free, too.
+    """
     term = search.terms[key]
-    beta, covariance = coefficients(regression, fit, key)
+    covariance = coefficients(regression, fit, key)[1]
     spread, p = regression.between_runs(fit, key)
     variance = np.diag(covariance) + (spread if p < 0.05 else 0.0)
     reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
-    other = beta if suggested is None else coefficients(regression, suggested, key)[0]
+    beta, *others = (coefficients(regression, f, key)[0] for f in (delivered or fit, fit, suggested or fit))
     out = []
-    for k, (index, value, also, sd) in enumerate(zip(term.form.linear, beta, other, np.sqrt(variance), strict=False)):
+    for k, (index, sd) in enumerate(zip(term.form.linear, np.sqrt(variance), strict=False)):
         parameter = term.form.parameters[index]
-        ends = (value, min(value, also) - reach * sd, max(value, also) + reach * sd)
+        found = [beta[k], *(other[k] for other in others)]
+        ends = (beta[k], min(found) - reach * sd, max(found) + reach * sd)
         middle, low, high = (float(term.form.stated(np.where(np.arange(len(beta)) == k, x, beta))[k]) for x in ends)
         out.append(Estimate(parameter.symbol, middle, parameter.unit, low, high))
     return tuple(out)
@@ -146,25 +155,29 @@ def wrench_findings(
     selection: Selection,
     noise: np.ndarray,
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
+    delivered: Fit,
 ) -> list[Finding]:
-    """Findings of the terms of a flight; `nonlinear` holds values and one-sigma of those with nonlinear parameters."""
+    """Findings of the terms of a flight; `nonlinear` holds values and one-sigma of those with nonlinear parameters,
+    `delivered` the fit whose numbers are stated."""
     beside = suggested(search, selection.active)
 
     def told(key: str) -> Told:
         term = search.terms[key]
-        beta, _ = coefficients(regression, selection.fit, key)
+        beta, _ = coefficients(regression, delivered, key)
         channels = main_channels(contributions.rows, regression.columns([key]), beta, noise)
         values, parameters = np.array(term.values, float), ()
         if term.form.linear:
             values[list(term.form.linear)] = term.form.stated(beta)
-            stated = estimates(regression, selection.fit, search, key, beside)
+            stated = estimates(regression, selection.fit, search, key, beside, delivered)
             # What nothing in the recordings shows (columns that are noise alone) is not stated.
             parameters = tuple(p for p, shown in zip(stated, regression.shown(key), strict=True) if shown)
         if key in nonlinear:
-            values, sd = nonlinear[key]
+            centre, sd = nonlinear[key]
+            values[list(term.form.nonlinear)] = centre[list(term.form.nonlinear)]
+            low, high = np.minimum(values, centre) - 1.96 * sd, np.maximum(values, centre) + 1.96 * sd
             parameters = tuple(
-                Estimate(p.symbol, float(v), p.unit, float(v - 1.96 * s), float(v + 1.96 * s))
-                for p, v, s in zip(term.form.parameters, values, sd, strict=True)
+                Estimate(p.symbol, float(v), p.unit, float(a), float(b))
+                for p, v, a, b in zip(term.form.parameters, values, low, high, strict=True)
             )
         names = tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels)
         return Told(values, parameters, names, search.alternatives(key, selection.active))
@@ -318,3 +331,8 @@ def relative_change(key: str, coefficient: float, sd: float, measured_moment: bo
     if key == "mass" or turned:
         return coefficient / (1.0 - coefficient), sd / (1.0 - coefficient) ** 2
     return coefficient, sd
+
+
+def coefficient_of(key: str, change: float) -> float:
+    """Coefficient of a relative change of a believed value in rows without measured moments (`relative_change`)."""
+    return change / (1.0 + change) if key == "mass" or key.startswith("inertia") else change

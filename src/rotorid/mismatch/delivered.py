@@ -6,6 +6,7 @@ Terms without a name stay out: an improved vehicle cannot hold them. The same fo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -46,6 +47,9 @@ class FittedModel(Protocol):
     def change(self, key: str, coefficient: float, sd: float) -> tuple[float, float]:
         """Relative change of a believed value and its one-sigma from its coefficient."""
 
+    def coefficient(self, key: str, change: float) -> float:
+        """Coefficient of a relative change of a believed value."""
+
 
 def widely(values: Values) -> dict[str, float]:
     """Priors of the values called wrong."""
@@ -53,9 +57,30 @@ def widely(values: Values) -> dict[str, float]:
 
 
 def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tuple[list[str], Fit]:
-    """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values free."""
+    """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values at their told numbers.
+
+    What the whole balance would make of those values is another number where slow moments of the air bias it, and
+    effects fitted beside that would be those of a vehicle that nobody states.
+    """
     delivered = model.delivered_with(keys, widely(values))
-    return delivered, model.regression.fit(delivered, loose=widely(values))
+    known, cols, beta = at_told_numbers(model, delivered, values)
+    fit = known.fit([k for k in delivered if k not in values])
+    size = len(fit.beta)
+    covariance = np.zeros((size + len(cols), size + len(cols)))
+    covariance[:size, :size] = fit.covariance
+    return delivered, replace(
+        fit, columns=np.append(fit.columns, cols), beta=np.append(fit.beta, beta), covariance=covariance
+    )
+
+
+def at_told_numbers(
+    model: FittedModel, keys: Sequence[str], values: Values
+) -> tuple[Regression, np.ndarray, np.ndarray]:
+    """The regression in which the wrong values among `keys` are known, their columns and their coefficients."""
+    told = [k for k in keys if k in values]
+    cols = model.regression.columns(told)
+    beta = np.array([model.coefficient(k, values[k][0]) for k in told])
+    return (model.regression.given(cols, beta) if told else model.regression), cols, beta
 
 
 def left_out_residuals(model: FittedModel, keys: Sequence[str], values: Values) -> list[np.ndarray]:
@@ -64,7 +89,9 @@ def left_out_residuals(model: FittedModel, keys: Sequence[str], values: Values) 
     Each environment of the fitted runs is judged by coefficients found without it.
     """
     regression = model.regression
-    cols, betas = regression.left_out(tuple(keys), False, widely(values))
+    known, told, beta = at_told_numbers(model, keys, values)
+    cols, betas = known.left_out(tuple(k for k in keys if k not in values), False)
+    cols, betas = np.append(cols, told), np.column_stack([betas, np.tile(beta, (len(betas), 1))])
     betas = np.where(model.unnamed(cols), 0.0, betas)
     fold = np.append(regression.folds(False), -1)  # the last stands for rows that are in no block
     added = model.contributions.left_out(cols, betas, [fold[b] for b in regression.blocks_of_rows])

@@ -190,6 +190,27 @@ class Regression:
         wider.limit = np.maximum(self.limit, least)
         return wider
 
+    def given(self, cols: np.ndarray, beta: np.ndarray) -> Regression:
+        """The same where the coefficients `beta` (k,) of the columns `cols` are known: what they add is taken off."""
+        pulls = self.gram[:, :, cols] @ beta
+        square = self.square - 2 * self.cross[:, cols] @ beta + pulls[:, cols] @ beta
+        apart = self.apart
+        if apart is not None:
+            apart = replace(
+                apart,
+                cross=apart.cross - apart.gram[:, :, cols] @ beta,
+                bias_cross=apart.bias_cross - apart.bias_gram[:, cols] @ beta,
+            )
+        known = replace(
+            self,
+            cross=self.cross - pulls,
+            square=square,
+            bias_cross=self.bias_cross - self.bias_gram[:, cols] @ beta,
+            apart=apart,
+        )
+        known.limit = self.limit
+        return known
+
     def without_winds(self) -> Regression:
         """The same without the winds of single runs: every other column less what they take of it.
 

@@ -14,7 +14,7 @@ from rotorid.effects.steady_wind import through_drag
 from rotorid.mismatch import rules
 from rotorid.mismatch.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.contributions import Contributions
-from rotorid.mismatch.decide import coefficients, relative_change
+from rotorid.mismatch.decide import coefficient_of, coefficients, relative_change
 from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, form_terms, training_rule
@@ -136,6 +136,10 @@ class WrenchModel:
     def change(self, key: str, coefficient: float, sd: float) -> tuple[float, float]:
         """Relative change of a believed value and its one-sigma from its coefficient."""
         return relative_change(key, coefficient, sd)
+
+    def coefficient(self, key: str, change: float) -> float:
+        """Coefficient of a relative change of a believed value."""
+        return coefficient_of(key, change)
 
 
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:

@@ -268,6 +268,21 @@ def test_a_reading_held_at_zero_under_a_steady_load_dropped_out():
     assert np.flatnonzero(np.isnan(fixed.runs[0].column("force_x_n"))).tolist() == list(range(900, 1100))
 
 
+@pytest.mark.parametrize(("drift", "went_on"), [(0.05, False), (0.4, True)])
+def test_a_coarse_reading_stands_still_until_the_load_has_changed_by_a_step(drift, went_on):
+    """Steps of 0.1 N: weights of whole steps leave next to no residual, and beside that half a step is plain."""
+    weights = np.repeat(np.tile([0.0, 2.0, 4.0, 1.0, 3.0], 8), 100)
+    load = np.concatenate([weights, 2.0 + np.linspace(0.0, drift, 500), weights])
+    reading = np.round(load / 0.1) * 0.1
+    reading[7::900] += 0.1
+    held = np.zeros(len(load), bool)
+    held[len(weights) : len(weights) + 500] = True
+    reading[held] = 2.0
+    run = Run("r", pd.DataFrame({"time_s": np.arange(len(load)) / 100, "reference_force_x_n": load}))
+    bench = Vehicle.model_validate({"name": "b", "kind": "bench", "tared": True})
+    assert dropout.load_went_on(run, bench, reading, held) is went_on
+
+
 @pytest.mark.parametrize("phase", [0.0, 1.2])
 def test_two_readings_of_one_quantity_tell_time_where_their_gain_is_one(phase):
     """Above 5 Hz one reading is mostly a noise of which the other holds a tenth, with a phase of its own."""

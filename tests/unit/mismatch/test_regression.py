@@ -392,3 +392,24 @@ def test_left_out_runs_and_gains_use_the_same_coefficients():
     assert whole.explained(keys) == pytest.approx(whole.fit(keys).gain, rel=1e-9)
     _, betas = whole.left_out(keys, False)
     np.testing.assert_allclose(betas.mean(axis=0), whole.fit(keys).beta, atol=0.01)
+
+
+def test_a_known_coefficient_is_taken_off_the_rows():
+    rng, size = np.random.default_rng(4), 4000
+    x = np.stack([coloured(size, 1.0, rng, pole=0.9) for _ in range(2)], axis=1)
+    x[:, 1] += 0.5 * x[:, 0]
+    y = x @ [0.5, -0.8] + 0.3 * rng.standard_normal(size)
+    known = regression([rows_of(y, *x.T)], ["one", "two"]).given(np.array([0]), np.array([0.2])).fit(["two"])
+    by_hand = regression([rows_of(y - 0.2 * x[:, 0], *x.T)], ["one", "two"]).fit(["two"])
+    np.testing.assert_allclose(known.beta, by_hand.beta, rtol=1e-9)
+    np.testing.assert_allclose(known.covariance, by_hand.covariance, rtol=1e-7)
+    np.testing.assert_allclose(known.residual_square, by_hand.residual_square, rtol=1e-7)
+
+
+@pytest.mark.parametrize("apart", [(), ("error",)])
+def test_a_coefficient_that_is_known_at_its_fitted_number_changes_no_other(apart):
+    whole = two_channels(5, apart)
+    fit = whole.fit(["error", "other"])
+    for k, key in ((0, "other"), (1, "error")):
+        known = whole.given(np.array([k]), fit.beta[k : k + 1]).fit([key])
+        np.testing.assert_allclose(known.beta, fit.beta[1 - k], rtol=1e-7)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch import within_trust
-from rotorid.mismatch.decide import relative_change
+from rotorid.mismatch.decide import coefficient_of, relative_change
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.within_trust import beyond_trust, in_words, settled
 
@@ -27,7 +27,10 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
         def columns(self, keys):
             return np.array([where[k] for k in keys])
 
-        def fit(self, keys, loose):
+        def given(self, cols, beta):
+            return self
+
+        def fit(self, keys):
             columns = self.columns(keys).astype(int)
             beta = np.array([thrust if c == 0 else 0.0 for c in columns])
             return Fit(columns, beta, 1e-8 * np.eye(len(columns)), np.zeros(1), 0.0)
@@ -40,6 +43,7 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
         delivered_with=lambda keys, loose: list(keys),
         values_beside=lambda active: list(TRUST),
         change=relative_change,
+        coefficient=coefficient_of,
     )
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((4000, 12))
@@ -65,6 +69,12 @@ def test_a_value_called_wrong_is_not_told_twice(monkeypatch):
     model = model_of(monkeypatch, -0.03)
     _, moved = settled(model, {"thrust": (-0.03, 0.001)}, ())
     assert list(moved) == ["mass"]
+
+
+def test_values_called_wrong_are_delivered_at_their_told_numbers(monkeypatch):
+    fit, _ = settled(model_of(monkeypatch, -0.2), {"mass": (0.25, 0.01)}, ())
+    # A mass of 1.25 of the believed: the coefficient of the acceleration's column is 1 − 1/1.25.
+    assert fit.beta[fit.places(np.array([1]))] == pytest.approx([0.2])
 
 
 def test_beyond_trust_something_else_is_missing(monkeypatch):

@@ -43,7 +43,7 @@ def told(key: str):
     fit = regression.fit([key], jackknife=True)
     selection = Selection([key], fit, {key: 1e-9})
     noise = np.array([0.5, *[np.nan] * 11])
-    return wrench_findings(Contributions(rows), regression, search, selection, noise, {})
+    return wrench_findings(Contributions(rows), regression, search, selection, noise, {}, selection.fit)
 
 
 @pytest.mark.parametrize("key", FORMS)

@@ -140,6 +140,10 @@ class ReadingModel:
         """Relative change of a believed value and its one-sigma: nothing accelerates on a stand, its coefficient."""
         return coefficient, sd
 
+    def coefficient(self, key: str, change: float) -> float:
+        """Coefficient of a relative change of a believed value: itself."""
+        return change
+
 
 def kept_values(search: Search, active: Sequence[str]) -> list[str]:
     """Terms that stand beside effects always, less believed values that a form at work takes up."""

@@ -31,7 +31,9 @@ CHANCE = 1e-9
 SMOOTH = 0.3
 """Second differences of a reading without noise are this share of its first ones at most; white noise has 1.7."""
 PLAIN_CHANGE = 8.0
-"""Times the noise by which a reading should have changed to be called held: more than two steps of a coarse one."""
+"""Times the noise by which a reading should have changed to be called held."""
+PLAIN_STEPS = 2.0
+"""The same in steps of a coarse reading, which stands still until the load has changed by one."""
 LEAST_JUMP = 5.0
 """A jump is this many of the usual steps of a reading: what was held jumps back at its end."""
 
@@ -134,9 +136,11 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
     x = x / np.maximum(np.abs(x[known]).max(axis=0), 1e-300)
     slopes = np.linalg.lstsq(x[outside], reading[outside], rcond=1e-9)[0]
     noise = float((reading[outside] - x[outside] @ slopes).std())
+    steps = np.abs(np.diff(reading[outside]))
+    step = float(steps[steps > 0].min()) if steps.any() else 0.0
     expected = x[inside] @ slopes
     off = np.abs(expected - reading[inside])
-    return bool(max(np.ptp(expected), np.nanmedian(off)) > PLAIN_CHANGE * noise)
+    return bool(max(np.ptp(expected), np.nanmedian(off)) > max(PLAIN_CHANGE * noise, PLAIN_STEPS * step))
 
 
 def _as_stretches(run: Run, name, sensor, kind, mask, p_value) -> list[Stretch]:
