@@ -7,10 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from rotorid.mismatch.decide import coefficients, relative_change
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.prepare import parts_of, prepare
 from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.value_sides import sides_of_values
+from rotorid.mismatch.within_trust import settled
 
 from .flights import DENSE_HZ, quad, recorded, smooth, with_table
 
@@ -50,3 +52,16 @@ def test_all_frequencies_judge_unless_slow_ones_tell_of_another_gain(size_n_m, e
 def test_a_wrong_inertia_is_told_though_the_rotors_make_up_for_a_slow_moment(size_n_m):
     change, sd = found(size_n_m).values["inertia_xx"]
     assert abs(change - (1 / BELIEVED_XX - 1)) < 2.5 * sd < 0.15
+
+
+def test_the_told_inertia_is_the_one_delivered():
+    """The whole balance, which the slow moment biases, would deliver another one beside the told number."""
+    made = found(0.03)
+    model, (change, sd) = made.model, made.values["inertia_xx"]
+    fit, moved = settled(model, made.values, model.selection.active)
+    beta, _ = coefficients(model.regression, fit, "inertia_xx")
+    assert relative_change("inertia_xx", float(beta[0]), 0.0)[0] == pytest.approx(change, rel=1e-9)
+    assert "inertia_xx" not in moved
+    free = model.regression.with_room(0.6).fit([*model.selection.active, "inertia_xx"], loose={"inertia_xx": 0.1})
+    biased, _ = coefficients(model.regression, free, "inertia_xx")
+    assert abs(relative_change("inertia_xx", float(biased[0]), 0.0)[0] - change) > 3 * sd
