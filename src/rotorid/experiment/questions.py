@@ -18,6 +18,7 @@ from rotorid.mismatch.regression import Regression
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import COST_PER_PARAMETER
 from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.within_trust import settled
 from rotorid.recordings import RecordingSet
 
 CURVES = ("throttle_curve", "thrust_curve")
@@ -85,7 +86,8 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
     fit_part, unseen = parts_of(recordings, split)
     prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
-    findings = (*mistakes, *findings_of(found, prepared))
+    delivered, _ = settled(found.model, found.values, found.model.selection.active)
+    findings = (*mistakes, *findings_of(found, prepared, delivered))
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:
