@@ -269,6 +269,7 @@ class Regression:
                 cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
             noise = self.apart.bias_gram[grid] * share
             at = np.arange(len(where))
+            # As `limited_bias`, column by column: these channels' products alone are no symmetric matrix.
             most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[at, where], 1e-300)
             bias[where] = noise * np.minimum(1.0, most)[:, None]
             bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
