@@ -14,14 +14,13 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.rows import Rows, Term
 
-COMPARISONS = {"accelerometer": slice(6, 9), "gyroscope": slice(9, 12)}
-"""Channels in which two sensors are compared."""
+COMPARISONS = range(6, 12)
+"""Channels in which two sensors are compared: accelerometer and velocity, gyroscope and attitude."""
 
 
 def compared_alone(terms: Sequence[Term], rows: Sequence[Rows]) -> tuple[list[int], list[str]]:
     """Channels in which two sensors are compared, and keys of the errors of a sensor that act in them."""
-    every = [c for where in COMPARISONS.values() for c in range(*where.indices(12))]
-    channels = [c for c in every if np.isfinite(rows[0].y[:, c]).all()]
+    channels = [c for c in COMPARISONS if np.isfinite(rows[0].y[:, c]).all()]
     sensors = {i for i, effect in catalogue().items() if effect.kind == "sensor"}
     start, keys = 0, []
     for term in terms:
