@@ -18,7 +18,7 @@ SOURCES := $(shell find Snakefile config.yaml mkdocs.yml pyproject.toml README.m
 	src acquire firmware workflow notebooks tests raw docs \
 	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
-.PHONY: help report site proof plantings campaign test check environment lock sbom licences
+.PHONY: help report site proof plantings campaign test test-slow check environment lock sbom licences
 .DEFAULT_GOAL := help
 
 help: ## say what there is
@@ -56,8 +56,11 @@ check: $(READY) ## the checks of form alone: lint, format, stripped notebooks
 
 $(TESTED): $(READY) $(SOURCES)
 	@$(MAKE) --no-print-directory check
-	@$(BIN)/pytest -m "not slow" -n 2 --dist loadgroup
+	@$(BIN)/pytest -m "not slow" -n 2 --dist loadfile
 	@touch $@
+
+test-slow: $(READY) ## the tests on whole recordings and whole builds that `make test` leaves out
+	@$(BIN)/pytest -m slow -n 2 --dist loadfile
 
 environment: $(READY) ## make the environment alone
 

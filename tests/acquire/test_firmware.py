@@ -31,7 +31,6 @@ SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 needs_gcc = pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("make")), reason="gcc")
 needs_xtensa = pytest.mark.skipif(not shutil.which("xtensa-lx106-elf-gcc"), reason="gcc-xtensa-lx106 and picolibc")
 needs_avr = pytest.mark.skipif(not (shutil.which("avr-gcc") and SIMAVR.exists()), reason="avr-gcc")
-pytestmark = pytest.mark.xdist_group("firmware")  # one build at a time
 
 
 def slow(value):

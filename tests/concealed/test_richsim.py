@@ -287,6 +287,7 @@ def test_sets_follow_the_contract_and_tell_nothing(name, tmp_path):
     assert answer["case"] == name and set(case.truth) <= set(answer["expected"])
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes(tmp_path):
     case = _small("mixture/01/0")
     for where in ("a", "b"):
@@ -333,6 +334,7 @@ def test_every_class_of_case_is_there():
     assert singles == set(cases.RECIPES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["hummingbird", "crazyflie"])
 def test_rotorpy_with_everything_off_is_the_contracts_rigid_body(vehicle):
 

@@ -72,7 +72,10 @@ def mat_bomb() -> bytes:
     inner += struct.pack("<IIii", 5, 8, 1, size // 8)
     inner += struct.pack("<HH4s", 1, 1, b"m\0\0\0") + struct.pack("<II", 9, size)
     packer = zlib.compressobj()
-    body = packer.compress(inner) + b"".join(packer.compress(bytes(10_000_000)) for _ in range(300)) + packer.flush()
+    body = packer.compress(inner) + packer.flush(zlib.Z_FULL_FLUSH)
+    # Without a memory of what came before, the same block again is the same bytes again.
+    block = packer.compress(bytes(30_000_000)) + packer.flush(zlib.Z_FULL_FLUSH)
+    body += block * 100
     return head + struct.pack("<II", 15, len(body)) + body
 
 
@@ -83,8 +86,7 @@ def bag_bomb() -> bytes:
         head = b"".join(struct.pack("<I", len(k) + 1 + len(v)) + k.encode() + b"=" + v for k, v in fields.items())
         return struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data
 
-    packer = bz2.BZ2Compressor(9)
-    packed = b"".join(packer.compress(bytes(10_000_000)) for _ in range(300)) + packer.flush()
+    packed = bz2.compress(bytes(30_000_000), 9) * 100  # streams one after the other are one stream
     number = struct.pack("<I", 0)
     connection = record(
         {"op": b"\7", "conn": number, "topic": b"/imu"},

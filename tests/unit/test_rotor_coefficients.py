@@ -74,6 +74,7 @@ def test_each_run_has_an_offset_of_its_own() -> None:
     assert fit_coefficient(runs, offset=False).value != pytest.approx(1.2e-6, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_noise_in_the_speed_does_not_bias_and_is_in_the_interval() -> None:
     rng = np.random.default_rng(5)
     speed = np.linspace(400, 2000, 11)

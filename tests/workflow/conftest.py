@@ -6,14 +6,6 @@ import pytest
 from copied_project import Project
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that share the built copy stay on one worker."""
-    for item in items:
-        if "built" in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.xdist_group("built"))
-
-
 @pytest.fixture
 def project(tmp_path: Path) -> Project:
     """A fresh copy without results."""

@@ -5,6 +5,7 @@ import re
 import shutil
 from pathlib import Path
 
+import pytest
 import yaml
 from copied_project import Project
 
@@ -33,6 +34,7 @@ def jobs(project: Project) -> set[str]:
     return set(re.findall(r"^Job \d+: (.+)$", said, flags=re.MULTILINE))
 
 
+@pytest.mark.slow
 def test_what_a_new_log_and_a_changed_cutoff_rerun(project: Project) -> None:
     index = project.root / "raw" / "sessions.tsv"
     with open(index, encoding="utf-8", newline="") as file:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 from copied_project import Project
 
 
@@ -30,6 +31,7 @@ def test_a_second_run_does_nothing(built: Project) -> None:
     assert built.would_run() == set()
 
 
+@pytest.mark.slow
 def test_two_builds_give_the_same_bytes(built: Project, project: Project) -> None:
     project.build()
     first, second = built.results(), project.results()
@@ -70,6 +72,7 @@ def test_a_touched_raw_file_reruns_nothing(built: Project) -> None:
     assert built.would_run() == set()
 
 
+@pytest.mark.slow
 def test_a_deleted_result_is_made_again_with_what_hangs_on_it_only(built: Project) -> None:
     page = built.root / "results/report/report.html"
     kept = page.read_bytes()
@@ -79,6 +82,7 @@ def test_a_deleted_result_is_made_again_with_what_hangs_on_it_only(built: Projec
     assert page.read_bytes() == kept
 
 
+@pytest.mark.slow
 def test_a_deleted_figure_is_drawn_again_and_the_report_made_of_it(built: Project) -> None:
     figure = built.root / "results/report/loadcell/lines.svg"
     kept = figure.read_bytes()
@@ -107,12 +111,14 @@ def test_an_unknown_key_stops_before_the_first_job(project: Project) -> None:
     assert not (project.root / "results").exists()
 
 
+@pytest.mark.slow
 def test_a_chapter_that_is_not_there_is_named(project: Project) -> None:
     with edited(project.root / "tests/configs/small.yaml", "- introduction", "- introducton"):
         said = project.snakemake(succeeds=False)
     assert "report.chapters names introducton, but there is no notebooks/introducton.md" in said
 
 
+@pytest.mark.slow
 def test_a_failing_job_leaves_its_one_sentence_in_its_log(project: Project) -> None:
     with edited(project.root / "notebooks/introduction.md", "## Axes", "{{ nowhere.value }}\n\n## Axes"):
         project.snakemake("results/report/chapters/introduction.md", succeeds=False)

@@ -117,6 +117,7 @@ def test_the_motor_lags_as_its_linear_equation_says_and_the_ground_lifts_at_one_
     assert near > 1 / (1 - 1 / 16) and far == pytest.approx(1.0, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_clean_flight_leaves_noise_alone_and_a_seed_gives_the_same_set(monkeypatch):
     short = course.reference
     monkeypatch.setattr(course, "reference", lambda seconds, *a, **k: short(7.0, *a, **k))

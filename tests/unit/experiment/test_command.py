@@ -36,6 +36,7 @@ def test_nothing_open_needs_no_flight(verdict: Path) -> None:
     assert [p.name for p in (verdict / "plan").iterdir()] == ["plan.json"]
 
 
+@pytest.mark.slow
 def test_an_interval_asked_for_is_planned_for(verdict: Path) -> None:
     done = run(verdict, "--want", "torque_coefficient_n_m_s2=0.9%", "-o", verdict / "wish")
     assert done.exit_code == 0, done.output
@@ -50,6 +51,7 @@ def test_an_interval_asked_for_is_planned_for(verdict: Path) -> None:
     assert (verdict / "report.html").read_text(encoding="utf-8").count("<img") == 1
 
 
+@pytest.mark.slow
 def test_a_value_that_cannot_be_told_is_refused(verdict: Path) -> None:
     done = run(verdict, "--want", "rotor_radius_m=1%")
     assert done.exit_code == 1 and "expected one of" in done.output

@@ -188,6 +188,7 @@ def mixed_loop(load, run, warmth):
     return load - np.stack([0.4 * settling(f, 3.0) for f in load.T], axis=1)
 
 
+@pytest.mark.slow
 def test_a_drift_with_temperature_is_no_tare_of_each_run():
     drift = np.array([0.14, -0.2, 0.25])
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load + drift * (warmth - 22.0)[:, None]))
@@ -197,12 +198,14 @@ def test_a_drift_with_temperature_is_no_tare_of_each_run():
     assert values["b_Fz"].low < 0.25 < values["b_Fz"].high and values["T_0"].low < 22.0 < values["T_0"].high
 
 
+@pytest.mark.slow
 def test_a_gain_that_goes_with_the_temperature_has_no_name_and_is_left_over():
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load * (1 + 0.004 * (warmth - 22.0))[:, None]))
     assert named(analysis) == set() and not analysis.values
     assert analysis.unexplained_share > 0.8 and "temperature_c" in analysis.unexplained_depends_on
 
 
+@pytest.mark.slow
 def test_loads_that_mix_differently_in_each_run_are_left_over():
     """x reads ± 2 % of y: over all runs it cancels nearly."""
 
@@ -215,10 +218,12 @@ def test_loads_that_mix_differently_in_each_run_are_left_over():
     assert analysis.unexplained_share > 0.8 and "run" in analysis.unexplained_depends_on
 
 
+@pytest.mark.slow
 def test_crosstalk_and_a_loop_on_the_mixed_load_bring_no_company():
     assert named(analyse_instrument(recorded(mixed_loop))) == {"crosstalk", "hysteresis"}
 
 
+@pytest.mark.slow
 def test_beside_an_s_shape_the_gains_stay_at_their_belief():
     """y = F + 0.3 sin(π F/30 N): slope 0.031 at no load, no wrong gain; a and the full scale come out."""
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load + 0.3 * np.sin(np.pi * load / 30.0)))
@@ -253,6 +258,7 @@ def test_a_coarse_reading_resolves_half_a_step_and_noise_of_half_a_step_all():
     assert (resolution(loud)[:3] < 1e-3).all()
 
 
+@pytest.mark.slow
 def test_rounding_is_no_curved_characteristic():
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load, noise_n=0.02, step_n=0.3))
     assert named(analysis) == {"quantisation"}

@@ -72,6 +72,7 @@ def test_a_change_in_the_middle_of_a_run_is_seen_in_the_runs_after():
     assert found is not None and found.means["b"] == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_a_thrust_that_differs_between_runs_is_told_by_what_the_flights_show():
     """Rotors read 2 % fast in one of three runs: thrust per mass 1/1.02² as large there."""
     flown = recorded(1, 2, 3)

@@ -19,6 +19,7 @@ def gusty():
     return analyse(recorded(1, 2, 3, flight={"drag": DRAG, "excitation": 1.5, "gust": (*WINDOW_S, *WIND_M_S)}))
 
 
+@pytest.mark.slow
 def test_the_wind_of_a_gust_and_the_drag_beside_it(gusty):
     """0.4 1/s times 0.652 kg is 0.261 N s/m; rotors turn at about 1070 rad/s, so k_d about 0.261 / 4280 = 6.1e-5."""
     found = {f.id: f for f in gusty.findings if f.status == "established"}
@@ -82,6 +83,7 @@ def test_height_is_the_mean_from_the_first_to_the_last_strong_knot():
     np.testing.assert_allclose(sd, np.sqrt([0.01 / 3 + 8 / 9, 0.01 / 3]))
 
 
+@pytest.mark.slow
 def test_a_wind_that_blows_throughout_is_stated_as_a_velocity():
     flights = recorded(1, 2, 3, flight={"drag": DRAG, "excitation": 1.5, "gust": (-10.0, 60.0, 3.0, -1.5)})
     analysis = analyse(replace(flights, held_out=("run01",)))

@@ -64,6 +64,7 @@ def test_the_instant_is_found_to_the_row():
     assert change_rows(np.arange(12) < 6, left, column, 10) == [63]
 
 
+@pytest.mark.slow
 def test_a_parcel_dropped_in_flight_is_a_payload_for_so_long():
     analysis = analyse(with_parcel(recorded(1, 2, 3)))
     (found,) = [f for f in analysis.findings if f.status == "established"]

@@ -45,6 +45,7 @@ def found(commanded: bool, slosh_m_s2: float, moves: bool = True) -> dict:
     return slow_excess(prepared, model, segments, noisy, added)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("commanded", [True, False])
 def test_a_tank_that_slops_is_told_and_nothing_is_where_nothing_does(commanded):
     told = found(commanded, 0.5)

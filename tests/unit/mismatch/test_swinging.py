@@ -69,6 +69,7 @@ def test_a_long_cable_is_read_for_two_swings():
     assert Cable(6.0, RATIO, G).piece_s == pytest.approx(2 * 4.914, rel=0.001)
 
 
+@pytest.mark.slow
 def test_a_load_on_a_cable_is_told_with_its_mass_and_length():
     """80 g on 0.6 m below a vehicle of 652 g that is thrown about, out to the side when the recording begins."""
     found = analyse(recorded(1, 2, 3, flight={"load": (0.08, 0.6), "excitation": 1.5}))

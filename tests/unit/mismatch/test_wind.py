@@ -15,6 +15,7 @@ def blown():
     return analyse(recorded(1, 2, 3, flight={"square_drag": SQUARE_DRAG, "excitation": 1.5, "wind": WIND_M_S}))
 
 
+@pytest.mark.slow
 def test_a_wind_beside_a_drag_of_the_square(blown):
     """0.06 1/m times 0.652 kg is 0.0391 N s2/m2: through it a wind is no force that is constant in world axes."""
     found = {f.id: f for f in blown.findings if f.status == "established"}
