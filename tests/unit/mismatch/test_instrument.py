@@ -14,9 +14,11 @@ from rotorid.mismatch.deliver import deliver
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import form_reading, value_column
 from rotorid.mismatch.instrument.mistakes import find_mistakes
+from rotorid.mismatch.instrument.model import size_of_columns
 from rotorid.mismatch.instrument.predict import entries
 from rotorid.mismatch.instrument.sampling import step_of
 from rotorid.mismatch.instrument.setup import set_up
+from rotorid.mismatch.rows import Rows
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_vehicle
 
 NEW = (
@@ -278,3 +280,13 @@ def test_a_load_along_two_axes_is_turned_by_what_bends():
     reading = form_reading(form, np.array([0.01, 0.05, 0.02]), loading, stand_vehicle())
     # θ_x = 0.05 · 4 = 0.2 turns the vertical force sideways: −0.2 · 4 along y.
     np.testing.assert_allclose(reading[0, :3], [0.44, -0.8, -0.33], atol=1e-12)
+
+
+def test_what_shows_in_few_seconds_has_the_size_of_the_strongest_tenth() -> None:
+    """Before: a filter that shows after a change of load, in fewer than a tenth of the seconds, had no size."""
+    per, seconds = 50, 100
+    column = np.zeros((per * seconds, 6, 1))
+    column[: 5 * per, 2, 0] = 1.0
+    rows = [Rows("r", np.arange(len(column)) / per, np.zeros((len(column), 6)), column)]
+    size = size_of_columns(rows, np.full(6, 0.1), per)(np.array([0]), np.array([2.0]))
+    assert size == pytest.approx([0, 0, 2.0 / 0.1 * np.sqrt(0.5), 0, 0, 0])

@@ -43,6 +43,8 @@ MEMORY = 4
 """Blocks over which the noise of a sensor may be alike beyond what whitening takes away: 1/f noise has no end."""
 ROWS_PER_COLUMN = 8
 STRONGEST = 0.9
+"""Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of load
+is in few of them."""
 ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
@@ -264,7 +266,8 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
             count = max(1, len(square) // per)
             whole = len(square) // count * count
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
-        strongest = np.sqrt(np.quantile(np.concatenate(energies), STRONGEST, axis=0))
+        every = np.sort(np.concatenate(energies), axis=0)
+        strongest = np.sqrt(every[int(STRONGEST * len(every)) :].mean(axis=0))
         return np.where(strongest > least, strongest, 0.0) / loud
 
     return sizes
