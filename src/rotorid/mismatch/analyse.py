@@ -47,7 +47,7 @@ from rotorid.mismatch.values import (
     throttle_scale,
     told_of_commands,
     with_square_term,
-    without_values_in_question,
+    with_values_in_question,
 )
 from rotorid.mismatch.within_trust import beyond_trust, settled
 from rotorid.mismatch.wrench import WrenchModel, linear_drag, nonlinear_intervals
@@ -168,7 +168,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         instead=instead_of(model, values),
         put_right=within_trust.in_words(moved),
     )
-    return with_noise_held_out(without_values_in_question(weighed(analysis)))
+    return with_noise_held_out(with_values_in_question(weighed(analysis)))
 
 
 def findings_of(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:

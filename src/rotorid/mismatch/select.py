@@ -267,21 +267,6 @@ class Search:
             None,
         )
 
-    def values_alone(self, selection: Selection) -> Regression | None:
-        """The regression with more room for believed values, where those alone explain as much as a selection does.
-
-        A value that is off by many times its trust is held back in the search, and something else takes up the rest.
-        """
-        reg, fit = self.regression, selection.fit
-        limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
-        moved = [abs(float(fit.beta[fit.columns == reg.start[t.key]][0])) for t in reg.terms if t.kind == "value"]
-        held = sum(m > NEAR_LIMIT * most for m, most in zip(moved, limits, strict=True))
-        if not held or not selection.active:
-            return None
-        wide = reg.with_room(VALUE_LIMITS[1])
-        enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
-        return wide if rules.VALUES_FIRST(enough) else None
-
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
@@ -388,7 +373,24 @@ class Search:
             return unsteady, Reason("steady", "it differs from run to run")
         if rules.CANCELS((cancelling := self.cancelling(active)) is not None):
             return cancelling, Reason("cancels", "where it is strongest it only cancels another")
+        if rules.FREE_VALUES((imitating := self.imitates_values(active)) is not None):
+            return imitating, Reason("free_values", "beside believed values that are free it is not significant")
         return None
+
+    def imitates_values(self, active: list[str]) -> str | None:
+        """The least significant term of those that are not significant once believed values are free.
+
+        The search holds values by their trust. Where one is off by many times that, an effect may take up the rest: a
+        thrust curve stands for a wrong mass or arm.
+        """
+        values = {t.key: VALUE_LIMITS[1] for t in self.regression.terms if t.kind == "value"}
+        if not values or not active:
+            return None
+        wide = self.regression.with_room(VALUE_LIMITS[1])
+        fit = wide.fit(self.always + active, jackknife=True, loose=values)
+        p_values = {k: wide.wald(fit, wide.columns([k]), self.blocks) for k in active if not self.terms[k].run}
+        least = max(p_values, key=p_values.get, default=None)
+        return least if least is not None and p_values[least] > KEEP_P else None
 
     def cancelling(self, active: list[str]) -> str | None:
         """The term of least worth that in its strongest channel is cancelled by another.

@@ -17,6 +17,7 @@ from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding
 from rotorid.mismatch.rows import PARAMETER_NAMES
+from rotorid.mismatch.words import effect_words, listed
 from rotorid.mismatch.wrench import WrenchModel
 from rotorid.recordings import RecordingSet, Vehicle, columns
 
@@ -169,14 +170,25 @@ def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) 
     return [told if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
 
 
-def without_values_in_question(analysis: Analysis) -> Analysis:
-    """The analysis less wrong values that would be right, or others, if another member of an open class were at work.
+def with_values_in_question(analysis: Analysis) -> Analysis:
+    """The analysis with those wrong values only suggested that a member of an open class would change.
+
+    Where it is a payload that is at work, the believed mass is right.
 
     Asked once the words are final: a class that is only suggested questions nothing.
     """
     members = {i for f in analysis.findings if f.status == "ambiguous" for i in f.alternatives}
-    open_values = {name for i in members & set(catalogue()) for name in catalogue()[i].would_change}
-    if not rules.VALUE_IN_QUESTION(bool(open_values & set(analysis.wrong_values))):
+    changing: dict[str, list[str]] = {}
+    for effect_id in sorted(members & set(catalogue())):
+        for name in catalogue()[effect_id].would_change:
+            if name in analysis.wrong_values:
+                changing.setdefault(name, []).append(effect_id)
+    if not rules.VALUE_IN_QUESTION(bool(changing)):
         return analysis
-    kept = {k: v for k, v in analysis.values.items() if k not in open_values or k not in analysis.wrong_values}
-    return replace(analysis, values=kept)
+    names = {name: listed([effect_words(i) for i in ids], "or") for name, ids in changing.items()}
+    doubtful = {
+        name: (analysis.values[name], f"{words}, which is not excluded, would change it")
+        for name, words in names.items()
+    }
+    kept = {k: v for k, v in analysis.values.items() if k not in changing}
+    return replace(analysis, values=kept, suggested_values={**analysis.suggested_values, **doubtful})

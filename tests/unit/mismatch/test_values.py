@@ -15,7 +15,9 @@ from rotorid.mismatch.decide import (
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.select import Selection
+from rotorid.mismatch.values import with_values_in_question
 
+from . import synthetic
 from .synthetic import coloured
 from .test_regression import RATE_HZ
 
@@ -195,3 +197,17 @@ def test_both_inertias_explain_as_much_as_an_arm_and_neither_alone():
     made = build(rows, terms, filters, lambda run, t: True, 1.0, RATE_HZ)
     found = exchangeable(made, Selection([], made.fit(["arm"])), ["arm"])
     assert [list(others) for others in found["arm"]] == [["inertia_xx", "inertia_yy"]]
+
+
+def test_a_value_that_a_member_of_an_open_class_would_change_is_suggested_with_the_reason():
+    """A vehicle heavier than believed, or one that is right and carries a payload."""
+    mass, arms = (0.65, 0.8, 0.78, 0.82), (1.0, 0.9, 0.88, 0.92)
+    open_class = ("com_offset", "payload")
+    class_ = synthetic.drag_finding(id="com_offset", status="ambiguous", alternatives=open_class)
+    told = with_values_in_question(synthetic.analysis(findings=[class_], values={"mass_kg": mass, "arm_scale": arms}))
+    assert set(told.values) == {"arm_scale"}
+    numbers, why = told.suggested_values["mass_kg"]
+    assert numbers == mass and "payload" in why and "centre of mass" not in why
+    # A class that is only suggested questions nothing.
+    suggested = synthetic.drag_finding(id="com_offset", status="suggested", alternatives=open_class)
+    assert with_values_in_question(synthetic.analysis(findings=[suggested], values={"mass_kg": mass})).values
