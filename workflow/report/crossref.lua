@@ -37,12 +37,15 @@ end
 
 -- First sentence of a caption, without the words that say what the figure is made of.
 local function first_sentence(inlines)
-  local out, started = pandoc.Inlines({}), false
+  local out, started, open = pandoc.Inlines({}), false, 0
   for position, inline in ipairs(inlines) do
     if inline.t ~= "RawInline" and not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
       started = true
       out:insert(inline)
-      if inline.t == "Str" and inline.text:match("[.;]$") and not inline.text:match("eqs?%.$") then
+      if inline.t == "Str" then
+        open = open + select(2, inline.text:gsub("%(", "")) - select(2, inline.text:gsub("%)", ""))
+      end
+      if inline.t == "Str" and open <= 0 and inline.text:match("[.;]$") and not inline.text:match("eqs?%.$") then
         out[#out] = pandoc.Str((inline.text:gsub("[.;]$", "")))
         break
       end

@@ -210,6 +210,8 @@ rule chapter_proof:
         coefficients=f"{CONFIG.proof.tables}/coefficients.csv",
         next_flight="docs/proof/next_flight.csv",
         next_flight_summary="docs/proof/next_flight_summary.csv",
+        plantings="docs/proof/plantings_summary.csv",
+        plantings_before="docs/proof/plantings_before_summary.csv",
     output:
         next_flight_figure=report(
             "results/report/proof/next_flight.svg",
@@ -253,6 +255,8 @@ rule chapter_proof:
         studies="results/report/proof/studies.csv",
         published="results/report/proof/published.csv",
         drawn="results/report/proof/drawn.csv",
+        releases="results/report/proof/releases.csv",
+        planted="results/report/proof/planted.csv",
         flights="results/report/proof/flights.csv",
         asked="results/report/proof/asked.csv",
     params:

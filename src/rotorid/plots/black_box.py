@@ -52,7 +52,7 @@ def comparison(metrics: pd.DataFrame) -> Figure:
     """RMSE of each model and output on whole experiments held out, with intervals."""
     from matplotlib.ticker import NullFormatter
 
-    fig, axes = style.figure(3.6, 2, 3, sharey=True)
+    fig, axes = style.figure(4.0, 2, 3, sharey=True)
     models = list(dict.fromkeys(metrics["model"]))[::-1]
     for axis, (name, (label, unit)) in zip(axes.flat, OUTPUTS.items(), strict=True):
         part = metrics[metrics["output"] == name].set_index("model").loc[models]

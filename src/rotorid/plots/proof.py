@@ -8,6 +8,7 @@ import numpy as np
 
 from rotorid.plots import style
 from rotorid.proof.next_flight import WITHIN
+from rotorid.proof.show import in_a_release
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +21,7 @@ LAST_COLUMNS = ("several", "a value", "nothing")
 
 def targets(summary: pd.DataFrame) -> Figure:
     """Each rate that has a target, its 95 % interval, and the stretch that the target allows; grey: not refuted."""
-    rows = summary[summary["at_least"].notna() | summary["at_most"].notna()]
+    rows = summary[(summary["at_least"].notna() | summary["at_most"].notna()) & ~in_a_release(summary)]
     rows = rows[rows["value"].notna() & ~rows["id"].str.endswith(("oracle", "better", "failed"))].iloc[::-1]
     fig, ax = style.figure(0.6 + 0.17 * len(rows))
     for k, row in enumerate(rows.itertuples()):

@@ -43,7 +43,7 @@ def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figu
 
 def attitude(flight: pd.DataFrame) -> Figure:
     """Euler angles and their references over time (figure 4.9b)."""
-    fig, axes = style.figure(1.8, 3, 1, sharex=True)
+    fig, axes = style.figure(2.6, 3, 1, sharex=True)
     for axis, angle in zip(axes, ANGLES, strict=True):
         axis.plot(
             flight["time_s"],

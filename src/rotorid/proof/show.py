@@ -7,6 +7,9 @@ import re
 
 import pandas as pd
 
+from rotorid.proof.intervals import wilson
+from rotorid.proof.table import SIMULATORS
+
 RATIOS = ("location_f1", "oracle")
 """Rows whose value is no share."""
 METHODS = {
@@ -19,16 +22,117 @@ METHODS = {
 }
 
 
+RELEASE_ROW = re.compile(r"(?P<simulator>\w+)_(?P<date>\d{4}-\d\d-\d\d)_(?P<score>right|clean_alarms|false)")
+"""Id of a release's row."""
+DRAWN_BY = {
+    "multibody": "flights (multibody)",
+    "continuous": "flights (equations)",
+    "stand_rig": "stands",
+    "bench_rig": "benches",
+}
+"""Simulators of the release proof, short."""
+
+
+def in_a_release(summary: pd.DataFrame) -> pd.Series:
+    """Mask of the rows of releases: they have a table of their own."""
+    return summary["id"].map(lambda key: RELEASE_ROW.fullmatch(key) is not None)
+
+
+def of_releases(summary: pd.DataFrame) -> pd.DataFrame:
+    """A row for each date and simulator of the release proof, as text, and one for all of them.
+
+    `right` counts the sets in which all that is hidden was told and nothing else, with the 95 % interval of their share
+    (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
+    """
+    groups: dict[tuple[str, str], dict[str, pd.Series]] = {}
+    for _, row in summary.iterrows():
+        if found := RELEASE_ROW.fullmatch(row["id"]):
+            groups.setdefault((found["date"], found["simulator"]), {})[found["score"]] = row
+    rows, sums = [], {"right": [0, 0], "clean_alarms": [0, 0]}
+    for (date, simulator), scores in groups.items():
+        counts = {}
+        for score, total in sums.items():
+            of = int(scores[score]["cases"])
+            counts[score] = round(float(scores[score]["value"]) * of) if of else 0, of
+            sums[score] = [a + b for a, b in zip(total, counts[score], strict=True)]
+        false = scores["false"]
+        rows.append(
+            {
+                "released": date,
+                "simulator": DRAWN_BY.get(simulator, words(simulator)),
+                **_counted(*counts["right"], *counts["clean_alarms"]),
+                "false": f"{number('', false['value'])} of {int(false['cases'])}",
+            }
+        )
+    if len(rows) > 1:
+        rows.append(
+            {"released": "all", "simulator": "", **_counted(*sums["right"], *sums["clean_alarms"]), "false": ""}
+        )
+    return pd.DataFrame(rows, columns=["released", "simulator", "right", "share", "alarms", "false"])
+
+
+def _counted(right: int, hidden: int, alarms: int, clean: int) -> dict[str, str]:
+    low, high = wilson(right, hidden)
+    return {
+        "right": f"{right} of {hidden}",
+        "share": span("", low, high) if hidden else "–",
+        "alarms": f"{alarms} of {clean}",
+    }
+
+
+PLANTED = {
+    "told": "told",
+    "size covered": "covered",
+    "ids new or lost a set": "moved",
+    "values new or lost a set": "values",
+}
+"""Scores of the planted sets that the report shows, and their columns."""
+
+
+def of_plantings(now: pd.DataFrame, before: pd.DataFrame) -> pd.DataFrame:
+    """What was planted in real flights at the larger size, as text: by flight, and by family of cause.
+
+    `told`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set; `before` is what was told
+    before anything was mended.
+    """
+    rows = []
+    for group, own in now[now["size"] == "large"].groupby("group", sort=False):
+        kind, _, name = str(group).partition(" ")
+        if kind not in ("all", "flight", "family"):
+            continue
+        row = {"group": words(name) or "all", "kind": kind}
+        for what, column in PLANTED.items():
+            score = own[own["what"] == what].iloc[0]
+            share = what in ("told", "size covered")
+            row[column] = _of(score) if share else f"{score['value']:.2f}"
+        earlier = before[(before["group"] == group) & (before["what"] == "told") & (before["size"] == "large")]
+        row["before"] = _of(earlier.iloc[0]) if len(earlier) else "–"
+        rows.append(row)
+    out = pd.DataFrame(rows, columns=["group", "kind", *PLANTED.values(), "before"])
+    order = out["kind"].map({"all": 0, "flight": 1, "family": 2})
+    return out.loc[order.sort_values(kind="stable").index].drop(columns="kind")
+
+
+def _of(score: pd.Series) -> str:
+    """A share as `14 of 25`."""
+    count = int(score["count"])
+    return f"{round(score['value'] * count)} of {count}" if count else "–"
+
+
 def with_target(summary: pd.DataFrame, present: str = "") -> pd.DataFrame:
     """`what`, `measured`, `interval`, `cases`, `target`, `holds`, `by` as text, rows that have a target.
 
+    Those of releases are left to `of_releases`.
+
     `by` says whether code older than that of hash `present` judged the row, and how many of its cases were looked at.
     """
+    summary = summary[~in_a_release(summary)]
     return _shown(present, summary[summary["at_least"].notna() | summary["at_most"].notna()])
 
 
 def without_target(summary: pd.DataFrame, present: str = "") -> pd.DataFrame:
     """The same for rows without one."""
+    summary = summary[~in_a_release(summary)]
     return _shown(present, summary[summary["at_least"].isna() & summary["at_most"].isna()]).drop(
         columns=["target", "holds"]
     )
@@ -62,6 +166,10 @@ def provenance(row: pd.Series, present: str) -> str:
     return ", ".join(said)
 
 
+SHORT = {SIMULATORS[tuple(key.split("_")) if "_" in key else ("flight", key)]: name for key, name in DRAWN_BY.items()}
+"""The same of the names that the tables of families hold."""
+
+
 def of_families(families: pd.DataFrame) -> pd.DataFrame:
     """Drawn cases as text: a row for each family and date with something wrong, the others of a date together."""
     known = families.astype(object).fillna("")
@@ -76,6 +184,7 @@ def of_families(families: pd.DataFrame) -> pd.DataFrame:
             rows.append({"family": f"{len(right)} families, all right", **others, **sums})
     out = pd.DataFrame(rows, columns=[c for c in known.columns if c not in ("judged_by", "looked_at")]).astype(str)
     out["released"] = out["released"].replace("", "development")
+    out["simulator"] = [SHORT.get(name, name) for name in out["simulator"]]
     for column in ("family", "wrong_names", "missed"):
         out[column] = out[column].str.replace("_", " ")
     return out

@@ -47,3 +47,40 @@ def test_families_in_which_nothing_was_wrong_stand_together():
     shown = show.of_families(families)
     assert shown["family"].tolist() == ["steady wind", "2 families, all right"]
     assert shown["cases"].tolist() == ["2", "5"] and shown["missed"].tolist() == ["steady wind 1", ""]
+
+
+def release_row(key: str, value: float, cases: int) -> dict:
+    blank = {"what": key, "at_least": None, "at_most": 0.05, "low_95": 0.0, "high_95": 1.0, "holds": "not refuted"}
+    return {"id": key, "value": value, "cases": cases, "judged_by": "", "looked_at": 0, **blank}
+
+
+def test_releases_have_a_row_for_each_date_and_simulator_and_one_for_all():
+    rows = []
+    for date, right in (("2026-11-26", 0.75), ("2026-11-27", 0.5)):
+        for simulator in ("multibody", "stand_rig"):
+            rows += [
+                release_row(f"{simulator}_{date}_clean_alarms", 0.25, 4),
+                release_row(f"{simulator}_{date}_right", right, 8),
+                release_row(f"{simulator}_{date}_false", 0.1, 10),
+            ]
+    summary = pd.DataFrame([*rows, release_row("clean_alarms", 0.0, 20)])
+    shown = show.of_releases(summary)
+    assert list(shown["simulator"]) == ["flights (multibody)", "stands", "flights (multibody)", "stands", ""]
+    assert list(shown["right"]) == ["6 of 8", "6 of 8", "4 of 8", "4 of 8", "20 of 32"]
+    assert shown.iloc[-1]["alarms"] == "4 of 16"
+    assert shown.iloc[-1]["share"] == "45.3 to 77.1 %".replace(" ", "\u00a0")
+    # Elsewhere they do not stand a second time.
+    assert list(show.with_target(summary)["what"]) == ["clean_alarms"]
+
+
+def test_plantings_are_counted_by_flight_and_family_beside_what_was_told_before():
+    def scores(group: str, told: float, count: int) -> list[dict]:
+        values = {"told": told, "size covered": 0.5, "ids new or lost a set": 0.68, "values new or lost a set": 0.0}
+        return [{"group": group, "what": w, "size": "large", "value": v, "count": count} for w, v in values.items()]
+
+    now = pd.DataFrame([*scores("family air", 1.0, 2), *scores("all", 0.56, 25), *scores("kind mass", 0.0, 2)])
+    shown = show.of_plantings(now, pd.DataFrame(scores("all", 0.5, 24)))
+    assert list(shown["group"]) == ["all", "air"]
+    assert list(shown["told"]) == ["14 of 25", "2 of 2"]
+    assert list(shown["before"]) == ["12 of 24", "–"]
+    assert shown.iloc[0]["moved"] == "0.68"
