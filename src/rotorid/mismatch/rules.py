@@ -143,6 +143,9 @@ CANCELS = rule(
 
 SIMPLER = rule("simpler", "A model with one id less and other forms of the rest is taken where it explains as much.")
 EXCHANGE = rule("exchange", "An id gives way to another that explains more in its place.")
+VALUES_FIRST = rule(
+    "values_first", "Believed values alone are taken where with more room they explain as much as effects."
+)
 FREE_VALUES = rule("free_values", "An effect is significant beside believed values that are free.")
 COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters where no plainer one is left to.")
 

@@ -267,6 +267,21 @@ class Search:
             None,
         )
 
+    def values_alone(self, selection: Selection) -> Regression | None:
+        """The regression with more room for believed values, where those alone explain as much as a selection does.
+
+        A value that is off by many times its trust is held back in the search, and something else takes up the rest.
+        """
+        reg, fit = self.regression, selection.fit
+        limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
+        moved = [abs(float(fit.beta[fit.columns == reg.start[t.key]][0])) for t in reg.terms if t.kind == "value"]
+        held = sum(m > NEAR_LIMIT * most for m, most in zip(moved, limits, strict=True))
+        if not held or not selection.active:
+            return None
+        wide = reg.with_room(VALUE_LIMITS[1])
+        enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
+        return wide if rules.VALUES_FIRST(enough) else None
+
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 

@@ -20,6 +20,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import Prepared, assemble_rows, form_terms, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
+    VALUE_LIMITS,
     Fit,
     Regression,
     autoregression,
@@ -260,6 +261,10 @@ def searched(
     ask = Questions(sizes_of, seconds.sizes, known)
     search = Search(regression.without_winds(), ask)
     selection = search.run(start)
+    if (wide := search.values_alone(selection)) is not None:
+        regression = regression.with_room(VALUE_LIMITS[1])
+        search = Search(wide, ask)
+        selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 
 

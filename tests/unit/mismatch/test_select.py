@@ -9,7 +9,7 @@ import numpy as np
 from rotorid.effects.contract import Form, Parameter
 from rotorid.mismatch.regression import autoregression, build
 from rotorid.mismatch.rows import Term
-from rotorid.mismatch.select import Questions, Search
+from rotorid.mismatch.select import Questions, Search, Selection
 
 from .synthetic import coloured
 from .test_regression import RATE_HZ, rows_of
@@ -194,9 +194,18 @@ def test_a_value_far_beyond_its_trust_is_not_taken_up_by_an_effect_that_looks_li
     assert found.not_established["unequal_rotors"].rule == "free_values"
 
 
-def test_an_effect_that_is_there_is_kept_beside_free_values():
-    assert imitated_value(0.2, 0.2).run().active == ["unequal_rotors/form"]
-    assert imitated_value(0.02, 0.2).run().active == ["unequal_rotors/form"]
+def test_values_alone_are_taken_where_with_room_they_explain_as_much():
+    search = imitated_value(0.3, 0.0)
+    keys = [*search.always, "unequal_rotors/form"]
+    wide = search.values_alone(Selection(["unequal_rotors/form"], search.regression.fit(keys)))
+    assert abs(wide.fit(search.always).beta[0] - 0.3) < 0.01
+
+
+def test_beside_an_effect_that_is_there_a_value_has_no_more_room():
+    for change in (0.2, 0.02):  # held at its limit, and not
+        search = imitated_value(change, 0.2)
+        found = search.run()
+        assert found.active == ["unequal_rotors/form"] and search.values_alone(found) is None
 
 
 def test_a_term_that_turns_a_value_from_one_side_of_its_belief_to_the_other_strains_it():
