@@ -27,7 +27,7 @@ COST_OF_UNKNOWN = 40.0
 """Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
 SHARE_OF_UNKNOWN = 0.1
 ALTERNATIVE_P = 0.01
-"""A term that beside an alternative, or beside free believed values, is less significant could be that instead."""
+"""A term that beside an alternative is less significant than this could be that alternative instead."""
 INSTEAD_P = 1e-3
 """It must itself be as significant as this in the other's place."""
 MOST_EXTRA_PARAMETERS = 3
@@ -405,7 +405,7 @@ class Search:
         fit = wide.fit(self.always + active, jackknife=True, loose=values)
         p_values = {k: wide.wald(fit, wide.columns([k]), self.blocks) for k in active if not self.terms[k].run}
         least = max(p_values, key=p_values.get, default=None)
-        return least if least is not None and p_values[least] > ALTERNATIVE_P else None
+        return least if least is not None and p_values[least] > KEEP_P else None
 
     def cancelling(self, active: list[str]) -> str | None:
         """The term of least worth that in its strongest channel is cancelled by another.
