@@ -8,7 +8,7 @@ import re
 import pandas as pd
 
 from rotorid.proof.intervals import wilson
-from rotorid.proof.table import SIMULATORS
+from rotorid.proof.table import SIMULATORS, row_prefix
 
 RATIOS = ("location_f1", "oracle")
 """Rows whose value is no share."""
@@ -20,17 +20,8 @@ METHODS = {
     "boosting": "gradient boosting",
     "sample_split": "sample-split F-test",
 }
-
-
 RELEASE_ROW = re.compile(r"(?P<simulator>\w+)_(?P<date>\d{4}-\d\d-\d\d)_(?P<score>right|clean_alarms|false)")
 """Id of a release's row."""
-DRAWN_BY = {
-    "multibody": "flights (multibody)",
-    "continuous": "flights (equations)",
-    "stand_rig": "stands",
-    "bench_rig": "benches",
-}
-"""Simulators of the release proof, short."""
 
 
 def in_a_release(summary: pd.DataFrame) -> pd.Series:
@@ -44,40 +35,55 @@ def of_releases(summary: pd.DataFrame) -> pd.DataFrame:
     `right` counts the sets in which all that is hidden was told and nothing else, with the 95 % interval of their share
     (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
     """
+    short = {row_prefix(*key): simulator.short for key, simulator in SIMULATORS.items()}
     groups: dict[tuple[str, str], dict[str, pd.Series]] = {}
     for _, row in summary.iterrows():
         if found := RELEASE_ROW.fullmatch(row["id"]):
             groups.setdefault((found["date"], found["simulator"]), {})[found["score"]] = row
-    rows, sums = [], {"right": [0, 0], "clean_alarms": [0, 0]}
-    for (date, simulator), scores in groups.items():
-        counts = {}
-        for score, total in sums.items():
-            of = int(scores[score]["cases"])
-            counts[score] = round(float(scores[score]["value"]) * of) if of else 0, of
-            sums[score] = [a + b for a, b in zip(total, counts[score], strict=True)]
-        false = scores["false"]
+    rows = [
+        {
+            "released": date,
+            "simulator": short.get(simulator, words(simulator)),
+            "right": _of(scores["right"]),
+            "share": _span_of(scores["right"]),
+            "alarms": _of(scores["clean_alarms"]),
+            "false": f"{number('', scores['false']['value'])} of {_count(scores['false'])}",
+        }
+        for (date, simulator), scores in groups.items()
+    ]
+    if len(rows) > 1:
+        right = [scores["right"] for scores in groups.values()]
+        alarms = [scores["clean_alarms"] for scores in groups.values()]
+        hits, of = sum(map(_hits, right)), sum(map(_count, right))
         rows.append(
             {
-                "released": date,
-                "simulator": DRAWN_BY.get(simulator, words(simulator)),
-                **_counted(*counts["right"], *counts["clean_alarms"]),
-                "false": f"{number('', false['value'])} of {int(false['cases'])}",
+                "released": "all",
+                "simulator": "",
+                "right": f"{hits} of {of}",
+                "share": span("", *wilson(hits, of)) if of else "–",
+                "alarms": f"{sum(map(_hits, alarms))} of {sum(map(_count, alarms))}",
+                "false": "",
             }
-        )
-    if len(rows) > 1:
-        rows.append(
-            {"released": "all", "simulator": "", **_counted(*sums["right"], *sums["clean_alarms"]), "false": ""}
         )
     return pd.DataFrame(rows, columns=["released", "simulator", "right", "share", "alarms", "false"])
 
 
-def _counted(right: int, hidden: int, alarms: int, clean: int) -> dict[str, str]:
-    low, high = wilson(right, hidden)
-    return {
-        "right": f"{right} of {hidden}",
-        "share": span("", low, high) if hidden else "–",
-        "alarms": f"{alarms} of {clean}",
-    }
+def _count(score: pd.Series) -> int:
+    """Cases behind a share; of plantings the column is `count`."""
+    return int(score["count"] if "count" in score else score["cases"])
+
+
+def _hits(score: pd.Series) -> int:
+    return round(float(score["value"]) * _count(score)) if _count(score) else 0
+
+
+def _span_of(score: pd.Series) -> str:
+    return span("", score["low_95"], score["high_95"]) if _count(score) else "–"
+
+
+def _of(score: pd.Series) -> str:
+    """A share as `14 of 25`."""
+    return f"{_hits(score)} of {_count(score)}" if _count(score) else "–"
 
 
 PLANTED = {
@@ -93,7 +99,7 @@ def of_plantings(now: pd.DataFrame, before: pd.DataFrame) -> pd.DataFrame:
     """What was planted in real flights at the larger size, as text: by flight, and by family of cause.
 
     `told`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set; `before` is what was told
-    before anything was mended.
+    before anything was mended. Below the row of all stand their targets and whether these hold.
     """
     rows = []
     for group, own in now[now["size"] == "large"].groupby("group", sort=False):
@@ -108,15 +114,19 @@ def of_plantings(now: pd.DataFrame, before: pd.DataFrame) -> pd.DataFrame:
         earlier = before[(before["group"] == group) & (before["what"] == "told") & (before["size"] == "large")]
         row["before"] = _of(earlier.iloc[0]) if len(earlier) else "–"
         rows.append(row)
-    out = pd.DataFrame(rows, columns=["group", "kind", *PLANTED.values(), "before"])
-    order = out["kind"].map({"all": 0, "flight": 1, "family": 2})
+    whole = now[(now["size"] == "large") & (now["group"] == "all")].set_index("what")
+    for name, cell in (("target", _target_of_planting), ("verdict", lambda score: score["state"])):
+        rows.append({"group": name, "kind": name, "before": ""})
+        rows[-1].update({column: cell(whole.loc[what]) for what, column in PLANTED.items()})
+    out = pd.DataFrame(rows, columns=["group", "kind", *PLANTED.values(), "before"]).fillna("")
+    order = out["kind"].map({"all": 0, "target": 1, "verdict": 2, "flight": 3, "family": 4})
     return out.loc[order.sort_values(kind="stable").index].drop(columns="kind")
 
 
-def _of(score: pd.Series) -> str:
-    """A share as `14 of 25`."""
-    count = int(score["count"])
-    return f"{round(score['value'] * count)} of {count}" if count else "–"
+def _target_of_planting(score: pd.Series) -> str:
+    if pd.notna(score["at_least"]):
+        return f"≥ {number('', score['at_least'])}"
+    return f"≤ {score['at_most']:g}" if pd.notna(score["at_most"]) else ""
 
 
 def with_target(summary: pd.DataFrame, present: str = "") -> pd.DataFrame:
@@ -166,10 +176,6 @@ def provenance(row: pd.Series, present: str) -> str:
     return ", ".join(said)
 
 
-SHORT = {SIMULATORS[tuple(key.split("_")) if "_" in key else ("flight", key)]: name for key, name in DRAWN_BY.items()}
-"""The same of the names that the tables of families hold."""
-
-
 def of_families(families: pd.DataFrame) -> pd.DataFrame:
     """Drawn cases as text: a row for each family and date with something wrong, the others of a date together."""
     known = families.astype(object).fillna("")
@@ -184,7 +190,8 @@ def of_families(families: pd.DataFrame) -> pd.DataFrame:
             rows.append({"family": f"{len(right)} families, all right", **others, **sums})
     out = pd.DataFrame(rows, columns=[c for c in known.columns if c not in ("judged_by", "looked_at")]).astype(str)
     out["released"] = out["released"].replace("", "development")
-    out["simulator"] = [SHORT.get(name, name) for name in out["simulator"]]
+    short = {simulator.what: simulator.short for simulator in SIMULATORS.values()}
+    out["simulator"] = [short.get(name, name) for name in out["simulator"]]
     for column in ("family", "wrong_names", "missed"):
         out[column] = out[column].str.replace("_", " ")
     return out

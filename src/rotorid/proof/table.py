@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -286,26 +286,38 @@ def holds(
     return OPEN
 
 
+class Simulator(NamedTuple):
+    """What rows of drawn cases call the simulator, in full and in a narrow column."""
+
+    what: str
+    short: str
+
+
 SIMULATORS = {
-    ("flight", "multibody"): "Drawn flights, multibody engine",
-    ("flight", "continuous"): "Drawn flights, differential equations",
-    ("stand", "rig"): "Drawn stands",
-    ("bench", "rig"): "Drawn benches",
+    ("flight", "multibody"): Simulator("Drawn flights, multibody engine", "flights (multibody)"),
+    ("flight", "continuous"): Simulator("Drawn flights, differential equations", "flights (equations)"),
+    ("stand", "rig"): Simulator("Drawn stands", "stands"),
+    ("bench", "rig"): Simulator("Drawn benches", "benches"),
 }
-"""Families of cases that are drawn whole from one seed, with their own rows."""
+"""Kind and family of cases that are drawn whole from one seed, with their own rows."""
+
+
+def row_prefix(kind: str, name: str) -> str:
+    """How the ids of a simulator's rows begin: `multibody`, `stand_rig`."""
+    return name if kind == "flight" else f"{kind}_{name}"
 
 
 def drawn_rows(scores: Sequence[Score]) -> list[dict[str, Any]]:
     """Rows of the simulators whose cases are drawn, for development and for each release's date by themselves."""
     rows = []
-    for (kind, name), what in SIMULATORS.items():
+    for (kind, name), (what, _) in SIMULATORS.items():
         own = [s for s in scores if (s["kind"], s["family"]) == (kind, name)]
         for date in sorted({s["released"] for s in own}):
             part = [s for s in own if s["released"] == date]
             clean = [s for s in part if s["clean"]]
             hidden = [s for s in part if not s["clean"]]
             when = f"released {date}" if date else "development"
-            key = "_".join(x for x in (kind if kind != "flight" else "", name, date) if x)
+            key = "_".join(x for x in (row_prefix(kind, name), date) if x)
             rows += [
                 finished(f"{key}_clean_alarms", f"{what}, {when}: false alarms", None, 0.01, rate(clean, _alarmed)),
                 finished(f"{key}_right", f"{what}, {when}: all that is hidden right", None, None, rate(hidden, _right)),
@@ -324,7 +336,8 @@ def drawn_families(scores: Sequence[Score]) -> list[dict[str, Any]]:
     for s in scores:
         if (s["kind"], s["family"]) in SIMULATORS:
             rest = kind_and_rest(s["case"])[1]
-            groups.setdefault((SIMULATORS[s["kind"], s["family"]], rest.split("/")[1], s["released"]), []).append(s)
+            simulator = SIMULATORS[s["kind"], s["family"]].what
+            groups.setdefault((simulator, rest.split("/")[1], s["released"]), []).append(s)
     return [
         {
             "simulator": simulator,

@@ -76,11 +76,12 @@ def test_releases_have_a_row_for_each_date_and_simulator_and_one_for_all():
 def test_plantings_are_counted_by_flight_and_family_beside_what_was_told_before():
     def scores(group: str, told: float, count: int) -> list[dict]:
         values = {"told": told, "size covered": 0.5, "ids new or lost a set": 0.68, "values new or lost a set": 0.0}
-        return [{"group": group, "what": w, "size": "large", "value": v, "count": count} for w, v in values.items()]
+        rated = {"size": "large", "count": count, "at_least": float("nan"), "at_most": 0.1, "state": "fails"}
+        return [{"group": group, "what": w, "value": v, **rated} for w, v in values.items()]
 
     now = pd.DataFrame([*scores("family air", 1.0, 2), *scores("all", 0.56, 25), *scores("kind mass", 0.0, 2)])
     shown = show.of_plantings(now, pd.DataFrame(scores("all", 0.5, 24)))
-    assert list(shown["group"]) == ["all", "air"]
-    assert list(shown["told"]) == ["14 of 25", "2 of 2"]
-    assert list(shown["before"]) == ["12 of 24", "–"]
+    assert list(shown["group"]) == ["all", "target", "verdict", "air"]
+    assert list(shown["told"]) == ["14 of 25", "≤ 0.1", "fails", "2 of 2"]
+    assert list(shown["before"]) == ["12 of 24", "", "", "–"]
     assert shown.iloc[0]["moved"] == "0.68"
