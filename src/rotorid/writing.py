@@ -7,7 +7,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,13 +20,14 @@ _HOST = platform.node().replace(".", "_")
 
 
 @contextmanager
-def all_or_none(*paths: Path) -> Iterator[tuple[Path, ...]]:
+def all_or_none(*paths: Path, optional: Collection[Path] = ()) -> Iterator[tuple[Path, ...]]:
     """Places to write files at that take their names together when the block ends; on an exception none is left.
 
     They lie in the files' own folders (which are made), so that each takes its name in one step. No system gives
     several names in one step, so the first file vouches for the others: it goes first and comes last. A process that
     is killed, or a computer that stops, leaves either all files of one writing or no first file. What such a process
-    left behind half written is swept away by the next that writes the same files.
+    left behind half written is swept away by the next that writes the same files. One of the `optional` paths that the
+    block writes nothing at is not there afterwards.
     """
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -34,14 +35,19 @@ def all_or_none(*paths: Path) -> Iterator[tuple[Path, ...]]:
     parts = tuple(path.with_name(f".{path.name}.{_HOST}-{os.getpid()}.part") for path in paths)
     try:
         yield parts
-        for part in parts:
-            _to_disk(part)
+        written = [part.exists() or path not in optional for part, path in zip(parts, paths, strict=True)]
+        for part, there in zip(parts, written, strict=True):
+            if there:
+                _to_disk(part)
         (first_part, first), *others = zip(parts, paths, strict=True)
         if others and first.exists():
             first.unlink()
             _to_disk(first.parent)
-        for part, path in others:
-            os.replace(part, path)
+        for (part, path), there in zip(others, written[1:], strict=True):
+            if there:
+                os.replace(part, path)
+            else:
+                path.unlink(missing_ok=True)
         for folder in {path.parent for _, path in others}:
             _to_disk(folder)
         os.replace(first_part, first)

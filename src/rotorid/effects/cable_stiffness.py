@@ -116,6 +116,7 @@ EFFECT = Effect(
     sentence="a force that depends on the tilt of the mount, motors on or off",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    of_the_rig=True,
     source="catalogue B7",
     sign=(
         "positive k_F pulls towards +x as the mount pitches up and towards −y as it rolls right; positive k_M "

@@ -68,6 +68,7 @@ EFFECT = Effect(
     sentence="under load the structure gives way, so the error grows faster than the load and its direction turns",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    of_the_rig=True,
     source="thesis 2.5 and 2.8: the PLA bench",
     sign="positive k_ij: a load along +j reads further towards +i, by k_ij times its square",
     validity=(

@@ -309,6 +309,8 @@ class Effect:
     may be its form."""
     speed_forms: tuple[SpeedForm, ...] = ()
     """Forms that act between command and rotor speed."""
+    of_the_rig: bool = False
+    """Whether it is of the stand or of the room around it, and no property of the vehicle."""
     set_forms: Callable[[Vehicle], tuple[SetForm, ...]] = lambda vehicle: ()
     """Forms that spoil a recorded set."""
     form_named: Callable[[str], Form | None] = lambda name: None

@@ -55,6 +55,7 @@ EFFECT = Effect(
     sentence="after each change of load the reading rings at one fixed frequency",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    of_the_rig=True,
     source="catalogue B8",
     sign="f_n and ζ are positive; no steady reading changes, a step overshoots by exp(−π ζ/√(1 − ζ²))",
     validity=(

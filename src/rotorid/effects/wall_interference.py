@@ -107,6 +107,7 @@ EFFECT = Effect(
     sentence="thrust falls off within seconds of spinning up, or changes with the distance of a wall",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    of_the_rig=True,
     source="catalogue B12",
     sign="positive c of the recirculation takes thrust away; positive c by distance adds thrust near the wall",
     validity=(

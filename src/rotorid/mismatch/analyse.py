@@ -6,7 +6,8 @@ established, and on the believed values, 4. what is left.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,9 +18,14 @@ from rotorid.mismatch import rules, within_trust
 from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
+from rotorid.mismatch.delivery.gate import Offer, Settled, gate
+from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
+from rotorid.mismatch.delivery.reduce import chain_ids, with_only
+from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
+from rotorid.mismatch.delivery.usable import question_of
 from rotorid.mismatch.dependence import dependence
-from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.evidence import weighed, with_shares
+from rotorid.mismatch.findings import CLAIMED, Analysis, Blow, Estimate, Finding, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each, without_values
@@ -29,7 +35,7 @@ from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.payload_windows import loads, on_board
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
-from rotorid.mismatch.refitted import refitted
+from rotorid.mismatch.refitted import refitted, values_alone
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
@@ -50,8 +56,9 @@ from rotorid.mismatch.values import (
     with_values_in_question,
 )
 from rotorid.mismatch.within_trust import beyond_trust, settled
+from rotorid.mismatch.words import parameter_words
 from rotorid.mismatch.wrench import WrenchModel, linear_drag, nonlinear_intervals
-from rotorid.recordings import RecordingSet
+from rotorid.recordings import RecordingSet, Split, Vehicle
 
 UNITS = {"force": "N", "moment": "N m"}
 SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
@@ -98,10 +105,6 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         if prepared.vehicle.rotor_speed_limits_rad_s is None:
             told, scale = throttle_scale(values, model, full_speed(known.runs, prepared.vehicle))
     fit, moved = settled(model, values, model.selection.active)
-    improved = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
-    for _, full, _, _ in scale.values():
-        improved = improved.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
-    plain_fit, plain_values = refitted(model)
 
     findings = [*mistakes, *findings_of(found, prepared, fit)]
     findings = payload_or_offset(findings, {**moved, **values})
@@ -109,22 +112,64 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     findings, told = with_square_term(findings, told, model)
     if found.commanded:
         told = told_of_commands(findings, told)
-    strained = beyond_trust(model, values, model.selection.active)
-    claimed = bool(values) or any(f.status in CLAIMED for f in findings)
     findings = together(findings)
-    fly = next_flight(findings, prepared, model.noise)
+    choice = Choice(recordings, split, found, told, scale, tuple(findings), tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(found, recordings, split, unseen)
     if len(seen.rows) == len(model.rows):
         return None
-    fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
+    choice = replace(choice, findings=with_windows(findings, seen))
+    plain_fit, plain_values = refitted(model)
+    first = account(choice, seen, fit, moved, plain_fit, plain_values)
+    words = with_values_in_question(weighed(first))
+    return with_noise_held_out(as_delivered(choice, words, seen, unseen))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen on the fitted runs alone."""
+
+    recordings: RecordingSet
+    split: Split
+    found: Fitted
+    told: Values
+    """Wrong values as they are stated (by the keys of `PARAMETER_NAMES`)."""
+    scale: dict[str, tuple[float, float, float, float]]
+    """A full speed that nobody stated, by its contract name."""
+    findings: tuple[Finding, ...]
+    remarks: tuple[str, ...]
+
+    def vehicle(self, moved: Values, told: Values) -> Vehicle:
+        """The believed vehicle with values moved within their trust and wrong ones as stated."""
+        changed = changed_vehicle(self.found.prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
+        for _, full, _, _ in self.scale.values():
+            changed = changed.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
+        return changed
+
+
+def with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Finding, ...]:
+    """Findings with the windows of every run in which they act: gusts, and a payload on board for a time."""
     windows = tuple(g.window for g in seen.gusts)
     blown = ids_of("air_moves", "in windows") if seen.gusts else ()
-    findings = [replace(f, windows=windows) if f.id in blown else f for f in findings]
+    out = [replace(f, windows=windows) if f.id in blown else f for f in findings]
     if aboard := on_board(seen.segments):
-        comes_and_goes = {t.effect for t in loads(model)}
-        findings = [carried_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in findings]
+        comes_and_goes = {t.effect for t in loads(seen)}
+        out = [carried_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in out]
+    return tuple(out)
+
+
+def account(
+    choice: Choice, seen: WrenchModel, fit: Fit, moved: Values, plain_fit: Fit, plain_values: Values
+) -> Analysis:
+    """What a choice amounts to on every run, before any word is weighed.
+
+    `seen` is the model with the rows of every run, `fit` with `moved` what is delivered, `plain_fit` with
+    `plain_values` the believed vehicle with values refitted.
+    """
+    found, told, findings = choice.found, choice.told, list(choice.findings)
+    model, values, prepared = found.model, found.values, found.prepared
+    fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
     delivered = residuals_of(seen, fit)
     before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
     left = leftover(
@@ -134,20 +179,21 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         seen.noisy_segments,
         after,
         depends,
-        delivered if strained else None,
-        claimed,
+        delivered if beyond_trust(model, values, model.selection.active) else None,
+        bool(values) or any(f.status in CLAIMED for f in findings),
     )
     refitted_left = residuals_of(seen, plain_fit)
     traces = make_traces(seen, found, refitted_left, delivered)
     between = sensor_traces(seen, refitted_left, delivered)
-    analysis = Analysis(
-        recordings=recordings,
-        split=split,
+    fly = next_flight(findings, prepared, model.noise)
+    return Analysis(
+        recordings=choice.recordings,
+        split=choice.split,
         believed=prepared.vehicle,
         refitted=changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()}),
-        improved=improved,
+        improved=choice.vehicle(moved, told),
         findings=tuple(findings),
-        values={**contract_values(prepared.vehicle, told), **scale},
+        values={**contract_values(prepared.vehicle, told), **choice.scale},
         not_testable=not_testable(prepared, found.chain, findings),
         traces=traces,
         between_sensors=between,
@@ -156,6 +202,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         noise_floor=noise_floors(prepared, found),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(seen.segments, seen.prepared),
+        blows=blows_of(seen),
         unexplained_share=left.share,
         unexplained_channels=left.channels,
         unexplained_depends_on=left.depends_on,
@@ -164,11 +211,89 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         next_separates=fly.separates,
         next_sigma=fly.sigma,
         force_source=model.segments[0].force_source,
-        notes=(*remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
+        notes=(*choice.remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
         instead=instead_of(model, values),
         put_right=within_trust.in_words(moved),
     )
-    return with_noise_held_out(with_values_in_question(weighed(analysis)))
+
+
+def blows_of(seen: WrenchModel) -> tuple[Blow, ...]:
+    """The winds in which a model flies its runs."""
+    out = [Blow(g.run, "in windows", g.knots_s, g.wind_m_s) for g in seen.gusts]
+    if seen.wind is None:
+        return tuple(out)
+    for run in dict.fromkeys(s.run for s in seen.segments):
+        own = [s.motion.time_s for s in seen.segments if s.run == run]
+        span = np.array([own[0][0], own[-1][-1]])
+        out.append(Blow(run, "all the time", span, np.tile(np.asarray(seen.wind, float), (2, 1))))
+    return tuple(out)
+
+
+def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet) -> Analysis:
+    """The analysis whose model holds what is claimed and passes the gate, and nothing else.
+
+    `words` is the analysis of the whole choice with its statuses; those, and the probability of each, stay.
+    """
+    found, vehicle = choice.found, choice.found.prepared.vehicle
+    ids = {f.id for f in claimed(words.findings)}
+    suggested = {key for name in words.suggested_values for key in names_of(choice.told).get(name, ())}
+    values = {k: v for k, v in found.values.items() if k not in suggested}
+    whole = ids >= {f.id for f in words.findings if f.id in words.without} and not suggested
+    fewer = found if whole else with_only(found, ids, values)
+    model = fewer.model
+    plain = values_alone(found.model)
+
+    def told_of(settled: Settled) -> Values:
+        given = settled.offer.values
+        if settled.offer.active or not choice.told:
+            return {k: v for k, v in choice.told.items() if {"thrust", "torque"} <= set(given) or k in given}
+        return speed_for_coefficients(given, vehicle) if only_throttle(choice.recordings) else given
+
+    def vehicle_of(settled: Settled) -> Vehicle:
+        stated = restated(words.findings, model, settled)
+        inside = {model.search.terms[k].effect for k in settled.offer.active} | chain_ids(fewer)
+        kept = [f for f in claimed(stated) if f.id in inside and place_of(f) == "vehicle"]
+        return with_effects(choice.vehicle(settled.moved, told_of(settled)), kept)
+
+    question = question_of(vehicle, choice.recordings.runs)
+    gated = gate(
+        model,
+        Offer(values, tuple(model.selection.active)),
+        plain,
+        believed_residuals(fewer.prepared, model.rows, fewer.commanded),
+        lambda settled: question(vehicle_of(settled)),
+    )
+    settled = gated.settled
+    findings = restated(words.findings, model, settled)
+    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in findings)
+    if whole and gated.passes_whole:
+        last = replace(words, findings=findings, improved=choice.vehicle(settled.moved, told_of(settled)))
+    else:
+        kept = with_only(fewer, ids - set(gated.withheld), settled.offer.values)
+        last_choice = replace(choice, found=kept, told=told_of(settled), findings=findings)
+        again = replace(seen, selection=kept.model.selection) if kept.model.rows is found.model.rows else None
+        every = again or on_every_run(kept, choice.recordings, choice.split, unseen)
+        moved_plain = {**gated.refitted.moved, **gated.refitted.offer.values}
+        own = account(last_choice, every, settled.fit, settled.moved, gated.refitted.fit, moved_plain)
+        last = replace(own, findings=findings, values=words.values, suggested_values=words.suggested_values,
+                       instead=words.instead, not_testable=words.not_testable,
+                       without_values=words.without_values)  # fmt: skip
+        last = with_shares(last)
+    reasons = gated.withheld_values
+    withheld = {n: reasons[k] for n, keys in names_of(choice.told).items() for k in keys if k in reasons}
+    notes = [fell_back_note(k, why) for k, why in gated.fell_back.items()]
+    return replace(
+        last,
+        withheld_values=withheld,
+        notes=(*last.notes, *notes),
+        believed_values=value_rows(model, settled, last.improved, vehicle),
+        value_correlations=value_correlations(model, settled),
+    )
+
+
+def fell_back_note(key: str, why: str, names: Mapping[str, str] = PARAMETER_NAMES) -> str:
+    """That a value of the refitted vehicle is left as believed."""
+    return f"Refitted, the {parameter_words(names[key])[0]} stays as believed: {why}."
 
 
 def findings_of(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:

@@ -1,4 +1,4 @@
-"""From a recording set to the files of its verdict: the three of the contract, and the ledger beside them."""
+"""From a recording set to the files of its verdict: verdict, page, vehicle, conditions, instruments and ledger."""
 
 from __future__ import annotations
 
@@ -11,9 +11,20 @@ from threadpoolctl import threadpool_limits
 
 from rotorid.mismatch import rules
 from rotorid.mismatch.analyse import analyse
+from rotorid.mismatch.delivery.files import (
+    CONDITIONS,
+    INSTRUMENTS,
+    conditions_of,
+    empty,
+    instruments_of,
+    read_conditions,
+    read_instruments,
+)
+from rotorid.mismatch.delivery.files import text_of as file_text
+from rotorid.mismatch.delivery.model import model_of
+from rotorid.mismatch.delivery.parts import improved_vehicle
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.forward import Forward, forward_channels, prove
-from rotorid.mismatch.improve import improved_vehicle
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.predict import prove as prove_reading
 from rotorid.mismatch.ledger import ledger, text_of
@@ -94,21 +105,34 @@ def write_files(
     improved_path: Path,
     progress: Callable[[str], None] = LOG.info,
 ) -> Verdict:
-    """Write what an analysis amounts to; the improved vehicle is read back and simulated as proof."""
+    """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
+
+    `conditions.yaml` and `instruments.yaml` stand beside the improved vehicle where there is something to write.
+    """
     progress("locating")
     locations = locate(analysis)
     improved = improved_vehicle(analysis)
-    ledger_path = verdict_path.with_name("ledger.json")
-    with all_or_none(verdict_path, page_path, improved_path, ledger_path) as parts:
-        verdict_part, page_part, improved_part, ledger_part = parts
+    others = [improved_path.with_name(name) for name in (CONDITIONS, INSTRUMENTS)]
+    paths = (verdict_path, page_path, improved_path, verdict_path.with_name("ledger.json"), *others)
+    with all_or_none(*paths, optional=others) as parts:
+        verdict_part, page_part, improved_part, ledger_part, *other_parts = parts
         write_vehicle(improved, improved_part)
+        contents = conditions_of(analysis), instruments_of(analysis)
+        for content, part in zip(contents, other_parts, strict=True):
+            if not empty(content):
+                part.write_text(file_text(content), encoding="utf-8")
+        conditions, instruments = (
+            read(part) if part.exists() else content
+            for read, part, content in zip((read_conditions, read_instruments), other_parts, contents, strict=True)
+        )
+        reloaded = read_vehicle(improved_part)
         if analysis.instrument is None:
             progress("running the simulation forward")
             forward = forward_channels(analysis)
-            prove(analysis, read_vehicle(improved_part), forward)
+            prove(analysis, model_of(reloaded, conditions, instruments), forward)
         else:
             forward = Forward({})
-            prove_reading(analysis, improved, read_vehicle(improved_part))
+            prove_reading(analysis, improved, reloaded, instruments)
         verdict = with_runs_left_out(make_verdict(analysis, locations, forward.channels), analysis)
         verdict_part.write_text(verdict.text(), encoding="utf-8")
         decided = ledger(analysis, verdict)

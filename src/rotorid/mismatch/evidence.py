@@ -109,6 +109,12 @@ def weighed(analysis: Analysis) -> Analysis:
     return replace(analysis, findings=findings, shares=shares, values=values, suggested_values=doubtful)
 
 
+def with_shares(analysis: Analysis) -> Analysis:
+    """The analysis with what each effect carries of the error that goes; no word changes."""
+    part = fitted_part(analysis)
+    return replace(analysis, shares=effect_shares(analysis, [part(t.run, t.time_s) < 0 for t in analysis.compared]))
+
+
 def effect_shares(analysis: Analysis, held: list[np.ndarray]) -> dict[str, float]:
     """To every stated effect the part of what goes from before to after on the runs held out that goes without it.
 

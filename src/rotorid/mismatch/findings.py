@@ -67,6 +67,40 @@ class Finding:
     """Of a `suggested` one: why it is not established."""
     windows: tuple[tuple[str, float, float], ...] = ()
     """(run, start_s, stop_s) where it acts, for effects in part of the flight; empty for always."""
+    withheld: str = ""
+    """Of one that is claimed: why the gate keeps it out of the files; empty where it is delivered."""
+
+    @property
+    def delivered(self) -> bool:
+        """Whether it may stand in one of the files."""
+        return self.status in CLAIMED and not self.withheld
+
+
+@dataclass(frozen=True)
+class Blow:
+    """Wind of a run: straight lines between instants, still air outside of them."""
+
+    run: str
+    kind: Literal["all the time", "in windows"]
+    time_s: np.ndarray
+    """(k,)."""
+    wind_m_s: np.ndarray
+    """North and east, (k, 2)."""
+
+
+@dataclass(frozen=True)
+class ValueRow:
+    """A believed value before and after, with all values free within their trust beside the delivered effects."""
+
+    name: str
+    """By its contract name."""
+    believed: float
+    estimate: float
+    low: float
+    high: float
+    """95 % interval of the estimate; the trust is part of it."""
+    delivered: float
+    """What stands in the improved vehicle."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +139,8 @@ class Analysis:
     """Channel to p-value that the residual does not depend on the inputs, before and after."""
     regimes: dict[str, dict[str, np.ndarray]]
     """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
+    blows: tuple[Blow, ...] = ()
+    """Winds that the model flies in, by run."""
     between_sensors: tuple[Trace, ...] = ()
     """Two sensors of one quantity compared (`accelerometer_x` … `gyroscope_z`): effects are judged by them, too."""
     without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
@@ -137,7 +173,13 @@ class Analysis:
     fired: Mapping[str, int] = field(default_factory=dict)
     """How often each rule's condition held during the analysis (`rules`)."""
     put_right: tuple[str, ...] = ()
-    """Values put right within what was believed of them, in words: `thrust coefficient −0.7 %`."""
+    """Values corrected within their trust, in words: `thrust coefficient −0.7 %`."""
+    withheld_values: Mapping[str, str] = field(default_factory=dict)
+    """Wrong value (by its contract name) that the gate keeps out of the vehicle, to the reason."""
+    believed_values: tuple[ValueRow, ...] = ()
+    """Every believed value before and after, as an identification report has them."""
+    value_correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    """Correlation of the estimates of two values of which little more than a ratio is known."""
 
     @property
     def compared(self) -> tuple[Trace, ...]:

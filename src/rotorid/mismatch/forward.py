@@ -15,10 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rotorid.effects.contract import Contribution, Form, Motion
+from rotorid.effects.contract import Contribution, Form, Motion, not_testable_reason
 from rotorid.errors import InputError
+from rotorid.mismatch.delivery.files import conditions_of, instruments_of
+from rotorid.mismatch.delivery.model import Model, model_of
+from rotorid.mismatch.delivery.parts import improved_vehicle
 from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.improve import Model, improved_vehicle, model_of
 from rotorid.mismatch.motion import Segment, SensorNoise
 from rotorid.mismatch.prepare import sensor_noise
 from rotorid.mismatch.shares import fitted_part, segments_of
@@ -64,7 +66,7 @@ def forward_channels(analysis: Analysis) -> Forward:
     models = {
         "before": Model(analysis.believed),
         "refitted": Model(analysis.refitted),
-        "after": model_of(improved_vehicle(analysis)),
+        "after": delivered_model(analysis),
     }
     errors: dict[str, list[WindowErrors]] = {}
     for stage, model in models.items():
@@ -94,13 +96,17 @@ def forward_channels(analysis: Analysis) -> Forward:
     return Forward(channels, tuple(notes))
 
 
-def prove(analysis: Analysis, reloaded: Vehicle, forward: Forward) -> None:
-    """Simulate a vehicle read back from its file; RuntimeError unless it makes the errors stated as `after`."""
+def delivered_model(analysis: Analysis) -> Model:
+    """The improved vehicle in the conditions of its runs, read by the instruments as they were found."""
+    return model_of(improved_vehicle(analysis), conditions_of(analysis), instruments_of(analysis))
+
+
+def prove(analysis: Analysis, reloaded: Model, forward: Forward) -> None:
+    """Simulate a model read back from its files; RuntimeError unless it makes the errors stated as `after`."""
     segments, _ = _segments(analysis)
     if not forward.channels or not segments or any("leaves out" in note for note in forward.notes):
-        model_of(reloaded)
         return
-    errors, part = errors_of(segments, model_of(reloaded)), fitted_part(analysis)
+    errors, part = errors_of(segments, reloaded), fitted_part(analysis)
     for name, channel in forward.channels.items():
         for sign, stated in ((1, channel.rmse.training.after), (-1, channel.rmse.held_out.after)):
             found = _rms(errors, name, part, sign)
@@ -156,21 +162,35 @@ def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], 
             values = np.asarray(model.chain_values)
             speed = commanded_path(segment, model.chain, values, 0.0, full_speed, max(voltages, default=None))
             acceleration = np.gradient(speed, motion.time_s, axis=0)
+        wind = model.conditions.wind(segment.run, motion.time_s) if model.conditions else None
         slow = [pair for pair in model.forms if remembers(pair[0], pair[1], motion, model.vehicle)]
-        force, moment = _past_wrench(slow, replace(motion, rotor_speed=speed), model.vehicle)
-        inputs.append(Inputs(speed, acceleration, motion.height, motion.voltage, None, force, moment))
-        states.append(_states(segment))
+        turning = replace(motion, rotor_speed=speed, wind=wind)
+        force, moment = _past_wrench(slow, [turning] * len(slow), model.vehicle)
+        aboard = [
+            replace(turning, carried=model.conditions.present(condition, segment.run, motion.time_s))
+            for condition, _, _ in model.loads
+        ]
+        carried = _past_wrench([pair for _, *pair in model.loads], aboard, model.vehicle)
+        force, moment = _added(force, carried[0]), _added(moment, carried[1])
+        inputs.append(Inputs(speed, acceleration, motion.height, motion.voltage, wind, force, moment))
+        states.append(_states(segment, model))
     return inputs, states
 
 
-def _states(segment: Segment) -> States:
+def _states(segment: Segment, model: Model) -> States:
+    """Recorded states, less the errors of the sensors that the model knows of."""
     motion = segment.motion
+    rates = motion.angular_velocity
+    for form, values in model.readings:
+        if not not_testable_reason(form, motion, model.vehicle):
+            error = form.contribution(motion, model.vehicle, values).angular_velocity
+            rates = rates if error is None or rates is None else rates - error
     quaternion = velocity = None
     if motion.rotation is not None:
         quaternion = Rotation.from_matrix(motion.rotation).as_quat(scalar_first=True)
         if motion.velocity is not None:
             velocity = np.einsum("nij,nj->ni", motion.rotation, motion.velocity)
-    return States(motion.angular_velocity, quaternion, velocity, motion.position)
+    return States(rates, quaternion, velocity, motion.position)
 
 
 def remembers(form: Form, values: np.ndarray, motion: Motion, vehicle: Vehicle) -> bool:
@@ -185,10 +205,12 @@ def remembers(form: Form, values: np.ndarray, motion: Motion, vehicle: Vehicle) 
     )
 
 
-def _past_wrench(slow, motion: Motion, vehicle: Vehicle) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Wrench of forms that look at the past, along the recorded flight."""
+def _past_wrench(
+    forms: Sequence[tuple[Form, np.ndarray]], motions: Sequence[Motion], vehicle: Vehicle
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Wrench of forms along the recorded flight, each with a motion of its own: (n, 3) N and N m, None for nothing."""
     total = Contribution()
-    for form, values in slow:
+    for (form, values), motion in zip(forms, motions, strict=True):
         part = form.contribution(motion, vehicle, values)
         total = Contribution(_added(total.force, part.force), _added(total.moment, part.moment))
     return total.force, total.moment

@@ -17,9 +17,9 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.delivery.parts import form_of
 from rotorid.mismatch.findings import Analysis, Finding
 from rotorid.mismatch.headline import errors_of, headline, tiles
-from rotorid.mismatch.improve import form_of
 from rotorid.mismatch.verdict import (
     Channel,
     EffectVerdict,

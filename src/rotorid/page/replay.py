@@ -9,8 +9,8 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.mismatch import forward
+from rotorid.mismatch.delivery.model import Model
 from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.improve import Model, improved_vehicle, model_of
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.verdict import Verdict
 from rotorid.vehicle.windows import Windows
@@ -47,7 +47,7 @@ def replay(analysis: Analysis, verdict: Verdict, run: str, segments: Sequence[Se
         else np.clip(centre - LONGEST_S / 2, time_s[0], max(time_s[-1] - LONGEST_S, time_s[0]))
     )
     out: dict[str, np.ndarray] = {}
-    for stage, model in (("before", Model(analysis.believed)), ("after", model_of(improved_vehicle(analysis)))):
+    for stage, model in (("before", Model(analysis.believed)), ("after", forward.delivered_model(analysis))):
         found = _windows(usable, at, model)
         if found is None:
             return None

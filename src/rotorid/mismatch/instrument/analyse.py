@@ -6,8 +6,8 @@ on the load or on its reading, with the believed values free, 4. nonlinear param
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -17,10 +17,13 @@ from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS
 from rotorid.mismatch import rules
 from rotorid.mismatch.absorbed import absorbed_findings
-from rotorid.mismatch.analyse import throttle_or_thrust
+from rotorid.mismatch.analyse import fell_back_note, throttle_or_thrust
 from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.delivered import Values, residuals_of
-from rotorid.mismatch.evidence import weighed
+from rotorid.mismatch.delivery.gate import Offer, gate
+from rotorid.mismatch.delivery.parts import claimed
+from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
+from rotorid.mismatch.evidence import weighed, with_shares
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
 from rotorid.mismatch.instrument.chain import (
@@ -46,6 +49,7 @@ from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import changed_vehicle, contract_values, names_of, told_of_commands
 from rotorid.mismatch.within_trust import in_words, settled
 from rotorid.recordings import RecordingSet, Vehicle
@@ -134,16 +138,58 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     plain = values_of(Selection([], model.selection.fit))
     findings += absorbed_findings(model, values, findings)
     fit, moved_values = settled(model, values, model.selection.active)
-    refitted, moved_plain = settled(model, plain, [])
     told = values if measured else told_of_commands(findings, values)
-    next_step, separates, sigma = next_experiment(findings, model)
+    choice = Choice(setup, model, chain, measured, values, told, tuple(findings), leftovers, reasons, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(model, chain, unseen)
+    refitted, moved_plain = settled(model, plain, [])
+    first = account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
+    return as_delivered(choice, weighed(first), seen, plain)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen on the fitted runs alone."""
+
+    setup: Setup
+    model: ReadingModel
+    chain: ChainResult | None
+    measured: bool
+    values: Values
+    told: Values
+    """Wrong values as they are stated."""
+    findings: tuple[Finding, ...]
+    leftovers: Sequence
+    reasons: Mapping[str, str]
+    remarks: tuple[str, ...]
+
+    def vehicle(self, changed: Values) -> Vehicle:
+        """The believed vehicle with values changed, and with a full speed that nobody stated."""
+        return with_full_speed(improved(self.setup.vehicle, changed), self.setup, self.chain)
+
+
+def account(
+    choice: Choice,
+    recordings: RecordingSet,
+    seen: ReadingModel,
+    fit: Fit,
+    moved_values: Values,
+    refitted: Fit,
+    plain: Values,
+) -> Analysis:
+    """What a choice amounts to on every run, before any word is weighed.
+
+    `seen` is the model with the rows of every run, `fit` with `moved_values` what is delivered, `refitted` with `plain`
+    the believed values fitted anew.
+    """
+    setup, model, chain, findings = choice.setup, choice.model, choice.chain, choice.findings
+    next_step, separates, sigma = next_experiment(list(findings), model)
     traces, before, after = make_traces(seen, refitted, fit)
     p_before, p_after, depends = dependence(seen, before, after)
-    share, channels, description = leftover(seen, before, after, p_after, depends, approximate_forms(model, leftovers))
-    if chain is not None and measured:
+    approximate = approximate_forms(model, choice.leftovers)
+    share, channels, description = leftover(seen, before, after, p_after, depends, approximate)
+    if chain is not None and choice.measured:
         traces += speed_traces(seen.setup, chain)
         lost = speed_left(seen.setup, chain, traces)
         if lost > LOST_SHARE:
@@ -154,16 +200,17 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
             )
             depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
             description = "; ".join([*([description] if description else []), SPEED_LEFT])
-    claimed = {f.id for f in findings if f.status in CLAIMED}
-    analysis = Analysis(
+    claimed_ids = {f.id for f in findings if f.status in CLAIMED}
+    own_chain = chain if choice.measured else None
+    return Analysis(
         recordings=recordings,
         split=setup.split,
         believed=setup.vehicle,
-        refitted=improved(setup.vehicle, {**moved_plain, **plain}),
-        improved=with_full_speed(improved(setup.vehicle, {**moved_values, **values}), setup, chain),
-        findings=tuple(findings),
-        values=contract_values(setup.vehicle, told, VALUE_NAMES) | full_speed_value(setup, chain),
-        not_testable={k: v for k, v in reasons.items() if k not in claimed},
+        refitted=improved(setup.vehicle, plain),
+        improved=choice.vehicle({**moved_values, **choice.values}),
+        findings=findings,
+        values=contract_values(setup.vehicle, choice.told, VALUE_NAMES) | full_speed_value(setup, chain),
+        not_testable={k: v for k, v in choice.reasons.items() if k not in claimed_ids},
         traces=traces,
         noise_floor=noise_floors(setup, model, chain),
         p_values={c: (p_before[c], p_after[c]) for c in p_before},
@@ -179,12 +226,65 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         samples_per_row=setup.average,
         instrument=setup.instrument,
         loadings=seen.loadings,
-        notes=(*remarks, *notes_of(setup)),
+        notes=(*choice.remarks, *notes_of(setup)),
         put_right=in_words(moved_values, VALUE_NAMES),
-        without=without_each(model, seen, values, chain if measured else None, findings, traces),
-        without_values=without_values(model, seen, values, moved_values, names_of(told, VALUE_NAMES), traces),
+        without=without_each(model, seen, choice.values, own_chain, list(findings), traces),
+        without_values=without_values(
+            model, seen, choice.values, moved_values, names_of(choice.told, VALUE_NAMES), traces
+        ),
     )
-    return weighed(analysis)
+
+
+def as_delivered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values) -> Analysis:
+    """The analysis whose model holds what is claimed and passes the gate, and nothing else; its statuses stay."""
+    model, names = choice.model, names_of(choice.told, VALUE_NAMES)
+    ids = {f.id for f in claimed(words.findings)}
+    suggested = {key for name in words.suggested_values for key in names.get(name, ())}
+    values = {k: v for k, v in choice.values.items() if k not in suggested}
+    active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
+    fewer = with_terms(model, active)
+    gated = gate(fewer, Offer(values, tuple(active)), plain, [np.nan_to_num(r.y) for r in model.rows])
+    final = gated.settled
+    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in restated(words.findings, fewer, final))
+    whole = len(active) == len(model.selection.active) and not suggested and gated.passes_whole
+    gone = [] if choice.chain is None else [k for k, _ in choice.chain.fit.chain if k not in ids]
+    vehicle = choice.vehicle({**final.moved, **final.offer.values})
+    if whole and not (gone and choice.measured):
+        last = replace(words, findings=findings, improved=vehicle)
+    else:
+        kept = with_terms(fewer, list(final.offer.active))
+        chain = choice.chain
+        for key in gone if choice.measured else ():
+            chain = without_id(choice.setup, chain, key)
+        told = {k: v for k, v in choice.told.items() if k in final.offer.values}
+        own = replace(choice, model=kept, chain=chain, values=final.offer.values, told=told, findings=findings)
+        every = replace(seen, selection=kept.selection)
+        changed = {**gated.refitted.moved, **gated.refitted.offer.values}
+        last = account(own, words.recordings, every, final.fit, final.moved, gated.refitted.fit, changed)
+        last = replace(
+            last,
+            findings=findings,
+            values=words.values,
+            suggested_values=words.suggested_values,
+            not_testable=words.not_testable,
+            without_values=words.without_values,
+        )
+        last = with_shares(last)
+    reasons = gated.withheld_values
+    return replace(
+        last,
+        withheld_values={n: reasons[k] for n, keys in names.items() for k in keys if k in reasons},
+        notes=(*last.notes, *(fell_back_note(k, why, VALUE_NAMES) for k, why in gated.fell_back.items())),
+        believed_values=value_rows(fewer, final, last.improved, choice.setup.vehicle, VALUE_NAMES),
+        value_correlations=value_correlations(fewer, final, VALUE_NAMES),
+    )
+
+
+def with_terms(model: ReadingModel, active: Sequence[str]) -> ReadingModel:
+    """A model with some of its terms alone at work, fitted anew."""
+    always = [t.key for t in model.regression.terms if t.kind != "effect"]
+    fit = model.regression.fit([*always, *active], jackknife=True)
+    return replace(model, selection=replace(model.selection, active=list(active), fit=fit))
 
 
 def without_each(

@@ -10,6 +10,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
 from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.errors import InputError
+from rotorid.mismatch.delivery.files import Instruments, instruments_of
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.instrument.setup import full_voltage_of, loaded_by, with_speed
@@ -47,10 +48,16 @@ def entries(vehicle: Vehicle, instrument: Instrument) -> tuple[list[tuple[Form, 
 
 
 def predicted(
-    vehicle: Vehicle, instrument: Instrument, loading: Loading, full_voltage: float | None = None
+    vehicle: Vehicle,
+    instrument: Instrument,
+    loading: Loading,
+    full_voltage: float | None = None,
+    errors: Instruments | None = None,
 ) -> np.ndarray:
-    """Reading that the vehicle with its effects predicts for a stretch, (n, 6)."""
-    forms, chain = entries(vehicle, replace(instrument, vehicle=vehicle))
+    """Reading that the vehicle with its effects predicts for a stretch by an instrument with its errors, (n, 6)."""
+    of_reading = [e.model_dump(include={"id", "form", "parameters"}) for e in (errors.instruments if errors else ())]
+    both = vehicle.model_copy(update={"effects": (*vehicle.effects, *(e for e in of_reading if e["form"]))})
+    forms, chain = entries(both, replace(instrument, vehicle=vehicle))
     if not loading.measured and loading.command is not None:
         speed = loading.command
         if chain:
@@ -73,12 +80,13 @@ def is_chain(entry: dict) -> bool:
     return effect is not None and any(f.name == entry.get("form") for f in effect.speed_forms)
 
 
-def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle) -> None:
-    """RuntimeError unless a vehicle read back predicts the readings that the model predicts."""
+def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle, errors: Instruments) -> None:
+    """RuntimeError unless vehicle and instruments read back predict the readings that the model predicts."""
+    ours_of = instruments_of(analysis)
     volts = full_voltage_of(analysis.loadings)
     for loading in analysis.loadings:
-        ours = predicted(written, analysis.instrument, loading, volts)
-        theirs = predicted(reloaded, analysis.instrument, loading, volts)
+        ours = predicted(written, analysis.instrument, loading, volts, ours_of)
+        theirs = predicted(reloaded, analysis.instrument, loading, volts, errors)
         scale = max(float(np.abs(ours).max()), 1e-12)
         if not np.allclose(ours, theirs, rtol=0, atol=SAME * scale):
             raise RuntimeError(f"improved_vehicle.yaml read back predicts another reading in {loading.run}")

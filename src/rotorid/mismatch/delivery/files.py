@@ -1,0 +1,184 @@
+"""`conditions.yaml` and `instruments.yaml`: what was found in a recording and is no property of the vehicle.
+
+Wind, gusts and a payload for a time belong to a run and to its instants; errors of sensors, clocks and stamps belong to
+the instruments. The vehicle has a file of its own, which the simulator runs. All three are read back before they are
+delivered, and the simulation run forward uses each where it belongs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.errors import InputError
+from rotorid.mismatch.delivery.parts import delivered, form_of
+from rotorid.mismatch.findings import Analysis, Blow, Finding
+from rotorid.writing import rounded
+
+CONDITIONS, INSTRUMENTS = "conditions.yaml", "instruments.yaml"
+ABOUT = {
+    CONDITIONS: "Found in these recordings, no property of the vehicle: when the air moved, when a payload was aboard.",
+    INSTRUMENTS: "Errors of sensors, clocks and stamps found in these recordings; no property of the vehicle.",
+}
+
+
+class Entry(BaseModel):
+    """One finding as a file has it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    id: str
+    form: str = ""
+    """Of the catalogue; empty where the parameters themselves describe it."""
+    equation: str = ""
+    sentence: str = ""
+    one_of: tuple[str, ...] = ()
+    """Of a class that the data leave open: its members, the id that stands for them first."""
+    parameters: dict[str, float] = Field(default_factory=dict)
+    """Symbol to value, SI units as the catalogue has them."""
+    interval_95: dict[str, tuple[float, float]] = Field(default_factory=dict)
+
+
+class Air(BaseModel):
+    """Wind of a run, straight lines between instants; outside of the condition's own the air is still."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    time_s: tuple[float, ...]
+    north_m_s: tuple[float, ...]
+    east_m_s: tuple[float, ...]
+
+
+class Condition(Entry):
+    """A finding that holds in one run, from an instant to another."""
+
+    run: str
+    start_s: float | None = None
+    """None from the run's beginning."""
+    stop_s: float | None = None
+    air: Air | None = None
+
+
+class Conditions(BaseModel):
+    """The whole of `conditions.yaml`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    set: str
+    conditions: tuple[Condition, ...] = ()
+
+    def wind(self, run: str, time_s: np.ndarray) -> np.ndarray | None:
+        """Velocity of the air over ground at instants (n,) of a run, (n, 3), m/s, world axes; None for still air."""
+        blowing = [c for c in self.conditions if c.run == run and c.air is not None]
+        if not blowing:
+            return None
+        wind = np.zeros((len(time_s), 3))
+        for condition in blowing:
+            air = condition.air
+            for axis, values in enumerate((air.north_m_s, air.east_m_s)):
+                before = values[0] if condition.start_s is None else 0.0
+                after = values[-1] if condition.stop_s is None else 0.0
+                wind[:, axis] += np.interp(time_s, air.time_s, values, left=before, right=after)
+        return wind
+
+    def present(self, condition: Condition, run: str, time_s: np.ndarray) -> np.ndarray:
+        """Whether a condition holds at instants (n,) of a run, (n,) 0 or 1."""
+        start = -np.inf if condition.start_s is None else condition.start_s
+        stop = np.inf if condition.stop_s is None else condition.stop_s
+        return ((condition.run == run) & (time_s >= start) & (time_s <= stop)).astype(float)
+
+
+class Instruments(BaseModel):
+    """The whole of `instruments.yaml`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    set: str
+    instruments: tuple[Entry, ...] = ()
+
+
+def conditions_of(analysis: Analysis) -> Conditions:
+    """What an analysis found of the conditions of each run."""
+    found: list[Condition] = []
+    for finding in delivered(analysis, "conditions"):
+        own = _entry(finding).model_dump()
+        if catalogue()[finding.id].air_moves:
+            kind = catalogue()[finding.id].air_moves
+            found += [Condition(**own, run=b.run, **_span(b), air=_air(b)) for b in analysis.blows if b.kind == kind]
+        else:
+            found += [Condition(**own, run=r, start_s=_known(a), stop_s=_known(b)) for r, a, b in finding.windows]
+    return Conditions(set=analysis.recordings.name, conditions=tuple(found))
+
+
+def instruments_of(analysis: Analysis) -> Instruments:
+    """What an analysis found of the instruments."""
+    entries = tuple(_entry(f) for f in delivered(analysis, "instruments"))
+    return Instruments(set=analysis.recordings.name, instruments=entries)
+
+
+def _span(blow: Blow) -> dict[str, float | None]:
+    always = blow.kind == "all the time"
+    return {"start_s": None if always else float(blow.time_s[0]), "stop_s": None if always else float(blow.time_s[-1])}
+
+
+def _air(blow: Blow) -> Air:
+    return Air(time_s=tuple(blow.time_s), north_m_s=tuple(blow.wind_m_s[:, 0]), east_m_s=tuple(blow.wind_m_s[:, 1]))
+
+
+def _known(instant: float) -> float | None:
+    return float(instant) if np.isfinite(instant) else None
+
+
+def _entry(finding: Finding) -> Entry:
+    form = form_of(finding)
+    stated = {e.symbol: float(e.value) for e in finding.parameters}
+    of_form = {} if form is None else dict(zip((p.symbol for p in form.parameters), finding.values, strict=True))
+    # Moving air is told by its velocity; the force that stands for it at one drag is another parameter.
+    moving = bool(catalogue()[finding.id].air_moves)
+    others = [i for i in finding.alternatives if i != finding.id]
+    return Entry(
+        id=finding.id,
+        form="" if form is None or moving else form.name,
+        equation=finding.equation or (form.equation if form else ""),
+        sentence=finding.sentence,
+        one_of=(finding.id, *others) if finding.status == "ambiguous" and others else (),
+        parameters=stated if form is None or moving else {k: float(v) for k, v in of_form.items()},
+        interval_95={e.symbol: (float(e.low), float(e.high)) for e in finding.parameters},
+    )
+
+
+def text_of(content: Conditions | Instruments) -> str:
+    """A file's text: a line on what it is, then YAML; numbers to the digits that a verdict states."""
+    name = CONDITIONS if isinstance(content, Conditions) else INSTRUMENTS
+    plain = rounded(content.model_dump(mode="json", exclude_defaults=True))
+    return f"# {ABOUT[name]}\n{yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)}"
+
+
+def read_conditions(path: Path) -> Conditions:
+    """A `conditions.yaml`; InputError names the file and what does not fit."""
+    return _read(path, Conditions)
+
+
+def read_instruments(path: Path) -> Instruments:
+    """An `instruments.yaml`; InputError names the file and what does not fit."""
+    return _read(path, Instruments)
+
+
+def _read(path: Path, kind):
+    try:
+        return kind.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    except yaml.YAMLError as error:
+        raise InputError(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise InputError(f"{path}: {where}: {first['msg']}") from None
+
+
+def empty(content: Conditions | Instruments) -> bool:
+    """Whether there is nothing to write."""
+    return not (content.conditions if isinstance(content, Conditions) else content.instruments)

@@ -1,0 +1,214 @@
+"""The gate: a model is delivered only as far as it predicts no channel worse where it was not fitted.
+
+Three models are compared channel by channel on environments that each was not fitted on: the believed vehicle, the
+same physics with values refitted, and the refitted values with the effects. Refitted values that make a channel worse
+fall back to what was believed; effects and values that make one worse than the refitted vehicle keep their status and
+are withheld, with the reason. The runs held out take no part: they report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rotorid.mismatch.channel_errors import growth
+from rotorid.mismatch.delivered import (
+    FittedModel,
+    Values,
+    delivered_fit,
+    judged_rows,
+    left_out_residuals,
+)
+from rotorid.mismatch.regression import Fit
+from rotorid.mismatch.rows import CHANNELS
+from rotorid.mismatch.within_trust import all_free, changes, pays, strained
+from rotorid.mismatch.words import channel_words
+
+WORSE_RATIO = 1.01
+"""Error beside the other model's from which a channel is predicted worse: a percent is what refitting itself moves."""
+WORSE_Z = 3.0
+"""Standard errors over blocks of a second of that growth: six channels and a handful of parts are compared, so that two
+would withhold a sound effect in one set of eight."""
+
+Residuals = list[np.ndarray]
+"""What a model leaves of every stretch where it was not fitted, (n, channels)."""
+
+
+@dataclass(frozen=True)
+class Worse:
+    """A channel that a model predicts worse than another."""
+
+    channel: str
+    ratio: float
+
+    def __str__(self) -> str:
+        """In words: `the error of the vertical force is 12 % larger`."""
+        return f"the error of the {channel_words(self.channel)} is {100 * (self.ratio - 1):.0f} % larger"
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What might be delivered: values called wrong, and the terms of effects."""
+
+    values: Values
+    active: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Settled:
+    """An offer fitted: its fit, values moved within their trust, and what it leaves where it was not fitted."""
+
+    offer: Offer
+    fit: Fit
+    moved: Values
+    left: Residuals
+
+
+@dataclass(frozen=True)
+class Gated:
+    """What passes the gate."""
+
+    settled: Settled
+    refitted: Settled
+    withheld: Mapping[str, str] = field(default_factory=dict)
+    """Id of an effect to the reason why it is not delivered."""
+    withheld_values: Mapping[str, str] = field(default_factory=dict)
+    """Key of a value called wrong to the same."""
+    fell_back: Mapping[str, str] = field(default_factory=dict)
+    """Key of a value of the refitted vehicle that is as believed to the reason."""
+
+    @property
+    def passes_whole(self) -> bool:
+        """Whether nothing was kept out."""
+        return not (self.withheld or self.withheld_values or self.fell_back)
+
+
+def settle(model: FittedModel, offer: Offer, reference: Residuals | None = None) -> Settled:
+    """An offer with the other values as believed, or moved within their trust where that pays.
+
+    With a `reference` the way is taken by which no channel is worse than it, if one of the two is such.
+    """
+    active = list(offer.active)
+    plain, as_believed = delivered_fit(model, [*offer.values, *active], offer.values)
+    free, fit = all_free(model, offer.values, active)
+    moved = changes(model, offer.values, active, fit)
+    held = Settled(offer, as_believed, {}, left_out_residuals(model, plain, offer.values))
+    if strained(model, moved):
+        return held
+    loose = Settled(offer, fit, moved, left_out_residuals(model, free, offer.values))
+    ways = (loose, held) if pays(held.left, loose.left, judged_rows(model), model.rows_per_block) else (held, loose)
+    if reference is not None and worse_than(model, reference, ways[0].left):
+        return min(ways, key=lambda way: excess(worse_than(model, reference, way.left)))
+    return ways[0]
+
+
+def worse_than(model: FittedModel, reference: Residuals, left: Residuals) -> list[Worse]:
+    """Channels of force and moment that are predicted worse than by a reference, where neither was fitted."""
+    ratio, z = growth(reference, left, judged_rows(model), model.rows_per_block)
+    found = np.flatnonzero((ratio > WORSE_RATIO) & (z > WORSE_Z))
+    return [Worse(CHANNELS[c], float(ratio[c])) for c in found]
+
+
+def excess(worse: Sequence[Worse]) -> float:
+    """How much worse channels are in all: the sum of their logarithms."""
+    return float(sum(np.log(w.ratio) for w in worse))
+
+
+def gate(
+    model: FittedModel,
+    offer: Offer,
+    plain: Values,
+    believed: Residuals,
+    unusable: Callable[[Settled], str] = lambda settled: "",
+) -> Gated:
+    """What of an offer may be delivered.
+
+    Parameters
+    ----------
+    model
+        The fitted runs' model, with `offer.active` among its terms.
+    offer, plain
+        Values called wrong and terms at work, and the values called wrong where no effect is at work.
+    believed
+        What the believed vehicle leaves of every stretch, (n, channels).
+    unusable
+        Why the vehicle of a settled offer is no body that hovers and flies; empty where it is.
+    """
+    refitted, fell_back = less_until(model, settle(model, Offer(plain, ()), believed), believed, lambda s: "")
+    settled, kept_out = less_until(model, settle(model, offer, refitted.left), refitted.left, unusable, refitted)
+    names = effect_names(model, offer.active)
+    return Gated(
+        settled,
+        refitted,
+        withheld={k: v for k, v in kept_out.items() if k in names},
+        withheld_values={k: v for k, v in kept_out.items() if k not in names},
+        fell_back=fell_back,
+    )
+
+
+def effect_names(model: FittedModel, active: Sequence[str]) -> dict[str, list[str]]:
+    """Ids of the effects at work to their terms."""
+    out: dict[str, list[str]] = {}
+    for key in active:
+        out.setdefault(model.search.terms[key].effect, []).append(key)
+    return out
+
+
+def less_until(
+    model: FittedModel,
+    settled: Settled,
+    reference: Residuals,
+    unusable: Callable[[Settled], str],
+    last: Settled | None = None,
+) -> tuple[Settled, dict[str, str]]:
+    """The offer less the parts without which no channel is worse than the reference, and the vehicle is usable.
+
+    One part after the other goes, always the one that helps most. Where no single part helps, all go: `last` is what
+    is delivered then (default the believed vehicle). Ids and value keys that went are given with their reason.
+    """
+    gone: dict[str, str] = {}
+    while fault := fault_of(model, settled, reference, unusable):
+        parts = parts_of(model, settled)
+        fewer = [(part, settle(model, less(settled.offer, part, model), reference)) for part in parts]
+        rated = [(rate(model, s, reference, unusable), part, s) for part, s in fewer]
+        best = min(rated, key=lambda r: r[0], default=None)
+        if best is None or not best[0] < rate(model, settled, reference, unusable):
+            gone |= {part: fault for part, _ in fewer}
+            return last or nothing(model, reference), gone
+        gone[best[1]] = fault
+        settled = best[2]
+    return settled, gone
+
+
+def nothing(model: FittedModel, reference: Residuals) -> Settled:
+    """The believed vehicle, nuisances aside."""
+    return Settled(Offer({}, ()), delivered_fit(model, [], {})[1], {}, reference)
+
+
+def parts_of(model: FittedModel, settled: Settled) -> list[str]:
+    """Ids of effects and keys of values that could be left out of an offer."""
+    return [*effect_names(model, settled.offer.active), *settled.offer.values]
+
+
+def less(offer: Offer, part: str, model: FittedModel) -> Offer:
+    """An offer without an effect, or with a value as believed."""
+    if part in offer.values:
+        return replace(offer, values={k: v for k, v in offer.values.items() if k != part})
+    return replace(offer, active=tuple(k for k in offer.active if model.search.terms[k].effect != part))
+
+
+def fault_of(model: FittedModel, settled: Settled, reference: Residuals, unusable: Callable[[Settled], str]) -> str:
+    """Why a settled offer is not delivered as it stands, in words; empty where it is."""
+    worse = worse_than(model, reference, settled.left)
+    if worse:
+        return f"where it was not fitted, {max(worse, key=lambda w: w.ratio)} with it"
+    return unusable(settled)
+
+
+def rate(
+    model: FittedModel, settled: Settled, reference: Residuals, unusable: Callable[[Settled], str]
+) -> tuple[float, bool]:
+    """How far an offer is from passing: the excess of its worse channels, then whether it is no usable vehicle."""
+    return excess(worse_than(model, reference, settled.left)), bool(unusable(settled))

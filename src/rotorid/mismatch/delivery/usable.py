@@ -1,0 +1,159 @@
+"""Whether a vehicle is a body that hovers and flies: what the fit of its values alone does not ask.
+
+A value can leave every channel better and still be that of no vehicle: a thrust coefficient that takes up a drag may
+leave a maximum thrust below the weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rotorid.control.swings import swings
+from rotorid.effects.contract import Motion
+from rotorid.errors import InputError
+from rotorid.recordings import Run, Vehicle
+from rotorid.recordings import columns as c
+from rotorid.recordings.belief import NO_BODY
+from rotorid.vehicle.improved import active_forms, speeds_of_commands
+
+MOST_HOVER_SHARE = 0.9
+"""Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
+FLIGHT_S, FLIGHT_SEED = 2.0, 1
+"""The trial flight: swings in roll, pitch and yaw under the project's attitude controller."""
+MOST_TILT_RAD = np.pi / 2
+"""Tilt in the trial flight from which the vehicle has fallen over; a quarter radian is asked for."""
+GYRATION = (0.05, 1.5)
+"""Radius of gyration over the longest arm: of a point mass at the hub, and of a beam far longer than the arms."""
+AIR_DENSITY_KG_M3 = 1.225
+HIGH_ABOVE_GROUND_M = 1e3
+LIGHT = 0.5
+"""Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
+
+
+Question = Callable[[Vehicle], str]
+"""Takes a vehicle of kind `flight`; gives why it is not fit for use, without a full stop, or nothing."""
+
+
+def question_of(believed: Vehicle, runs: Sequence[Run]) -> Question:
+    """What is asked of a vehicle derived from a believed one: a body, that hovers, that flies.
+
+    What the believed vehicle fails itself is not asked: no part of the model is to blame for it.
+    """
+    share = recorded_share(runs, believed)
+    every = (no_body, lambda vehicle: cannot_hover(vehicle, share), cannot_fly)
+    asked = [question for question in every if not question(believed)]
+    return lambda vehicle: next((why for question in asked if (why := question(vehicle))), "")
+
+
+def no_body(vehicle: Vehicle) -> str:
+    """Which value is not that of a body with rotors; empty where all may be."""
+    arm = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max())
+    inertia = vehicle.inertia_kg_m2.matrix()
+    least, middle, largest = np.linalg.eigvalsh(inertia)
+    if largest > NO_BODY * (least + middle):
+        return f"its principal moments of inertia {least:.3g}, {middle:.3g} and {largest:.3g} kg m2 are of no body"
+    for axis, moment in zip(("roll", "pitch", "yaw"), np.diag(inertia), strict=True):
+        radius = float(np.sqrt(moment / vehicle.mass_kg))
+        if not GYRATION[0] * arm <= radius <= GYRATION[1] * arm:
+            return f"its {axis} inertia has a radius of gyration of {radius:.3g} m with arms of {arm:.3g} m"
+    merit = figure_of_merit(vehicle)
+    if merit is not None and merit > 1.0:
+        return f"its rotors would have a figure of merit of {merit:.2f}; none is above 1"
+    return ""
+
+
+def figure_of_merit(vehicle: Vehicle) -> float | None:
+    """Ideal over real power of the rotors at rest, (C_F^1.5 / C_Q) / √(2 ρ π R²); None where a value is not stated.
+
+    Source: Leishman, Principles of Helicopter Aerodynamics, 2.8, with T = C_F ω² and P = C_Q ω³.
+    """
+    if vehicle.rotor_radius_m is None or vehicle.torque_coefficient_n_m_s2 is None:
+        return None
+    disc = np.sqrt(2.0 * AIR_DENSITY_KG_M3 * np.pi) * vehicle.rotor_radius_m
+    return float(np.max(vehicle.thrust_coefficients_n_s2() ** 1.5 / vehicle.torque_coefficients_n_m_s2() / disc))
+
+
+def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
+    """Why it cannot hover; empty where it can, or where no largest rotor speed is stated."""
+    most = full_thrust_n(vehicle)
+    if most is None:
+        return ""
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    allowed = max(MOST_HOVER_SHARE, recorded_share)
+    if weight <= allowed * most:
+        return ""
+    return (
+        f"its full thrust is {most:.3g} N for a weight of {weight:.3g} N; hovering may take {100 * allowed:.0f} % of it"
+    )
+
+
+def full_thrust_n(vehicle: Vehicle) -> float | None:
+    """Upward force at rest in still air with full command, effects included, N; None without a limit of the speed."""
+    if vehicle.rotor_speed_limits_rad_s is None:
+        return None
+    full = np.full((2, vehicle.rotor_count), float(vehicle.rotor_speed_limits_rad_s[1]))
+    volts = np.ones(2)
+    speed = speeds_of_commands(vehicle, full, np.array([0.0, 1.0]), volts, 1.0)[-1:]
+    return float(-static_force(vehicle, speed)[0, 2])
+
+
+def static_force(vehicle: Vehicle, speed: np.ndarray) -> np.ndarray:
+    """Force (n, 3), N, body axes, of rotors at speeds (n, k), rad/s, at rest and level in still air, high up."""
+    zero, n = np.zeros((len(speed), 3)), len(speed)
+    up = np.zeros((n, 3))
+    up[:, 2] = -vehicle.gravity_m_s2
+    motion = Motion(
+        time_s=np.arange(n, dtype=float),
+        rotor_speed=speed,
+        rotor_acceleration=np.zeros_like(speed),
+        angular_velocity=zero,
+        angular_acceleration=zero,
+        specific_force=up,
+        accelerometer=up,
+        gyroscope=zero,
+        rotation=np.broadcast_to(np.eye(3), (n, 3, 3)),
+        velocity=zero,
+        position=zero,
+        height=np.full(n, HIGH_ABOVE_GROUND_M),
+        voltage=np.ones(n),
+    )
+    force = np.zeros((n, 3))
+    force[:, 2] = -(vehicle.thrust_coefficients_n_s2() * speed**2).sum(axis=1)
+    for form, values in active_forms(vehicle):
+        added = form.contribution(motion, vehicle, values).force
+        if added is not None:
+            force = force + added
+    return force
+
+
+def cannot_fly(vehicle: Vehicle) -> str:
+    """Why it does not fly swings about hover under the project's attitude controller; empty where it does."""
+    try:
+        flown = swings(vehicle, "trial", FLIGHT_S, 1, FLIGHT_SEED)
+    except InputError as error:
+        return f"it cannot be simulated: {error}"
+    quaternion = flown.runs[0].table[list(c.QUATERNION)].to_numpy()
+    tilt = np.arccos(np.clip(1.0 - 2.0 * (quaternion[:, 1] ** 2 + quaternion[:, 2] ** 2), -1.0, 1.0))
+    if not np.isfinite(tilt).all() or tilt.max() > MOST_TILT_RAD:
+        return "simulated under an attitude controller it falls over"
+    return ""
+
+
+def recorded_share(runs: Sequence[Run], vehicle: Vehicle) -> float:
+    """Share of the full thrust that the rotors made while flying, by the squares of their speeds; 0 if not known.
+
+    A log says it without any coefficient: a racer that hovers at a fifth of its thrust, a lifter at nine tenths.
+    """
+    limits = vehicle.rotor_speed_limits_rad_s
+    if limits is None:
+        return 0.0
+    for group, scale in (("rotor_speed", 1.0), ("rotor_command", 1.0), ("throttle", limits[1])):
+        names = list(c.rotor_columns(group, vehicle.rotor_count))
+        tables = [r.table[names].to_numpy() for r in runs if r.has(*names)]
+        if tables:
+            share = np.nanmean((scale * np.concatenate(tables) / limits[1]) ** 2, axis=1)
+            flying = share[share > LIGHT * np.nanmax(share)]
+            return float(np.median(flying)) if len(flying) else 0.0
+    return 0.0
