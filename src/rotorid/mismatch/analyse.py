@@ -123,7 +123,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     plain_fit, plain_values = refitted(model)
     first = account(choice, seen, fit, moved, plain_fit, plain_values)
     words = with_values_in_question(weighed(first))
-    return with_noise_held_out(as_delivered(choice, words, seen, unseen))
+    return with_noise_held_out(as_delivered(choice, words, seen, unseen, moved))
 
 
 @dataclass(frozen=True)
@@ -229,10 +229,11 @@ def blows_of(seen: WrenchModel) -> tuple[Blow, ...]:
     return tuple(out)
 
 
-def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet) -> Analysis:
+def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values) -> Analysis:
     """The analysis whose model holds what is claimed and passes the gate, and nothing else.
 
-    `words` is the analysis of the whole choice with its statuses; those, and the probability of each, stay.
+    `words` is the analysis of the whole choice with its statuses, which stay; `moved` are the values that it moved
+    within their trust.
     """
     found, vehicle = choice.found, choice.found.prepared.vehicle
     ids = {f.id for f in claimed(words.findings)}
@@ -264,9 +265,9 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
         lambda settled: question(vehicle_of(settled)),
     )
     settled = gated.settled
-    findings = restated(words.findings, model, settled)
-    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in findings)
-    if whole and gated.passes_whole:
+    stated = restated(words.findings, model, settled)
+    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in stated)
+    if whole and gated.passes_whole and settled.moved.keys() == moved.keys():
         last = replace(words, findings=findings, improved=choice.vehicle(settled.moved, told_of(settled)))
     else:
         kept = with_only(fewer, ids - set(gated.withheld), settled.offer.values)

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from rotorid.mismatch.deliver import write_files
-from rotorid.mismatch.forward import forward_channels, prove
-from rotorid.mismatch.improve import improved_vehicle, model_of
+from rotorid.mismatch.delivery.model import model_of
+from rotorid.mismatch.delivery.parts import improved_vehicle
+from rotorid.mismatch.forward import delivered_model, forward_channels, prove
 from rotorid.recordings import read_vehicle, write_vehicle
 from tests.unit.mismatch.synthetic import HOVER, K_D, SPEED_M_S, analysis, drag_finding
 
@@ -50,10 +51,10 @@ def test_forward_errors_are_those_computed_by_hand():
 def test_a_vehicle_that_is_not_the_model_is_refused():
     made = analysis(findings=[drag_finding()])
     forward = forward_channels(made)
-    prove(made, improved_vehicle(made), forward)
+    prove(made, delivered_model(made), forward)
     wrong = replace(made, findings=(drag_finding(values=(2 * K_D,)),))
     with pytest.raises(RuntimeError, match="improved_vehicle.yaml"):
-        prove(made, improved_vehicle(wrong), forward)
+        prove(made, delivered_model(wrong), forward)
 
 
 @pytest.mark.parametrize(

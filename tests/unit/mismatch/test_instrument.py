@@ -11,11 +11,11 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.loading import Instrument, Loading, at_sensor, forms_of, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.deliver import deliver
+from rotorid.mismatch.delivery.files import read_instruments
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import form_reading, value_column
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import size_of_columns
-from rotorid.mismatch.instrument.predict import entries
 from rotorid.mismatch.instrument.sampling import step_of
 from rotorid.mismatch.instrument.setup import set_up
 from rotorid.mismatch.rows import Rows
@@ -267,9 +267,11 @@ def test_the_files_of_a_bench_hold_its_model(tmp_path):
     assert errors.after < 0.012 < 0.05 < errors.before
     written = read_vehicle(paths[2])
     assert written.reading_gain == pytest.approx((1.03, 1.03, 1.03), abs=0.002)
-    assert [e["id"] for e in written.effects] == ["tare_offset"]
+    assert written.effects == ()
+    errors_found = read_instruments(tmp_path / "instruments.yaml").instruments
+    assert [(e.id, e.form) for e in errors_found] == [("tare_offset", "constant")]
+    assert not (tmp_path / "conditions.yaml").exists()
     assert "flight" not in verdict.sentence
-    assert entries(written, set_up(bench_set()).instrument)[0][0][0].name == "constant"
 
 
 def test_a_load_along_two_axes_is_turned_by_what_bends():

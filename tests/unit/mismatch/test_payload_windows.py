@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.improve import modelled
+from rotorid.mismatch.delivery.parts import delivered
 from rotorid.mismatch.payload_windows import change_rows, two_plateaus
 
 from .flights import COLUMNS, quad, recorded
@@ -76,5 +76,6 @@ def test_a_parcel_dropped_in_flight_is_a_payload_for_so_long():
     assert windows["run01"][1] == pytest.approx(DROPPED_S, abs=0.1)
     assert windows["run00"] == pytest.approx(CARRIED["run00"], abs=0.1)
     assert "run01" in found.sentence and "12.0 s" in found.sentence
-    assert modelled(analysis) == []  # it is no property of the vehicle
+    assert delivered(analysis, "vehicle") == []  # it is no property of the vehicle
+    assert [f.id for f in delivered(analysis, "conditions")] == ["payload"]
     assert analysis.p_values["force_z"][1] > 0.01

@@ -245,8 +245,9 @@ def as_delivered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Val
     fewer = with_terms(model, active)
     gated = gate(fewer, Offer(values, tuple(active)), plain, [np.nan_to_num(r.y) for r in model.rows])
     final = gated.settled
-    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in restated(words.findings, fewer, final))
     whole = len(active) == len(model.selection.active) and not suggested and gated.passes_whole
+    stated = words.findings if whole else restated(words.findings, fewer, final)
+    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in stated)
     gone = [] if choice.chain is None else [k for k, _ in choice.chain.fit.chain if k not in ids]
     vehicle = choice.vehicle({**final.moved, **final.offer.values})
     if whole and not (gone and choice.measured):
