@@ -201,7 +201,8 @@ def template(name: str, **changes) -> Vehicle:
 def check(data: Recorded, vehicle: Believed | None = None, **options) -> SetCheck:
     """What recordings hold, what they lack, and what in them cannot be right; takes what `verdict` takes.
 
-    `print(rotorid.check(...))` shows it as `rotorid check` does; `lacks` and `doubts` are its sentences.
+    `print(rotorid.check(...))` shows it as `rotorid check` does. `lacks` holds sentences; each of `doubts` names what
+    is in doubt, with a sentence and whether it stops a verdict.
     """
     return check_recordings(recording_set(data, vehicle, **options))
 

@@ -10,7 +10,8 @@ from rotorid import templates
 from rotorid.cli.simulating import fly
 from rotorid.recordings import RecordingSet, Run, read_set
 from rotorid.recordings import columns as c
-from rotorid.recordings.physics import doubts, near_names
+from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.physics import near_names, physical_doubts
 
 RPM = 60 / (2 * np.pi)
 
@@ -30,7 +31,7 @@ def changed(recordings: RecordingSet, change) -> RecordingSet:
 
 
 def test_a_sound_flight_raises_no_doubt(flown) -> None:
-    assert doubts(flown) == ()
+    assert physical_doubts(flown) == ()
 
 
 def times(names, factor):
@@ -65,8 +66,8 @@ SPEEDS = c.rotor_columns("rotor_speed", 4)
     ],
 )
 def test_each_mistake_is_named(flown, change, said) -> None:
-    found = doubts(changed(flown, change))
-    assert any(said in sentence for sentence in found), found
+    found = physical_doubts(changed(flown, change))
+    assert any(said in doubt.sentence and doubt.stops for doubt in found), found
 
 
 def test_a_throttle_in_microseconds_and_a_rest_are_named(flown) -> None:
@@ -75,7 +76,7 @@ def test_a_throttle_in_microseconds_and_a_rest_are_named(flown) -> None:
             table[f"throttle_{i}"] = 1000 + table[f"rotor_speed_{i}_rad_s"] / 2.5
         table.loc[:500, list(SPEEDS)] = 0.0
 
-    found = " ".join(doubts(changed(flown, pulses)))
+    found = " ".join(map(str, physical_doubts(changed(flown, pulses))))
     assert "it is in µs" in found
     assert "all rotors are at rest in 8% of the samples" in found
 
@@ -86,14 +87,16 @@ def test_few_and_rare_samples_are_named(flown) -> None:
 
     thin = changed(flown, rare)
     cut = replace(thin, runs=tuple(Run(r.name, r.table.iloc[:3000]) for r in thin.runs))
-    found = " ".join(doubts(cut))
-    assert "Only 12 s are recorded" in found
-    assert "rotor speeds come at 2.5" in found
+    found = physical_doubts(cut)
+    assert [(doubt.what, doubt.stops) for doubt in found] == [("time_s", False), (SPEEDS[0], False)]
+    assert "Only 12 s are recorded" in found[0].sentence
+    assert "rotor speeds come at 2.5" in found[1].sentence
 
 
 def test_a_nearly_right_name_is_named(flown) -> None:
     misspelt = changed(flown, lambda t: t.insert(1, "velocity_x_ms", t.pop("velocity_x_m_s")))
-    assert near_names(misspelt) == ("Column velocity_x_ms is not known; did you mean velocity_x_m_s?",)
+    sentence = "Column velocity_x_ms is not known; did you mean velocity_x_m_s?"
+    assert near_names(misspelt) == (Doubt("velocity_x_ms", sentence, stops=False),)
 
 
 def test_the_text_shows_doubts(flown, tmp_path: Path) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.recordings import columns as c
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import read_set
-from rotorid.recordings.physics import doubts, near_names
+from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.sufficient import sufficient
 
@@ -51,8 +52,8 @@ class SetCheck:
     other_columns: tuple[str, ...]
     lacks: tuple[str, ...]
     """One sentence for each thing that is missing: what it is and what cannot be tested without it."""
-    doubts: tuple[str, ...] = ()
-    """One sentence for each thing that cannot be right, with the numbers that raised it."""
+    doubts: tuple[Doubt, ...] = ()
+    """What cannot be right, with the numbers that raised it."""
 
     def as_dict(self) -> dict:
         return asdict(self)
@@ -175,8 +176,18 @@ def check_set(recordings: RecordingSet) -> SetCheck:
         columns=tuple(name for name in columns if c.is_known(name)),
         other_columns=tuple(name for name in columns if not c.is_known(name)),
         lacks=tuple(lacks),
-        doubts=(*near_names(recordings), *(doubts(recordings) if vehicle.kind == "flight" else ())),
+        doubts=doubts_of(recordings),
     )
+
+
+def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """What cannot be right in a set, its vehicle and its runs together; empty where nothing is in doubt."""
+    found = [*near_names(recordings), *voltages(recordings)]
+    if recordings.vehicle.kind != "bench":
+        found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
+    if recordings.vehicle.kind == "flight":
+        found += physical_doubts(recordings)
+    return tuple(found)
 
 
 def as_text(check: SetCheck) -> str:
@@ -198,7 +209,7 @@ def as_text(check: SetCheck) -> str:
     if check.other_columns:
         lines.append("Kept as regime variables: " + ", ".join(check.other_columns))
     if check.doubts:
-        lines += ["", "Looks wrong:", *(f"- {sentence}" for sentence in check.doubts)]
+        lines += ["", "Looks wrong:", *(f"- {doubt}" for doubt in check.doubts)]
     lines.append("")
     lines += [f"- {sentence}" for sentence in check.lacks] or ["Nothing that the contract knows is missing."]
     return "\n".join(lines) + "\n"

@@ -8,10 +8,16 @@ too.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rotorid.names import listed
 from rotorid.recordings import columns as c
+from rotorid.recordings.body import Body, Flown, body_of, impossible, quantities
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
@@ -19,17 +25,20 @@ STEP_S = 0.02
 """Step of the common clock; what is compared is slower than some hertz."""
 SMOOTH_S = 0.1
 LONGEST_GAP_S = 0.25
-WEIGHT_RATIO = (0.7, 1.4)
-"""Thrust over mass times specific force, outside of which no belief within its trust can be."""
+GRAVITY_M_S2 = (9.5, 10.1)
+LIFT_M_S2 = (5.0, 20.0)
+"""Where the median of an accelerometer in flight lies, in its unit and axes."""
+HIGHEST_VOLTAGE_V = 120.0
 LEAST_TURNING_RAD_S = 0.05
 """Spread of a body rate below which nothing can be said of it."""
 AGREES, CONTRADICTS = 0.5, -0.3
 """Correlations: above, two signals agree; below, one of them is turned round."""
+TOP = 0.99
+"""Share of the rotor speeds below their highest that counts: single samples may be faults."""
 SLOW_S, LATEST_STEPS, LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
 SURE_Z, ALIKE, RIDGE = 6.0, 5.0, 0.02
 """Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, a share of the regressors."""
-RPM = 2 * np.pi / 60
 DEGREE = np.pi / 180
 LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
 LEAST_TIME_S = 20.0
@@ -37,34 +46,37 @@ AT_REST = 0.2
 """Share of the median rotor speed below which a rotor counts as at rest."""
 
 
-def doubts(recordings: RecordingSet) -> tuple[str, ...]:
-    """Sentences on what cannot be right in a set of kind `flight`, the gravest first; empty where all agrees."""
+def physical_doubts(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """What cannot be right in a set of kind `flight`; empty where all agrees."""
     vehicle = recordings.vehicle
-    found: list[str] = []
+    found: list[tuple[str, Doubt]] = []
     for run in recordings.runs:
         clock = _clock(run)
         if clock is None:
             continue
-        for sentence in (
+        for doubt in (
             *_accelerometer(run, clock, vehicle),
-            *_weight(run, clock, vehicle),
             *_gyroscope(run, clock),
             *_world(run, clock, vehicle),
             *_rotors(run, clock, vehicle),
             *_throttle(run, vehicle),
             *_rest(run, vehicle),
         ):
-            found.append(f"{run.name}: {sentence}")
+            found.append((run.name, doubt))
     return (*_once(found), *_amount(recordings))
 
 
-def _once(found: list[str]) -> list[str]:
-    """Doubts that every run repeats told once."""
-    seen: dict[str, list[str]] = {}
-    for text in found:
-        run, _, sentence = text.partition(": ")
-        seen.setdefault(sentence.split("(")[0], []).append(text)
-    return [texts[0] + (f" The same in {len(texts) - 1} more." if len(texts) > 1 else "") for texts in seen.values()]
+def _once(found: list[tuple[str, Doubt]]) -> list[Doubt]:
+    """Doubts by run as one for each thing in doubt: the first run's, with the number of runs that repeat it."""
+    alike: dict[tuple[str, str], list[tuple[str, Doubt]]] = {}
+    for run, doubt in found:
+        # Numbers differ between runs and stand in brackets.
+        alike.setdefault((doubt.what, doubt.sentence.split("(")[0]), []).append((run, doubt))
+    out = []
+    for (run, first), *others in alike.values():
+        more = f" The same in {len(others)} more." if others else ""
+        out.append(replace(first, sentence=f"{run}: {first.sentence}{more}"))
+    return out
 
 
 # Common clock -------------------------------------------------------------------------------------
@@ -117,52 +129,135 @@ def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
+def flown(run: Run, vehicle: Vehicle) -> Flown | None:
+    """What a run says about the rotors in the air (on a stand: turning); None where it is short or says nothing."""
+    clock = _clock(run)
+    speeds = None if clock is None else _speeds(run, clock, vehicle)
+    if clock is None or speeds is None or not np.isfinite(speeds).any():
+        return None
+    coefficients = vehicle.thrust_coefficients_n_s2()
+    thrust = float(np.nanmedian((coefficients * speeds**2).sum(axis=1)))
+    if not thrust > 0:
+        return None
+    force = _on(run, clock, c.SPECIFIC_FORCE)
+    lift = None if force is None else -float(np.nanmedian(force[:, 2]))
+    if lift is None or not LIFT_M_S2[0] < lift < LIFT_M_S2[1]:
+        lift = 9.81  # On average a flight is carried; a wrong accelerometer is a doubt of its own.
+    kinds = ("rotor_speed", "rotor_command", "throttle")
+    column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
+    return Flown(
+        hover_rad_s=float(np.sqrt(thrust / coefficients.sum())),
+        top_rad_s=float(np.nanquantile(speeds, TOP)),
+        lift_m_s2=lift if vehicle.kind == "flight" else None,
+        column=column,
+    )
+
+
+def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """Believed values that no multirotor has together, by the rotor speeds of each run; each value once."""
+    vehicle = recordings.vehicle
+    speeds = {run.name: x for run in recordings.runs if (x := flown(run, vehicle))} or {"": None}
+    alike: dict[tuple[int, ...], list[str]] = {}
+    bodies: dict[tuple[int, ...], tuple[Body, str]] = {}
+    for run, turning in speeds.items():
+        body = body_of(vehicle, turning)
+        if body is None:
+            return ()
+        # Runs in which the same quantities are wrong have the same cause.
+        wrong = tuple(number for number, q in enumerate(quantities(body)) if not q.fits)
+        alike.setdefault(wrong, []).append(run)
+        bodies.setdefault(wrong, (body, turning.column if turning else ""))
+    found: dict[str, tuple[Doubt, list[str]]] = {}
+    for wrong, (body, column) in bodies.items():
+        for doubt in impossible(body, column):
+            found.setdefault(doubt.what, (doubt, []))[1].extend(alike[wrong])
+    return tuple(
+        doubt if len(runs) == len(speeds) else replace(doubt, sentence=f"{listed(runs)}: {doubt.sentence}")
+        for doubt, runs in found.values()
+    )
+
+
+def gravity(vehicle: Vehicle) -> tuple[Doubt, ...]:
+    """A gravity that is not the earth's."""
+    value, (low, high) = vehicle.gravity_m_s2, GRAVITY_M_S2
+    if low <= value <= high:
+        return ()
+    units = [
+        unit for unit, factor in {"g": 9.81, "ft/s²": 0.3048, "cm/s²": 0.01}.items() if low <= value * factor <= high
+    ]
+    fits = f"; {units[0]} would fit" if units else ""
+    sentence = f"gravity_m_s2 = {value:g}: expected that of the earth, {low:g} to {high:g} m/s²{fits}"
+    return (Doubt("gravity_m_s2", sentence, stops=True),)
+
+
+def voltages(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """A battery that no voltmeter reads in volts, in the first run that has it."""
+    name = c.BATTERY_VOLTAGE
+    for run in recordings.runs:
+        middle = float(np.nanmedian(run.column(name))) if run.has(name) else 0.0
+        if middle < 0:
+            said = "the sign is turned"
+        elif middle > HIGHEST_VOLTAGE_V:
+            said = "mV would fit" if 2 < middle / 1e3 < HIGHEST_VOLTAGE_V else "0.1 V would fit"
+        else:
+            continue
+        sentence = f"{run.name}: {name} has a median of {middle:.4g}, expected 0 to {HIGHEST_VOLTAGE_V:g} V: {said}"
+        return (Doubt(name, sentence, stops=True),)
+    return ()
+
+
 # Doubts -------------------------------------------------------------------------------------------
 
 
-def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle):
+def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     force = _on(run, clock, c.SPECIFIC_FORCE)
     if force is None:
         return
     middle = np.nanmedian(force, axis=0)
     size = float(np.linalg.norm(middle))
     if middle[2] > 0.5 * size and size > 0.5:
-        yield (
+        yield Doubt(
+            c.SPECIFIC_FORCE[2],
             f"specific_force_z_m_s2 is positive in flight (median {middle[2]:.3g}), expected about -9.8: the body axes "
-            "are forward-left-up, or the sign is turned"
+            "are forward-left-up, or the sign is turned",
+            stops=True,
         )
     elif size < 2.0 and size > 0.5:
-        yield f"the accelerometer's median is {size:.3g}, expected about 9.8 m/s²: it is in multiples of g"
+        yield Doubt(
+            c.SPECIFIC_FORCE[2],
+            f"the accelerometer's median is {size:.3g}, expected about 9.8 m/s²: it is in multiples of g",
+            stops=True,
+        )
     elif size <= 0.5:
-        yield (
+        yield Doubt(
+            c.SPECIFIC_FORCE[2],
             f"the accelerometer's median is {size:.3g} m/s², expected about 9.8: gravity was added back, but a "
-            "specific force holds none"
+            "specific force holds none",
+            stops=True,
+        )
+    elif size > LIFT_M_S2[1]:
+        unit = (
+            "ft/s²"
+            if 28 < size < 37
+            else "milli-g"
+            if 700 < size < 1400
+            else "cm/s²"
+            if 700 < size / 9.81 < 1400
+            else ""
+        )
+        yield Doubt(
+            c.SPECIFIC_FORCE[2],
+            f"the accelerometer's median is {size:.4g}, expected about 9.8 m/s²"
+            + (f": {unit} would fit" if unit else ""),
+            stops=True,
         )
     elif -middle[2] < 0.7 * size:
         axis = "xyz"[int(np.argmax(np.abs(middle)))]
-        yield f"the accelerometer feels the thrust along {axis}, not along -z: its axes are not the body's"
-
-
-def _weight(run: Run, clock: np.ndarray, vehicle: Vehicle):
-    speeds = _speeds(run, clock, vehicle)
-    if speeds is None:
-        return
-    thrust = (vehicle.thrust_coefficients_n_s2() * speeds**2).sum(axis=1)
-    force = _on(run, clock, c.SPECIFIC_FORCE)
-    lift = vehicle.gravity_m_s2 if force is None else -np.nanmedian(force[:, 2])
-    if not lift > 5.0:
-        return
-    ratio = float(np.nanmedian(thrust)) / (vehicle.mass_kg * lift)
-    if WEIGHT_RATIO[0] <= ratio <= WEIGHT_RATIO[1]:
-        return
-    cause = "mass, thrust coefficient or the unit of the rotor speeds is wrong"
-    if 0.7 < ratio * RPM**2 < 1.4:
-        cause = "the rotor speeds are in revolutions per minute"
-    elif 0.7 < ratio * (2 * np.pi) ** 2 < 1.4:
-        cause = "the rotor speeds are in revolutions per second"
-    elif 0.7 < ratio / 1000 < 1.4 or 0.7 < ratio * 1000 < 1.4:
-        cause = "the mass is in grams"
-    yield f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force): {cause}"
+        yield Doubt(
+            f"specific_force_{axis}_m_s2",
+            f"the accelerometer feels the thrust along {axis}, not along -z: its axes are not the body's",
+            stops=True,
+        )
 
 
 def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
@@ -177,7 +272,7 @@ def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
     return out
 
 
-def _gyroscope(run: Run, clock: np.ndarray):
+def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     gyro, attitude = _on(run, clock, c.ANGULAR_VELOCITY), _on(run, clock, c.QUATERNION)
     if gyro is None or attitude is None:
         return
@@ -189,22 +284,32 @@ def _gyroscope(run: Run, clock: np.ndarray):
         scale = float(np.nanstd(gyro[:, k]) / np.nanstd(derived[:, k]))
         name = f"angular_velocity_{axis}_rad_s"
         if r < CONTRADICTS:
-            yield (
+            yield Doubt(
+                name,
                 f"{name} turns against the attitude (correlation {r:.2f}): body axes of gyroscope and attitude differ, "
-                "or the quaternion is the inverse one"
+                "or the quaternion is the inverse one",
+                stops=True,
             )
         elif r > AGREES and 0.5 < scale * DEGREE < 2:
-            yield f"{name} is {scale:.3g} times the derivative of the attitude: it is in degrees per second"
+            yield Doubt(
+                name,
+                f"{name} is {scale:.3g} times the derivative of the attitude: it is in degrees per second",
+                stops=True,
+            )
         elif r > AGREES and not 0.5 < scale < 2:
-            yield f"{name} is {scale:.3g} times the derivative of the attitude"
+            yield Doubt(name, f"{name} is {scale:.3g} times the derivative of the attitude", stops=True)
         elif np.isfinite(r) and r < 0.2:
             others = [abs(_correlation(gyro[:, k], derived[:, j])) for j in range(3)]
             best = int(np.nanargmax(others))
             if others[best] > 0.6 and best != k:
-                yield f"{name} follows the attitude about {'xyz'[best]}, not about {axis}: the axes are exchanged"
+                yield Doubt(
+                    name,
+                    f"{name} follows the attitude about {'xyz'[best]}, not about {axis}: the axes are exchanged",
+                    stops=True,
+                )
 
 
-def _world(run: Run, clock: np.ndarray, vehicle: Vehicle):
+def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     attitude, force = _on(run, clock, c.QUATERNION), _on(run, clock, c.SPECIFIC_FORCE)
     velocity, position = _on(run, clock, c.VELOCITY), _on(run, clock, c.POSITION)
     if velocity is not None and position is not None:
@@ -213,11 +318,17 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle):
             if np.nanstd(velocity[:, k]) > 0.2:
                 r = _correlation(velocity[:, k], derived[:, k])
                 if r < CONTRADICTS:
-                    yield f"velocity_{axis}_m_s goes against the derivative of position_{axis}_m (correlation {r:.2f})"
+                    yield Doubt(
+                        f"velocity_{axis}_m_s",
+                        f"velocity_{axis}_m_s goes against the derivative of position_{axis}_m (correlation {r:.2f})",
+                        stops=True,
+                    )
                 elif r < 0.2:
-                    yield (
+                    yield Doubt(
+                        f"velocity_{axis}_m_s",
                         f"velocity_{axis}_m_s does not follow position_{axis}_m (correlation {r:.2f}): one of them is "
-                        "in body axes, or axes are exchanged"
+                        "in body axes, or axes are exchanged",
+                        stops=True,
                     )
     if attitude is None or force is None:
         return
@@ -228,7 +339,11 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle):
     turn = Rotation.from_quat(attitude[known][:, [1, 2, 3, 0]])
     world = turn.apply(force[known])
     if np.median(world[:, 2]) > 5.0 and np.median(force[known][:, 2]) < 0:
-        yield "turned into the world, the accelerometer points down: the attitude refers to axes with z up"
+        yield Doubt(
+            c.QUATERNION[0],
+            "turned into the world, the accelerometer points down: the attitude refers to axes with z up",
+            stops=True,
+        )
     if velocity is None:
         return
     change = np.gradient(velocity, STEP_S, axis=0)[known]
@@ -236,9 +351,11 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle):
         if np.nanstd(world[:, k]) > 0.5 and np.nanstd(change[:, k]) > 0.5:
             r = _correlation(world[:, k], change[:, k])
             if r < CONTRADICTS:
-                yield (
+                yield Doubt(
+                    f"velocity_{axis}_m_s",
                     f"the velocity along {axis} changes against the tilt of the thrust (correlation {r:.2f}): world "
-                    "axes of attitude and velocity differ"
+                    "axes of attitude and velocity differ",
+                    stops=True,
                 )
 
 
@@ -279,7 +396,7 @@ def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
     return best[1] if best is not None and best[0] > LEAST_EXPLAINED else None
 
 
-def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle):
+def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Whether each rotor turns the vehicle as its place says; if not, where it seems to sit."""
     speeds, gyro = _speeds(run, clock, vehicle, 2 * STEP_S), _on(run, clock, c.ANGULAR_VELOCITY, 2 * STEP_S)
     if speeds is None or gyro is None or vehicle.rotor_count < 3:
@@ -297,9 +414,11 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle):
     sure = [i for i in range(vehicle.rotor_count) if found[:, i].all()]
     seats = ", ".join(f"{i + 1} {_seat(np.array([found[1, i], -found[0, i]]))}" for i in sure)
     rotors = f"rotor {wrong[0]} does" if len(wrong) == 1 else f"rotors {', '.join(map(str, wrong))} do"
-    yield (
+    yield Doubt(
+        "rotors",
         f"{rotors} not turn the vehicle as the stated places say; by roll and pitch they sit: {seats}: look at the "
-        "order of the rotors, or at the signs of the body axes"
+        "order of the rotors, or at the signs of the body axes",
+        stops=True,
     )
 
 
@@ -307,7 +426,7 @@ def _seat(place: np.ndarray) -> str:
     return f"{'front' if place[0] > 0 else 'rear'} {'right' if place[1] > 0 else 'left'}"
 
 
-def _throttle(run: Run, vehicle: Vehicle):
+def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
     names = [n for n in c.rotor_columns("throttle", vehicle.rotor_count) if run.has(n)]
     if not names:
         return
@@ -315,10 +434,12 @@ def _throttle(run: Run, vehicle: Vehicle):
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if low < -0.01 or high > 1.01:
         how = "µs (1000 to 2000)" if 800 < high < 2500 else "percent" if 2 < high <= 100 else "another range"
-        yield f"throttle runs from {low:.4g} to {high:.4g}, expected 0 to 1: it is in {how}"
+        yield Doubt(
+            names[0], f"throttle runs from {low:.4g} to {high:.4g}, expected 0 to 1: it is in {how}", stops=True
+        )
 
 
-def _rest(run: Run, vehicle: Vehicle):
+def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
     kinds = [k for k in ("rotor_speed", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))]
     if not kinds:
         return
@@ -326,14 +447,19 @@ def _rest(run: Run, vehicle: Vehicle):
     mean = values[np.isfinite(values).all(axis=1)].mean(axis=1)
     at_rest = float((mean < AT_REST * np.median(mean[mean > 0])).mean()) if (mean > 0).any() else 1.0
     if at_rest > 0.02:
-        yield f"all rotors are at rest in {at_rest:.0%} of the samples: keep only the part in the air"
+        yield Doubt(
+            c.rotor_columns(kinds[0], 1)[0],
+            f"all rotors are at rest in {at_rest:.0%} of the samples: keep only the part in the air",
+            stops=False,
+        )
 
 
-def _amount(recordings: RecordingSet):
+def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
     """Doubts about how much there is and how often it was sampled."""
     total = sum(float(r.time_s[-1] - r.time_s[0]) for r in recordings.runs)
     if total < LEAST_TIME_S:
-        yield f"Only {total:.0f} s are recorded: intervals will be wide; {LEAST_TIME_S:g} s and more are better."
+        sentence = f"Only {total:.0f} s are recorded: intervals will be wide; {LEAST_TIME_S:g} s and more are better."
+        yield Doubt(c.TIME, sentence, stops=False)
     groups = {
         "rotor speeds": c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count),
         "body rates": c.ANGULAR_VELOCITY,
@@ -353,13 +479,15 @@ def _amount(recordings: RecordingSet):
                 known = np.isfinite(run.array(columns)).all(axis=1)
                 rates.append(known.sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
         if rates and min(rates) < LEAST_RATE_HZ[name]:
-            yield (
+            yield Doubt(
+                columns[0],
                 f"The {name} come at {min(rates):.3g} Hz, {LEAST_RATE_HZ[name]:g} Hz and more are better: "
-                f"{costs[name]}."
+                f"{costs[name]}.",
+                stops=False,
             )
 
 
-def near_names(recordings: RecordingSet) -> tuple[str, ...]:
+def near_names(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """Columns that are kept without a meaning but are nearly one that has a meaning."""
     from difflib import get_close_matches
 
@@ -370,5 +498,5 @@ def near_names(recordings: RecordingSet) -> tuple[str, ...]:
     for name in sorted(there - set(known)):
         near = [n for n in get_close_matches(name, known, 1, 0.85) if n not in there]
         if near and not c.is_known(name):
-            out.append(f"Column {name} is not known; did you mean {near[0]}?")
+            out.append(Doubt(name, f"Column {name} is not known; did you mean {near[0]}?", stops=False))
     return tuple(out)
