@@ -22,8 +22,9 @@ from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicl
 from rotorid.recordings.belief import check_belief
 from rotorid.recordings.check import SetCheck, check_recordings
 from rotorid.recordings.files import check_rotors
+from rotorid.recordings.proposed import proposed_in
 from rotorid.recordings.tables import check_table
-from rotorid.result import FILES, Result
+from rotorid.result import FILES, OTHERS, Result
 
 Believed = Vehicle | Mapping | str | Path
 """A vehicle, the keys of a `vehicle.yaml`, the path of one, or the name of a template."""
@@ -84,7 +85,8 @@ def verdict(
         analysis = analysis_of(recordings)
         paths = [Path(folder) / file for file in FILES]
         found = write_files(analysis, *paths[:3], progress=tell)
-        texts = {path.name: path.read_text(encoding="utf-8") for path in paths}
+        there = [path for name in (*FILES, *OTHERS) if (path := Path(folder) / name).exists()]
+        texts = {path.name: path.read_text(encoding="utf-8") for path in there}
     return Result(found, texts, analysis)
 
 
@@ -127,7 +129,9 @@ def recording_set(
     if held_out and set(held_out) == set(names):
         raise InputError("held_out names every run, none is left to fit")
     kept = found.held_out if held_out is None else tuple(held_out)
-    return RecordingSet(found.name, believed, found.runs, kept, found.path, found.left_out)
+    return RecordingSet(
+        found.name, believed, found.runs, kept, found.path, found.left_out, found.proposed if vehicle is None else ()
+    )
 
 
 def believed_vehicle(vehicle: Believed) -> Vehicle:
@@ -183,7 +187,8 @@ def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
         yaml.safe_load(found.vehicle_text), "the vehicle proposed"
     )  # fmt: skip
     runs = tuple(Run(run, check_table(table, f"run {run}")) for run, table in sorted(found.runs.items()))
-    return RecordingSet(name, believed, runs)
+    proposed = proposed_in(found.vehicle_text) if vehicle is None else ()
+    return RecordingSet(name, believed, runs, proposed=proposed)
 
 
 def template(name: str, **changes) -> Vehicle:

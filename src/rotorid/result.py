@@ -13,12 +13,15 @@ import pandas as pd
 import yaml
 
 from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.headline import headline, tiles
+from rotorid.mismatch.tiles import tiles
 from rotorid.mismatch.verdict import Verdict, main_channel
 from rotorid.page.make import pretty
 from rotorid.recordings import Vehicle, vehicle_of
 
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
+"""Files that every verdict has."""
+OTHERS = ("conditions.yaml", "instruments.yaml")
+"""Files that it has where there is something to write."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,7 +44,7 @@ class Result:
 
     @property
     def word(self) -> str:
-        """`no_mismatch`, `explained`, `partly_explained` or `unexplained`."""
+        """`no_mismatch`, `explained`, `partly_explained`, `unexplained` or `not_judged`."""
         return self.verdict.verdict
 
     @property
@@ -99,7 +102,7 @@ class Result:
         return residuals_of(self.analysis)
 
     def save(self, folder: str | Path) -> Path:
-        """Write `verdict.json`, `report.html`, `improved_vehicle.yaml` and `ledger.json`; returns the page's path."""
+        """Write `verdict.json`, `report.html`, the vehicle and whatever else there is; returns the page's path."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in self.files.items():
@@ -116,8 +119,10 @@ class Result:
             f"</small><br><b>{pretty(t.large)}</b><br><small>{pretty(t.small)}</small></td>"
             for t in tiles(self.verdict, main)
         )
+        doubts = (*(d.sentence for d in self.verdict.doubts), *self.verdict.warnings)
         parts = [
-            f'<p style="font-size:1.15em"><b>{pretty(headline(self.verdict, main))}</b></p>',
+            f'<p style="font-size:1.15em"><b>{pretty(self.verdict.sentence)}</b></p>',
+            *(f"<p>{pretty(text)}</p>" for text in doubts),
             f"<table><tr>{shown}</tr></table>",
         ]
         said = self.effects[self.effects["status"].isin(["established", "ambiguous", "suggested"])]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, tell
 from rotorid.errors import InputError
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.verdict import Verdict
 
 FIXED_S, PER_SAMPLE_S, MOST_SAMPLES = 5.0, 1.2e-3, 300_000
 """What a flight costs on one core (benchmarks/mismatch.md): a fixed part, a part a sample, and where it levels off."""
@@ -31,17 +35,30 @@ def verdict(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print verdict.json on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    ci: Annotated[
+        bool, typer.Option("--ci", help="Exit code 1 where the set is not judged, or by the two limits below.")
+    ] = False,
+    max_unexplained: Annotated[
+        str, typer.Option("--max-unexplained", help="With --ci: largest share that may stay unexplained, 20% or 0.2.")
+    ] = "100%",
+    no_doubts: Annotated[
+        bool, typer.Option("--no-doubts", help="With --ci: no doubt about the set, and no warning, is let pass.")
+    ] = False,
 ) -> None:
     """Say where a believed vehicle and its recordings part, why, and write a better vehicle.
 
-    Writes `verdict.json`, `report.html` (open it in a browser) and `improved_vehicle.yaml`. Of logs a recording set is
-    made first, as by `rotorid import`. A mismatch found is no error: the exit code is 0.
+    Writes `verdict.json`, `report.html` (open it in a browser) and `improved_vehicle.yaml`, and where there is
+    something to write `conditions.yaml` (wind, payload for a time) and `instruments.yaml` (errors of sensors). Of logs
+    a recording set is made first, as by `rotorid import`. A mismatch found is no error: the exit code is 0, but with
+    --ci.
 
     Examples:
 
     `rotorid verdict flights`
 
     `rotorid verdict log.ulg --mass-kg 1.52 -o answer`
+
+    `rotorid verdict flights --ci --max-unexplained 20% --no-doubts`
     """
     with one_sentence():
         start = time.monotonic()
@@ -57,19 +74,48 @@ def verdict(
             folder = made.folder
             if not quiet and not as_json:
                 tell(made)
-        text = deliver_set(folder, target, quiet, series)
+        limit = share_of(max_unexplained)
+        found = deliver_set(folder, target, quiet, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)
-            return
-        typer.echo(text)
-        typer.echo(
-            f"{target / 'report.html'} (and verdict.json, improved_vehicle.yaml, ledger.json), "
-            f"{time.monotonic() - start:.0f} s"
-        )
+        else:
+            for line in (*(d.sentence for d in found.doubts), *found.warnings):
+                typer.echo(f"! {line}")
+            typer.echo(found.sentence)
+            others = ", ".join(sorted(p.name for p in target.iterdir() if p.suffix in (".json", ".yaml")))
+            typer.echo(f"{target / 'report.html'} (and {others}), {time.monotonic() - start:.0f} s")
+        faults = faults_of(found, limit, no_doubts) if ci else []
+        for fault in faults:
+            typer.echo(f"ci: {fault}", err=True)
+    if faults:
+        raise typer.Exit(1)
 
 
-def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -> str:
-    """Analyse the set in `folder`, write the files into `target`, and return the verdict's sentence.
+def share_of(text: str) -> float:
+    """A share of `20%` or `0.2`; InputError where it is none."""
+    number = text.strip().removesuffix("%")
+    try:
+        share = float(number) / (100.0 if text.strip().endswith("%") else 1.0)
+    except ValueError:
+        share = math.nan
+    if not 0.0 <= share <= 1.0:
+        raise InputError(f"--max-unexplained is {text!r}, expected a share such as 20% or 0.2")
+    return share
+
+
+def faults_of(verdict: Verdict, most: float, no_doubts: bool) -> list[str]:
+    """Why a verdict fails as a regression test of an airframe, one sentence each."""
+    out = ["the set is not judged"] if verdict.verdict == "not_judged" else []
+    share = verdict.unexplained.share
+    if share > most:
+        out.append(f"{100 * share:.0f} % stays unexplained, more than {100 * most:.0f} %")
+    if no_doubts:
+        out += [d.sentence for d in verdict.doubts] + list(verdict.warnings)
+    return out
+
+
+def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -> Verdict:
+    """Analyse the set in `folder`, write the files into `target`, and return the verdict.
 
     With `series` the residuals are written, too, as `series.parquet`.
     """
@@ -98,7 +144,7 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
             from rotorid.result import residuals_of
 
             write_table(residuals_of(analysis), target / "series.parquet")
-        return verdict.sentence
+        return verdict
 
 
 def _no_vehicle(folder: Path) -> str:

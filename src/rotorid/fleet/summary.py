@@ -75,7 +75,9 @@ _OWN = ("set", "vehicle", "day")
 def reasons(verdict: dict[str, Any]) -> list[str]:
     """Why a person should look at a verdict; nothing where it stands by itself."""
     out = []
-    if verdict["verdict"] == "unexplained":
+    if verdict["verdict"] == "not_judged":
+        out.append("not judged: " + "; ".join(d["sentence"].rstrip(".") for d in verdict["doubts"] if d["stops"]))
+    elif verdict["verdict"] == "unexplained":
         out.append("a mismatch that nothing of the catalogue explains")
     elif verdict["verdict"] == "partly_explained":
         out.append(f"{verdict['unexplained']['share']:.0%} of the mismatch unexplained")

@@ -279,12 +279,11 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
         last = replace(own, findings=findings, values=words.values, suggested_values=words.suggested_values,
                        instead=words.instead, not_testable=words.not_testable,
                        without_values=words.without_values)  # fmt: skip
-        last = with_shares(last)
     reasons = gated.withheld_values
     withheld = {n: reasons[k] for n, keys in names_of(choice.told).items() for k in keys if k in reasons}
     notes = [fell_back_note(k, why) for k, why in gated.fell_back.items()]
     return replace(
-        last,
+        with_shares(last),
         withheld_values=withheld,
         notes=(*last.notes, *notes),
         believed_values=value_rows(model, settled, last.improved, vehicle),

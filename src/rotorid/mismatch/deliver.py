@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from rotorid.mismatch import rules
 from rotorid.mismatch.analyse import analyse
+from rotorid.mismatch.delivery.doubts import with_doubts
 from rotorid.mismatch.delivery.files import (
     CONDITIONS,
     INSTRUMENTS,
@@ -66,7 +67,7 @@ def analysis_of(recordings: RecordingSet, off: Collection[str] = ()) -> Analysis
     analysis = replace(analysis, fired=dict(asked.fired), notes=(*without, *analysis.notes))
     recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with mistakes put right are made anew
     analysis = replace(analysis, recordings=recordings, notes=(*usable.left_out, *analysis.notes))
-    return with_rounded_model(analysis)
+    return with_rounded_model(with_doubts(analysis, usable))
 
 
 def with_rounded_model(analysis: Analysis) -> Analysis:

@@ -8,7 +8,7 @@ runs held out lower a word, nothing else.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from rotorid.mismatch import rules
 from rotorid.mismatch.comparison import VOTES_FROM
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
 from rotorid.mismatch.shares import fitted_part
+from rotorid.mismatch.sizes import effect_sizes, scales
 from rotorid.mismatch.words import channel_words
 
 ACTS = 1 / 3
@@ -110,26 +111,32 @@ def weighed(analysis: Analysis) -> Analysis:
 
 
 def with_shares(analysis: Analysis) -> Analysis:
-    """The analysis with what each effect carries of the error that goes; no word changes."""
+    """The analysis with the size of each effect and what it carries of the error that goes; no word changes.
+
+    Channels are weighed by what a pilot knows: the weight, and the moment that the rotors can make.
+    """
     part = fitted_part(analysis)
-    return replace(analysis, shares=effect_shares(analysis, [part(t.run, t.time_s) < 0 for t in analysis.compared]))
+    held = [part(t.run, t.time_s) < 0 for t in analysis.compared]
+    units = {channel: scale.value for channel, scale in scales(analysis).items()}
+    return replace(analysis, shares=effect_shares(analysis, held, units), effect_sizes=effect_sizes(analysis, held))
 
 
-def effect_shares(analysis: Analysis, held: list[np.ndarray]) -> dict[str, float]:
+def effect_shares(
+    analysis: Analysis, held: list[np.ndarray], units: Mapping[str, float] | None = None
+) -> dict[str, float]:
     """To every stated effect the part of what goes from before to after on the runs held out that goes without it.
 
-    Energies over all channels, each in units of its floor: what is left without the effect less what is left with all,
-    over what all take away. Effects that only act together add up to more than one.
+    Energies over all channels, each in its unit (default its floor): what is left without the effect less what is left
+    with all, over what all take away. Effects that only act together add up to more than one.
     """
+    units = analysis.noise_floor if units is None else units
 
     def energy(parts: Sequence[np.ndarray]) -> float:
         sums: dict[str, np.ndarray] = {}
         for trace, own, mask in zip(analysis.compared, parts, held, strict=True):
             new = np.array([np.nansum(own[mask] ** 2), np.isfinite(own[mask]).sum()])
             sums[trace.channel] = sums.get(trace.channel, np.zeros(2)) + new
-        return sum(
-            s[0] / max(s[1], 1) / analysis.noise_floor[c] ** 2 for c, s in sums.items() if analysis.noise_floor.get(c)
-        )
+        return sum(s[0] / max(s[1], 1) / units[c] ** 2 for c, s in sums.items() if units.get(c))
 
     before, after = (energy([getattr(t, stage) for t in analysis.compared]) for stage in ("before", "after"))
     if before <= after:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Instrument, Loading
 from rotorid.recordings import RecordingSet, Split, Vehicle
+from rotorid.recordings.doubts import Doubt
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.sizes import Size
 
 CLAIMED = ("established", "ambiguous")
 """Statuses of what is held to be at work."""
@@ -151,6 +155,8 @@ class Analysis:
     """Values that the runs held out do not bear out: as in `values`, and why."""
     shares: Mapping[str, float] = field(default_factory=dict)
     """To the id of a stated effect the part of the error that goes on the runs held out which goes without it."""
+    effect_sizes: Mapping[str, Size] = field(default_factory=dict)
+    """To the id of a stated effect what it does where it does most, on the runs held out."""
     unexplained_share: float = 0.0
     """Share of the residual's energy above the noise floor that the findings leave (0 where nothing was off)."""
     unexplained_channels: tuple[str, ...] = ()
@@ -174,6 +180,8 @@ class Analysis:
     """How often each rule's condition held during the analysis (`rules`)."""
     put_right: tuple[str, ...] = ()
     """Values corrected within their trust, in words: `thrust coefficient −0.7 %`."""
+    doubts: tuple[Doubt, ...] = ()
+    """What `check` doubts in the set, and values that are only proposed."""
     withheld_values: Mapping[str, str] = field(default_factory=dict)
     """Wrong value (by its contract name) that the gate keeps out of the vehicle, to the reason."""
     believed_values: tuple[ValueRow, ...] = ()

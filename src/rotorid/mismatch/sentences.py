@@ -11,6 +11,7 @@ import numpy as np
 
 from rotorid.mismatch.consistency import by_share, carrying, quoted
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, one_per_class, with_status
+from rotorid.mismatch.sizes import Scale, scales, share_words
 from rotorid.mismatch.words import (
     capital,
     channel_words,
@@ -31,6 +32,9 @@ MOST_WORDS = 40
 MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
 WORTH_SAYING_P = 0.05
+WORTH_A_WORD = 0.03
+"""Share of the weight, or of the moment that the rotors can make, that a channel must stay off to be named: what a
+pilot trims without noticing is less."""
 NO_BETTER = 0.02
 """Relative change of an error run forward below which it is neither better nor worse."""
 
@@ -68,6 +72,9 @@ def first_words(text: str, most: int = MOST_WORDS) -> str:
 def headline(told: Told) -> str:
     """What a pilot is told in at most MOST_WORDS words: where and how much, what was left out, how much better."""
     analysis = told.analysis
+    if told.word == "not_judged":
+        first = next(d for d in analysis.doubts if d.stops)
+        return first_words(f"Not judged. {first.sentence}")
     if told.word == "no_mismatch":
         return _agreement(analysis, told.channels)
     stated = with_status(analysis, *CLAIMED)
@@ -81,15 +88,34 @@ def headline(told: Told) -> str:
         return first_words(capital(f"{where}; {_rest(told)}"))
     better = _better_in_short(main, told.channels)
     rest = "" if told.word == "explained" else f"; {100 * told.left:.0f} % stays unexplained"
+    still = _still_off(told)
+    off = off_words(main, told.channels, scales(analysis))
     for parts in (
-        (where, causes, better, rest),
-        (where, causes, "", rest),
-        (off_words(main, told.channels), causes, "", rest),
+        (where, causes, better, rest, still),
+        (where, causes, "", rest, still),
+        (off, causes, "", rest, still),
+        (off_words(main, told.channels), causes, "", "", still),
+        ("", causes, "", "" if still else rest, still),
     ):
-        text = f"{parts[0]}; {parts[1]}{parts[2]}{parts[3]}."
+        text = "".join([f"{parts[0]}; " if parts[0] else "", *parts[1:]]) + "."
         if len(text.split()) <= MOST_WORDS:
             return capital(text)
-    return first_words(capital(f"{causes}{rest}."))
+    return first_words(capital(f"{causes}{still or rest}."))
+
+
+def _still_off(told: Told) -> str:
+    """The channel that stays off most with what was found, as a clause; empty where none is worth a word."""
+    known = scales(told.analysis)
+    left = {}
+    for channel, own in told.channels.items():
+        after = quoted(own).after
+        if channel in known and after is not None:
+            left[channel] = math.sqrt(max(after**2 - (own.noise_floor or 0.0) ** 2, 0.0))
+    most = max(left, key=lambda c: left[c] / known[c].value, default=None)
+    if most is None or left[most] < WORTH_A_WORD * known[most].value:
+        return ""
+    off = f"{number(left[most])} {told.channels[most].unit}"
+    return f"; the {channel_words(most)} stays {off} off ({share_words(left[most], most, known)})"
 
 
 def details(told: Told) -> list[str]:
@@ -103,7 +129,6 @@ def details(told: Told) -> list[str]:
     if told.word != "no_mismatch" and (with_status(analysis, *CLAIMED) or analysis.wrong_values):
         main = main_channel(analysis, told.locations, told.channels)
         out.append(_better(main, told.channels, analysis.put_right))
-        out += _worse(told.channels)
     for finding in by_share(with_status(analysis, "suggested"), told.shares):
         name, numbers = capital(effect_words(finding.id)), _parameters(finding)
         out.append(f"{name} is suggested{f' ({numbers})' if numbers else ''}, not established: {finding.objection}.")
@@ -147,11 +172,14 @@ def _put_right(stated: Sequence[Finding]) -> str:
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
 
 
-def off_words(main: str, channels: Mapping[str, Channel]) -> str:
-    """How much a channel is off, in words."""
+def off_words(main: str, channels: Mapping[str, Channel], known: Mapping[str, Scale] | None = None) -> str:
+    """How much a channel is off, in words; with the `known` scales as a share of the weight, too."""
     if not main:
         return "the model and the recordings differ"
-    return f"the {channel_words(main)} is {number(quoted(channels[main]).before)} {channels[main].unit} off"
+    before = quoted(channels[main]).before
+    share = share_words(before, main, known) if known and before is not None else ""
+    said = f", {share}" if share else ""
+    return f"the {channel_words(main)} is {number(before)} {channels[main].unit} off{said}"
 
 
 def _better_in_short(main: str, channels: Mapping[str, Channel]) -> str:
@@ -164,15 +192,23 @@ def _better_in_short(main: str, channels: Mapping[str, Channel]) -> str:
     return f"; the error falls to {number(errors.after)} {unit} (noise {floor})"
 
 
-def _worse(channels: Mapping[str, Channel]) -> list[str]:
-    """A warning for every channel that is worse on the runs held out."""
+def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
+    """A sentence for every channel that what is delivered makes worse on the runs held out.
+
+    Worse than the vehicle with its values refitted, or than the believed one.
+    """
     out = []
     for name, channel in channels.items():
-        errors = quoted(channel)
-        if errors.before and errors.after and errors.after > 1.1 * max(errors.before, channel.noise_floor or 0.0):
+        errors = channel.rmse.held_out
+        others = [("refitted", errors.refitted), ("believed", errors.before)]
+        known = [(word, value) for word, value in others if value is not None]
+        if errors.after is None or not known or errors.after <= (channel.noise_floor or 0.0):
+            continue
+        word, best = min(known, key=lambda pair: pair[1])
+        if errors.after > (1 + NO_BETTER) * best:
             out.append(
-                f"Warning: the {channel_words(name)} is worse with this, {number(errors.before)} before and "
-                f"{number(errors.after)} {channel.unit} after."
+                f"On the runs held out the {channel_words(name)} is worse with what is delivered: "
+                f"{number(errors.after)} {channel.unit}, {number(best)} with the {word} values alone."
             )
     return out
 
@@ -193,10 +229,6 @@ def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
         return []
     texts = [f"{word}: {listed(own)}" for word, own in groups.items() if own]
     out = [f"Simulated forward for half a second with the improved vehicle, {'; '.join(texts)}."]
-    if groups["worse"]:
-        out.append(
-            f"Warning: the simulation run forward is worse in {listed([g.split(' (')[0] for g in groups['worse']])}."
-        )
     return out
 
 
@@ -206,7 +238,7 @@ def _concerns_the_recording(finding: Finding) -> bool:
 
 
 def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]) -> str:
-    """The channel in which the mismatch stands out most: its error before over its noise.
+    """The channel in which the mismatch is largest to a pilot: what goes of its error, or all of it where nothing does.
 
     Of the channels located, those of what was named come first.
     """
@@ -215,24 +247,23 @@ def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Ma
     named = [c for f in with_status(analysis, *CLAIMED) for c in f.channels if c in there]
     pool = named or there or inverse
 
-    def excess(name):
+    explained = bool(with_status(analysis, *CLAIMED) or analysis.wrong_values)
+    known = scales(analysis)
+
+    def size(name: str) -> float:
         errors = quoted(channels[name])
         before, after = errors.before or 0.0, errors.after or 0.0
-        removed = (
-            math.sqrt(max(before**2 - after**2, 0.0))
-            if with_status(analysis, *CLAIMED) or analysis.wrong_values
-            else before
-        )
-        return removed / max(channels[name].noise_floor or after or 1e-12, 1e-12)
+        off = math.sqrt(max(before**2 - after**2, 0.0)) if explained else before
+        return off / known[name].value if name in known else 0.0
 
-    return max(dict.fromkeys(pool), key=excess) if pool else ""
+    return max(dict.fromkeys(pool), key=size) if pool else ""
 
 
 def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Channel], analysis: Analysis) -> str:
     if not main:
         return off_words(main, channels)
     here = [loc for loc in locations if loc.channel == main]
-    off = off_words(main, channels)
+    off = off_words(main, channels, scales(analysis))
     if not here:
         return off
     best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)

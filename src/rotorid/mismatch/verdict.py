@@ -23,8 +23,9 @@ from rotorid.mismatch.consistency import (
     share_left,
     verdict_word,
 )
-from rotorid.mismatch.findings import Analysis, Finding, Trace, one_per_class, with_status
-from rotorid.mismatch.sentences import Told, details, first_words, headline, main_channel, spoken
+from rotorid.mismatch.delivery.doubts import stopping
+from rotorid.mismatch.findings import Analysis, Finding, Trace, ValueRow, one_per_class, with_status
+from rotorid.mismatch.sentences import Told, details, first_words, headline, main_channel, spoken, warnings_of
 from rotorid.mismatch.shares import fitted_part
 
 __all__ = ["Verdict", "main_channel", "make_verdict", "one_per_class", "spoken", "with_status"]
@@ -133,6 +134,8 @@ class EffectVerdict(Part):
 
     id: str
     status: Literal["established", "ambiguous", "suggested", "absorbed", "not_established"]
+    delivered: bool = Field(description="Whether it stands in one of the three files.")
+    withheld: str = Field(description="Of one that is established or of a class and not delivered: why.")
     alternatives: tuple[str, ...]
     sentence: str
     share: Share | None = Field(
@@ -142,8 +145,45 @@ class EffectVerdict(Part):
     equation: str
     channels: tuple[str, ...]
     parameters: tuple[ParameterEstimate, ...]
+    probability: Probability = Field(description="Posterior that the id is at work; null where none was computed.")
     p_value: Probability
     held_out_gain: Gain | None
+
+
+class Absent(Part):
+    """An id that was tested and not found, and how large it may be all the same."""
+
+    id: str
+    symbol: str
+    at_most: Magnitude
+    unit: str
+    share_of_weight: Magnitude
+
+
+class DoubtOfSet(Part):
+    """Something that stands in the way of believing the verdict."""
+
+    what: str
+    sentence: str
+    stops: bool = Field(description="Whether the set is not judged because of it.")
+
+
+class BelievedValue(Part):
+    """One believed value before and after, with all values free beside the delivered effects."""
+
+    believed: Number
+    estimate: Number
+    interval_95: Interval
+    delivered: Number = Field(description="What stands in improved_vehicle.yaml.")
+    wrong: bool = Field(description="Whether it is among `parameters`.")
+    withheld: str = Field(description="Of a wrong one that is not delivered: why.")
+
+
+class Correlated(Part):
+    """Two believed values of which these recordings know little more than a ratio."""
+
+    values: tuple[str, str]
+    correlation: Number
 
 
 class WrongValue(Part):
@@ -184,13 +224,18 @@ class Verdict(Part):
     set: str
     kind: Literal["flight", "stand", "bench"]
     runs: Runs
-    verdict: Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
+    verdict: Literal["no_mismatch", "explained", "partly_explained", "unexplained", "not_judged"]
+    doubts: tuple[DoubtOfSet, ...]
     sentence: str
     details: tuple[str, ...] = Field(description="What the sentence has no room for, the largest share first.")
+    warnings: tuple[str, ...] = Field(description="Channels that are worse with what is delivered.")
     channels: dict[str, Channel]
     locations: tuple[Location, ...]
     effects: tuple[EffectVerdict, ...]
+    absent: tuple[Absent, ...]
     parameters: dict[str, WrongValue]
+    believed_values: dict[str, BelievedValue]
+    correlations: tuple[Correlated, ...]
     not_testable: tuple[NotTestable, ...]
     unexplained: Unexplained
     next_experiment: NextExperiment
@@ -215,22 +260,27 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     located = located_channels(locations, inverse)
     left = share_left(inverse, located)
     shares = analysis.shares
-    word = verdict_word(analysis, locations, left)
+    word = "not_judged" if stopping(analysis) else verdict_word(analysis, locations, left)
     told = Told(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,
         kind=analysis.recordings.vehicle.kind,
         runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
         verdict=word,
+        doubts=tuple(DoubtOfSet(what=d.what, sentence=d.sentence, stops=d.stops) for d in analysis.doubts),
         sentence=spoken(headline(told), analysis),
         details=tuple(spoken(text, analysis) for text in details(told)),
+        warnings=tuple(spoken(text, analysis) for text in warnings_of({**inverse, **forward})),
         channels=inverse | dict(forward),
         locations=tuple(locations),
         effects=tuple(effect_verdict(f, shares.get(f.id)) for f in by_share(analysis.findings, shares)),
+        absent=(),
         parameters={
             name: WrongValue(believed=believed, refitted=refitted, interval_95=(low, high))
             for name, (believed, refitted, low, high) in analysis.values.items()
         },
+        believed_values={row.name: believed_value_of(row, analysis) for row in analysis.believed_values},
+        correlations=tuple(Correlated(values=pair, correlation=r) for pair, r in analysis.value_correlations.items()),
         not_testable=tuple(NotTestable(id=i, reason=r) for i, r in sorted(analysis.not_testable.items())),
         unexplained=Unexplained(
             share=float(np.clip(told.left, 0.0, 1.0)),
@@ -243,6 +293,18 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             separates=analysis.next_separates,
             predicted_separation_sigma=analysis.next_sigma,
         ),
+    )
+
+
+def believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
+    """One row of the table of all believed values."""
+    return BelievedValue(
+        believed=row.believed,
+        estimate=row.estimate,
+        interval_95=(row.low, row.high),
+        delivered=row.delivered,
+        wrong=row.name in analysis.values,
+        withheld=analysis.withheld_values.get(row.name, ""),
     )
 
 
@@ -308,6 +370,8 @@ def effect_verdict(finding: Finding, share: float | None) -> EffectVerdict:
     return EffectVerdict(
         id=finding.id,
         status=finding.status,
+        delivered=finding.delivered,
+        withheld=finding.withheld,
         alternatives=finding.alternatives,
         sentence=first_words(f"only suggested: {finding.objection}" if finding.objection else finding.sentence),
         share=share,
@@ -317,6 +381,7 @@ def effect_verdict(finding: Finding, share: float | None) -> EffectVerdict:
             ParameterEstimate(symbol=e.symbol, value=e.value, unit=e.unit, interval_95=(e.low, e.high))
             for e in finding.parameters
         ),
+        probability=None,
         p_value=finding.p_value,
         held_out_gain=None
         if finding.gain is None

@@ -19,8 +19,9 @@ from markupsafe import Markup
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.delivery.parts import form_of
 from rotorid.mismatch.findings import Analysis, Finding
-from rotorid.mismatch.headline import errors_of, headline, tiles
+from rotorid.mismatch.tiles import errors_of, tiles
 from rotorid.mismatch.verdict import (
+    BelievedValue,
     Channel,
     EffectVerdict,
     Location,
@@ -47,6 +48,7 @@ WORDS = {
     "explained": "mismatch, explained",
     "partly_explained": "mismatch, partly explained",
     "unexplained": "mismatch, unexplained",
+    "not_judged": "not judged",
 }
 MOST_LOCATIONS = 12
 MOST_RUNS_IN_STRIP = 8
@@ -92,11 +94,13 @@ def make_page(
         runs=runs_text(verdict),
         word=WORDS[verdict.verdict],
         word_class=verdict.verdict,
-        headline=pretty(headline(verdict, main)),
+        headline=pretty(verdict.sentence),
+        doubts=[{"sentence": pretty(d.sentence), "stops": d.stops} for d in verdict.doubts],
+        warnings=[pretty(text) for text in verdict.warnings],
         tiles=[
             {"heading": t.heading, "large": pretty(t.large), "small": pretty(t.small)} for t in tiles(verdict, main)
         ],
-        sentence=pretty(verdict.sentence),
+        details=[pretty(text) for text in verdict.details],
         where_text=where_text(verdict),
         strip=strip(analysis, verdict),
         locations=[location_row(loc) for loc in shown],
@@ -105,6 +109,8 @@ def make_page(
         effects=[effect_block(e, finding_of(e, analysis)) for e in claimed],
         suggested=[effect_block(e, finding_of(e, analysis)) for e in verdict.effects if e.status == "suggested"],
         values=[value_range(name, *v) for name, v in analysis.values.items()],
+        all_values=[value_row(name, row) for name, row in verdict.believed_values.items()],
+        correlated=correlated_text(verdict),
         better_text=better_text(verdict),
         forward_text=forward_text(verdict),
         table=error_table(verdict.channels, data["fit_percent"]),
@@ -357,6 +363,8 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
             f"It could as well be {listed(others, 'or')}: these recordings cannot tell them apart; the model holds "
             f"{effect_words(e.id)} in the place of the class."
         )
+    if e.withheld:
+        notes.append(f"Not delivered: {e.withheld}.")
     elif effect is not None and effect.confusers:
         notes.append(
             f"What is easily mistaken for it ({listed([effect_words(i) for i in effect.confusers])}) was tested beside "
@@ -427,6 +435,36 @@ def value_range(name: str, believed: float, refitted: float, low: float, high: f
     words, unit = parameter_words(name)
     row = parameter_range(words.rstrip(","), refitted, unit, low, high, believed=believed)
     return row | {"meaning": pretty(f"believed {number(believed, 4)} {unit}".strip())}
+
+
+def value_row(name: str, row: BelievedValue) -> dict:
+    """A line of the table of all believed values: before, estimate with interval, delivered."""
+    words, unit = parameter_words(name)
+    low, high = row.interval_95
+    change = ""
+    if row.believed and row.delivered is not None and row.delivered != row.believed:
+        change = f"{100 * (row.delivered / row.believed - 1):+.2g} %"
+    return {
+        "name": words,
+        "unit": unit_text(unit),
+        "believed": cell(row.believed),
+        "estimate": pretty(plus_minus(row.estimate, low, high)) if row.estimate is not None else "–",
+        "delivered": cell(row.delivered),
+        "change": pretty(change),
+        "note": pretty(f"not delivered: {row.withheld}" if row.withheld else "wrong" if row.wrong else ""),
+    }
+
+
+def correlated_text(verdict: Verdict) -> list[str]:
+    """Sentences on the values of which little more than a ratio is known."""
+    pairs: list[tuple[str, str, float]] = []
+    for pair in verdict.correlations:
+        first, second = (parameter_words(n)[0] for n in pair.values)
+        pairs.append((first, second, pair.correlation))
+    return [
+        pretty(f"Of {first} and {second} these recordings know little more than a ratio (correlation {r:.3f}).")
+        for first, second, r in pairs
+    ]
 
 
 def better_text(verdict: Verdict) -> str:

@@ -12,6 +12,7 @@ from rotorid.errors import InputError
 from rotorid.names import hint
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import check_belief
+from rotorid.recordings.proposed import proposed_in
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import (
     TooFewSamples,
@@ -193,7 +194,8 @@ def read_set(folder: Path) -> RecordingSet:
         held_out = read_split(split, [run_name(p) for p in paths])
     elif near := _misnamed(split):
         raise InputError(f"{folder / near}: expected the name {SPLIT}")
-    return RecordingSet(folder.name, vehicle, tuple(runs), held_out, str(folder), tuple(left_out))
+    proposed = proposed_in((folder / VEHICLE).read_text(encoding="utf-8"))
+    return RecordingSet(folder.name, vehicle, tuple(runs), held_out, str(folder), tuple(left_out), proposed)
 
 
 def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:

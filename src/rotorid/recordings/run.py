@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import columns as c
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.vehicle import Vehicle
 
 
@@ -77,6 +78,8 @@ class RecordingSet:
     """Folder that it was read from, for messages; empty where there is none."""
     left_out: tuple[str, ...] = ()
     """One sentence for each run that could not be used."""
+    proposed: tuple[Doubt, ...] = ()
+    """Values of the vehicle that nobody measured."""
 
     def run(self, name: str) -> Run:
         """The run of that name; KeyError if there is none."""

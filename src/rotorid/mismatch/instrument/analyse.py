@@ -270,10 +270,9 @@ def as_delivered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Val
             not_testable=words.not_testable,
             without_values=words.without_values,
         )
-        last = with_shares(last)
     reasons = gated.withheld_values
     return replace(
-        last,
+        with_shares(last),
         withheld_values={n: reasons[k] for n, keys in names.items() for k in keys if k in reasons},
         notes=(*last.notes, *(fell_back_note(k, why, VALUE_NAMES) for k, why in gated.fell_back.items())),
         believed_values=value_rows(fewer, final, last.improved, choice.setup.vehicle, VALUE_NAMES),

@@ -1,4 +1,4 @@
-"""The top of the verdict's page: one sentence of at most 25 words and three tiles."""
+"""The top of the verdict's page: three tiles below its sentence."""
 
 from __future__ import annotations
 
@@ -15,9 +15,6 @@ from rotorid.mismatch.words import (
     parameter_words,
     regime_words,
 )
-
-MOST_WORDS = 25
-FEWEST_NAMED = 1
 
 
 @dataclass(frozen=True)
@@ -57,55 +54,6 @@ def _name(effect: EffectVerdict) -> str:
     if len(others) == 1:
         return f"{effect_words(effect.id)} or {effect_words(others[0])}"
     return f"{effect_words(effect.id)} or one of {len(others)} others"
-
-
-def headline(verdict: Verdict, main: str) -> str:
-    """At most 25 words: what is off, what it is, how much better it gets."""
-    if verdict.verdict == "no_mismatch":
-        return "The believed vehicle describes these recordings to within the noise of their sensors."
-    named, values = claims(verdict), [parameter_words(n)[0].rstrip(",") for n in verdict.parameters]
-    # How much better it gets, and what is left, come before the last of the names.
-    for tail in (_gain(verdict, main), _left(verdict)):
-        for count in range(len(named), min(FEWEST_NAMED, len(named)) - 1, -1):
-            for wrong in (values, values[:1]):
-                text = _claim(named, count, wrong) + tail + "."
-                if (count or wrong) and len(text.split()) <= MOST_WORDS:
-                    return capital(text)
-    text = _claim(named, FEWEST_NAMED, []) if named else _claim([], 0, values)
-    if named or values:
-        return capital(f"{' '.join(text.split()[: MOST_WORDS - 1])}.")
-    off = f"the {channel_words(main)} differs from the recordings" if main else "model and recordings differ"
-    return capital(f"{off}, and nothing in the catalogue explains it.")
-
-
-def _claim(named: Sequence[str], count: int, values: Sequence[str]) -> str:
-    shown = list(named[:count])
-    more = len(named) - count
-    if more:
-        shown.append(f"{more} more")
-    parts = []
-    if shown:
-        parts.append(f"{listed(shown)} {'was' if len(named) == 1 else 'were'} left out")
-    if values:
-        parts.append(f"{listed(list(values))} {'is' if len(values) == 1 else 'are'} wrong")
-    return "; ".join(parts)
-
-
-def _gain(verdict: Verdict, main: str) -> str:
-    if main not in verdict.channels or not (claims(verdict) or verdict.parameters):
-        return ""
-    channel = verdict.channels[main]
-    errors, _ = errors_of(channel)
-    if errors.before is None or errors.after is None or errors.after >= errors.before:
-        return _left(verdict)
-    rest = "" if verdict.verdict == "explained" else f", {100 * verdict.unexplained.share:.0f} % unexplained"
-    return f": {channel_words(main)} error {number(errors.before)} → {number(errors.after)} {channel.unit}{rest}"
-
-
-def _left(verdict: Verdict) -> str:
-    if verdict.verdict == "explained":
-        return ""
-    return f"; {100 * verdict.unexplained.share:.0f} % of the mismatch stays unexplained"
 
 
 def tiles(verdict: Verdict, main: str) -> list[Tile]:
