@@ -1,0 +1,97 @@
+"""`conditions.yaml` and `instruments.yaml`: what belongs to a run and to a sensor, read back as it was written."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotorid.errors import InputError
+from rotorid.mismatch.deliver import write_files
+from rotorid.mismatch.delivery.files import (
+    conditions_of,
+    empty,
+    instruments_of,
+    read_conditions,
+    read_instruments,
+    text_of,
+)
+from rotorid.mismatch.delivery.model import model_of
+from rotorid.mismatch.findings import Blow
+from rotorid.mismatch.forward import delivered_model, errors_of, forward_channels
+from rotorid.mismatch.shares import segments_of
+from tests.unit.mismatch.delivery.test_parts import WIND, sensor_error
+from tests.unit.mismatch.synthetic import HOVER, K_D, analysis, drag_finding
+
+NAMES = ("verdict.json", "report.html", "improved_vehicle.yaml")
+
+
+def windy(**changes):
+    """Drag in a steady wind of 2 m/s to the north."""
+    blows = tuple(Blow(run, "all the time", np.array([0.5, 39.5]), np.array([[2.0, 0.0]] * 2)) for run in "abc")
+    return replace(analysis(findings=[drag_finding(), WIND]), blows=blows, **changes)
+
+
+def test_a_steady_wind_stands_with_its_runs_and_comes_back(tmp_path):
+    path = tmp_path / "conditions.yaml"
+    path.write_text(text_of(conditions_of(windy())))
+    found = read_conditions(path)
+    assert [(c.id, c.run, c.start_s, c.stop_s) for c in found.conditions] == [
+        ("steady_wind", run, None, None) for run in "abc"
+    ]
+    assert found.conditions[0].parameters == {"w_north": 2.0, "w_east": 0.0}
+    assert found.wind("a", np.array([-1.0, 20.0, 99.0])).tolist() == [[2.0, 0.0, 0.0]] * 3
+    assert found.wind("z", np.array([0.0])) is None
+
+
+def test_a_gust_blows_in_its_window_alone():
+    gust = replace(WIND, id="gust", windows=(("a", 4.0, 6.0),))
+    blow = Blow("a", "in windows", np.array([4.0, 5.0, 6.0]), np.array([[0.0, 0.0], [3.0, 1.0], [0.0, 0.0]]))
+    found = conditions_of(replace(analysis(findings=[gust]), blows=(blow,)))
+    assert found.wind("a", np.array([3.0, 4.5, 5.0, 7.0]))[:, 0].tolist() == [0.0, 1.5, 3.0, 0.0]
+    assert (found.conditions[0].start_s, found.conditions[0].stop_s) == (4.0, 6.0)
+
+
+def test_the_simulation_run_forward_flies_in_the_wind_that_was_found():
+    """At a steady velocity in a wind as fast there is no airspeed, so no drag: the vehicle goes straight on."""
+    made = windy()
+    runs = tuple(
+        replace(r, table=r.table.assign(velocity_x_m_s=2.0, position_x_m=2.0 * r.time_s)) for r in made.recordings.runs
+    )
+    made = replace(made, recordings=replace(made.recordings, runs=runs))
+    with_wind = forward_channels(made).channels["velocity"].rmse.held_out.after
+    still = forward_channels(replace(made, blows=())).channels["velocity"].rmse.held_out.after
+    assert with_wind == pytest.approx(0.0, abs=1e-6)
+    assert still > 0.1 * K_D * 4 * HOVER * 2.0 / 0.652
+
+
+def test_an_error_of_a_gyroscope_is_taken_off_the_reading():
+    """Rates that read 0.01 rad/s too much are no rotation where the instrument is known to."""
+    made = analysis(findings=[sensor_error(values=(0.01, 0.0, 0.0))])
+    runs = tuple(replace(r, table=r.table.assign(angular_velocity_x_rad_s=0.01)) for r in made.recordings.runs)
+    made = replace(made, recordings=replace(made.recordings, runs=runs))
+    segments = segments_of(made)
+    known = errors_of(segments, delivered_model(made))[0].channels["attitude"]
+    unknown = errors_of(segments, model_of(made.improved))[0].channels["attitude"]
+    assert np.abs(known).max() < 1e-4 < np.abs(unknown).max()
+
+
+def test_the_files_are_there_where_there_is_something_to_write_and_gone_where_not(tmp_path):
+    paths = [tmp_path / n for n in NAMES]
+    write_files(replace(windy(), findings=(drag_finding(), WIND, sensor_error())), *paths)
+    assert {"conditions.yaml", "instruments.yaml"} <= {p.name for p in tmp_path.iterdir()}
+    assert read_instruments(tmp_path / "instruments.yaml").instruments[0].id == "gyro_error"
+    write_files(analysis(findings=[drag_finding()]), *paths)
+    assert {p.name for p in tmp_path.iterdir()} == {*NAMES, "ledger.json"}
+
+
+def test_nothing_found_is_empty():
+    made = analysis(findings=[drag_finding()])
+    assert empty(conditions_of(made)) and empty(instruments_of(made))
+
+
+@pytest.mark.parametrize(("text", "said"), [("set: a\nwinds: []\n", "winds"), ("{", "not YAML"), ("[]", "conditions")])
+def test_a_file_that_does_not_fit_is_refused_in_one_sentence(tmp_path, text, said):
+    path = tmp_path / "conditions.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_conditions(path)

@@ -1,0 +1,80 @@
+"""A delivered vehicle is a body that hovers and flies."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.mismatch.delivery.usable import (
+    cannot_fly,
+    cannot_hover,
+    figure_of_merit,
+    full_thrust_n,
+    no_body,
+    question_of,
+    recorded_share,
+)
+from rotorid.recordings import Run
+from tests.unit.vehicle.thesis import thesis_vehicle
+
+LIMITS = {"rotor_speed_limits_rad_s": (0.0, 1600.0)}
+
+
+def vehicle(**changes):
+    return thesis_vehicle().model_copy(update=LIMITS | changes)
+
+
+def test_full_thrust_is_that_of_all_rotors_at_their_limit():
+    assert full_thrust_n(vehicle()) == pytest.approx(4 * 1.3877e-6 * 1600**2)
+    assert full_thrust_n(thesis_vehicle().model_copy(update={"rotor_speed_limits_rad_s": None})) is None
+
+
+def test_a_thrust_coefficient_below_the_weight_cannot_hover():
+    """A maximum thrust of 0.72 of the weight, as one improved vehicle had."""
+    weak = vehicle(thrust_coefficient_n_s2=0.72 * 0.652 * 9.81 / (4 * 1600**2))
+    assert "full thrust is 4.61 N for a weight of 6.4 N" in cannot_hover(weak, 0.0)
+    assert cannot_hover(vehicle(), 0.0) == ""
+
+
+def test_a_vehicle_recorded_near_its_full_thrust_may_hover_there():
+    tight = vehicle(thrust_coefficient_n_s2=1.05 * 0.652 * 9.81 / (4 * 1600**2))
+    assert cannot_hover(tight, 0.0) and cannot_hover(tight, 0.96) == ""
+
+
+def test_an_effect_that_takes_the_thrust_away_is_seen():
+    curve = {"id": "command_saturation", "form": "upper limit", "parameters": {"w_high": 0.6}}
+    slow = vehicle(effects=(curve,))
+    assert full_thrust_n(slow) == pytest.approx(0.36 * full_thrust_n(vehicle())) and cannot_hover(slow, 0.0)
+
+
+def test_the_recorded_share_needs_no_coefficient():
+    speed = np.full((400, 4), 0.5 * 1600.0)
+    speed[:100] = 100.0  # on the ground
+    table = pd.DataFrame(speed, columns=[f"rotor_speed_{i}_rad_s" for i in range(1, 5)]).assign(
+        time_s=np.arange(400) / 100
+    )
+    assert recorded_share([Run("a", table)], vehicle()) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("factor", [1e-4, 100.0])
+def test_an_inertia_is_that_of_the_body(factor):
+    j = thesis_vehicle().inertia_kg_m2
+    wrong = vehicle(inertia_kg_m2=j.model_copy(update={k: getattr(j, k) * factor for k in ("xx", "yy", "zz")}))
+    assert "radius of gyration" in no_body(wrong) and no_body(vehicle()) == ""
+
+
+def test_no_rotor_is_better_than_an_ideal_one():
+    known = vehicle(rotor_radius_m=0.0635)
+    better = known.model_copy(update={"torque_coefficient_n_m_s2": 1.8558e-9})
+    assert figure_of_merit(known) < 1.0 < figure_of_merit(better) and "figure of merit" in no_body(better)
+
+
+def test_it_flies_under_the_projects_controller_and_one_that_cannot_is_said():
+    assert cannot_fly(vehicle()) == ""
+    still = vehicle(torque_coefficient_n_m_s2=1.8558e-8, rotor_speed_limits_rad_s=(0.0, 900.0))
+    tilted = {"id": "com_offset", "form": "moment", "parameters": {"r_x": 0.08, "r_y": 0.0}}
+    assert cannot_fly(still.model_copy(update={"effects": (tilted,)}))
+
+
+def test_what_the_believed_vehicle_fails_itself_is_not_asked_of_another():
+    weak = vehicle(thrust_coefficient_n_s2=0.72 * 0.652 * 9.81 / (4 * 1600**2))
+    assert question_of(weak, ())(weak) == "" and question_of(vehicle(), ())(weak)
