@@ -93,6 +93,7 @@ def main(
         state["examples"][name] = {
             "verdict": verdict["verdict"].replace("_", " "),
             "sentence": verdict["sentence"],
+            "said_with_it": [*(doubt["sentence"] for doubt in verdict["doubts"]), *verdict["warnings"]],
             "runs": len(recordings.runs),
             "seconds": float(sum(run.time_s[-1] - run.time_s[0] for run in recordings.runs)),
             "values": [

@@ -27,6 +27,7 @@ from rotorid.mismatch.delivery.doubts import stopping
 from rotorid.mismatch.findings import Analysis, Finding, Trace, ValueRow, one_per_class, with_status
 from rotorid.mismatch.sentences import Told, details, first_words, headline, main_channel, spoken, warnings_of
 from rotorid.mismatch.shares import fitted_part
+from rotorid.mismatch.sizes import Size
 
 __all__ = ["Verdict", "main_channel", "make_verdict", "one_per_class", "spoken", "with_status"]
 
@@ -129,6 +130,15 @@ class Gain(Part):
     interval_95: Interval
 
 
+class SizeOfEffect(Part):
+    """Root mean square of what an effect does to a channel, in its unit and as a share of what a pilot knows."""
+
+    channel: str
+    rms: Magnitude
+    share: Magnitude
+    of: str
+
+
 class EffectVerdict(Part):
     """What the data say of one id."""
 
@@ -138,6 +148,7 @@ class EffectVerdict(Part):
     withheld: str = Field(description="Of one that is established or of a class and not delivered: why.")
     alternatives: tuple[str, ...]
     sentence: str
+    size: SizeOfEffect | None = Field(description="What it does where it does most, on the held-out runs.")
     share: Share | None = Field(
         description="Part of the squared error between before and after on the held-out runs that goes without it, "
         "two sensors of one quantity compared among the channels."
@@ -273,7 +284,10 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         warnings=tuple(spoken(text, analysis) for text in warnings_of({**inverse, **forward})),
         channels=inverse | dict(forward),
         locations=tuple(locations),
-        effects=tuple(effect_verdict(f, shares.get(f.id)) for f in by_share(analysis.findings, shares)),
+        effects=tuple(
+            effect_verdict(f, shares.get(f.id), analysis.effect_sizes.get(f.id))
+            for f in by_share(analysis.findings, shares)
+        ),
         absent=(),
         parameters={
             name: WrongValue(believed=believed, refitted=refitted, interval_95=(low, high))
@@ -365,7 +379,7 @@ def rms(parts: Sequence[np.ndarray]) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
-def effect_verdict(finding: Finding, share: float | None) -> EffectVerdict:
+def effect_verdict(finding: Finding, share: float | None, size: Size | None = None) -> EffectVerdict:
     """One entry under `effects`."""
     return EffectVerdict(
         id=finding.id,
@@ -374,6 +388,9 @@ def effect_verdict(finding: Finding, share: float | None) -> EffectVerdict:
         withheld=finding.withheld,
         alternatives=finding.alternatives,
         sentence=first_words(f"only suggested: {finding.objection}" if finding.objection else finding.sentence),
+        size=None
+        if size is None
+        else SizeOfEffect(channel=size.channel, rms=size.rms, share=size.share, of=size.words.removeprefix("of ")),
         share=share,
         equation=finding.equation or (finding.form.equation if finding.form else ""),
         channels=finding.channels,

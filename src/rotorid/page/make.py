@@ -50,6 +50,7 @@ WORDS = {
     "unexplained": "mismatch, unexplained",
     "not_judged": "not judged",
 }
+SIZE_UNITS = {"force": "N", "moment": "N m", "rotor_speed": "rad/s", "accelerometer": "m/s2", "gyroscope": "rad/s"}
 MOST_LOCATIONS = 12
 MOST_RUNS_IN_STRIP = 8
 STRIP_CELLS = 400
@@ -362,6 +363,12 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
         notes.append(
             f"It could as well be {listed(others, 'or')}: these recordings cannot tell them apart; the model holds "
             f"{effect_words(e.id)} in the place of the class."
+        )
+    if e.size is not None and e.size.share is not None:
+        unit = SIZE_UNITS.get(e.size.channel.rpartition("_")[0], "")
+        notes.append(
+            f"Where it does most it moves the {channel_words(e.size.channel)} by {number(e.size.rms)} {unit}".rstrip()
+            + f", {number(100 * e.size.share)} % of {e.size.of} (root mean square on held-out flight)."
         )
     if e.withheld:
         notes.append(f"Not delivered: {e.withheld}.")

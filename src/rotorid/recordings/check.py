@@ -14,7 +14,6 @@ import numpy as np
 from rotorid.recordings import columns as c
 from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import read_set
-from rotorid.recordings.grounded import grounded
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.sufficient import sufficient
@@ -187,7 +186,7 @@ def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
     if recordings.vehicle.kind != "bench":
         found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
     if recordings.vehicle.kind == "flight":
-        found += [*physical_doubts(recordings), *grounded(recordings)]
+        found += physical_doubts(recordings)
     return tuple(found)
 
 
