@@ -18,6 +18,7 @@ import numpy as np
 from rotorid.exports.forms import AT_ONCE_S, FLU, Exported
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.improved import simulate_as_stated
+from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.simulator import Commands, Start
 
 STEP_S = 0.001
@@ -46,7 +47,7 @@ class Difference:
 def commands_of(vehicle: Vehicle, duration_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Times (n,) and rotor speeds (n, k), rad/s, about hover that turn the vehicle about every axis in turn."""
     time = np.arange(int(duration_s / STEP_S) + 1) * STEP_S
-    hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum())
+    hover = hover_speed_rad_s(vehicle)
     phase = 2 * np.pi * np.arange(vehicle.rotor_count) / vehicle.rotor_count
     # Phases around the vehicle roll and pitch it; their torques cancel, so yaw has a swing of its own.
     swing = 0.004 * np.sin(2 * np.pi * 1.5 * time[:, None] + phase) + 0.02 * np.sin(2 * np.pi * 0.7 * time)[:, None]

@@ -15,6 +15,7 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.mixer import hover_speed_rad_s
 
 FLU = np.array([1.0, -1.0, -1.0])
 AT_ONCE_S = 1e-3
@@ -134,7 +135,7 @@ def rotorpy(vehicle: Vehicle) -> Exported:
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: RotorPy has 9.81")
     j = _in_flu(parts.inertia)
-    low, high = vehicle.rotor_speed_limits_rad_s or (0.0, 10 * _hover(vehicle))
+    low, high = vehicle.rotor_speed_limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle))
     values = {
         "mass": parts.mass_kg,
         **{f"I{a}{b}": float(j["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "yz", "xz")},
@@ -166,10 +167,6 @@ def rotorpy(vehicle: Vehicle) -> Exported:
     arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in values.items()}
     arrays["rotor_pos"] = {k: np.array(v) for k, v in values["rotor_pos"].items()}
     return Exported("\n".join(lines), "rotorpy_params.py", tuple(left), arrays)
-
-
-def _hover(vehicle: Vehicle) -> float:
-    return float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum()))
 
 
 def mjcf(vehicle: Vehicle) -> Exported:
@@ -261,7 +258,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it belongs to Gazebo's world file")
     j = _in_flu(parts.inertia)
-    most = (vehicle.rotor_speed_limits_rad_s or (0.0, 10 * _hover(vehicle)))[1]
+    most = (vehicle.rotor_speed_limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle)))[1]
     share = min(1e-3 * parts.mass_kg, 0.005)
     radius = vehicle.rotor_radius_m or 0.05
     links, motors = [], []
@@ -355,7 +352,7 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     left.append(
         "air without friction: it leaves on Bullet's damping, a deceleration of 0.04 (1 + |v|) v and so for turning"
     )
-    hover = _hover(vehicle)
+    hover = hover_speed_rad_s(vehicle)
     limit = (vehicle.rotor_speed_limits_rad_s or (0.0, 2 * hover))[1]
     lift = float(parts.thrust.sum() * limit**2 / (parts.mass_kg * vehicle.gravity_m_s2))
     # kf and km are by the square of turns a minute, the drag by the sum of rad/s.
