@@ -12,9 +12,10 @@ from typer.testing import CliRunner
 
 from rotorid import templates
 from rotorid.cli import app
-from rotorid.exports import export_vehicle
-from rotorid.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy
+from rotorid.exports import export_vehicle, flown
+from rotorid.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 from rotorid.recordings import Vehicle, write_vehicle
+from rotorid.recordings.vehicle import Inertia
 
 
 def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
@@ -204,3 +205,108 @@ def test_gym_pybullet_drones_refuses_what_it_cannot_fly() -> None:
     for vehicle in (plus, with_effects().model_copy(update={"rotors": with_effects().rotors[:3]})):
         with pytest.raises(ValueError, match="gym-pybullet-drones"):
             export_vehicle(vehicle, "gym-pybullet-drones")
+
+
+THRUST_LAG = ("motor_lag", "on thrust", {"tau": 0.04})
+CHAIN = (
+    ("throttle_curve", "affine", {"a_0": 0.05, "a_1": 0.1}),
+    ("battery_sag", "power of voltage", {"p": 1.0}),
+    ("delay", "of the command", {"T": -0.01}),
+    THRUST_LAG,
+)
+NEAR_GROUND = ("ground_effect", "image rotor", {"c": 1.0})
+
+
+def limited(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
+    return with_effects(*effects).model_copy(update={"rotor_speed_limits_rad_s": (100.0, 2000.0)})
+
+
+def test_a_lag_of_the_thrust_goes_along_wherever_a_lag_is_known() -> None:
+    vehicle = with_effects(THRUST_LAG)
+    rotorpy = export_vehicle(vehicle, "rotorpy")
+    assert rotorpy.parameters["tau_m"] == 0.04
+    (said,) = rotorpy.left_out
+    assert said.startswith("motor_lag") and "near hover has the same time constant" in said
+    motor = ElementTree.fromstring(export_vehicle(vehicle, "sdf").text).find("model/plugin")
+    assert [float(motor.findtext(f"timeConstant{way}")) for way in ("Up", "Down")] == [0.04, 0.04]
+    mjcf = export_vehicle(vehicle, "mjcf")
+    actuators = ElementTree.fromstring(mjcf.text).findall("actuator/general")
+    assert [(a.get("dyntype"), float(a.get("dynprm"))) for a in actuators] == [("filterexact", 0.04)] * 4
+    assert mjcf.left_out == ()
+    nearly = export_vehicle(with_effects(LAG), "mjcf")
+    assert "taken as one of the thrust, 0.03 s" in nearly.left_out[0]
+    for form in ("gym-pybullet-drones", "px4"):
+        assert any(s.startswith("motor_lag (on thrust") for s in export_vehicle(vehicle, form).left_out)
+
+
+@pytest.mark.parametrize("form", ["rotorpy", "mjcf", "sdf", "gym-pybullet-drones", "px4"])
+def test_what_lies_before_the_motors_is_named(form: str) -> None:
+    named = [s.split(" (")[0] for s in export_vehicle(with_effects(*CHAIN), form).left_out]
+    assert named[:3] == ["throttle_curve", "battery_sag", "delay"]
+
+
+def test_saturation_is_a_limit_where_a_tool_has_limits() -> None:
+    high = ("command_saturation", "upper limit", {"w_high": 0.8})
+    low = ("command_saturation", "lower limit", {"w_low": 0.2})
+    vehicle = limited(high, low)
+    rotorpy = export_vehicle(vehicle, "rotorpy")
+    assert (rotorpy.parameters["rotor_speed_min"], rotorpy.parameters["rotor_speed_max"]) == (320.0, 1600.0)
+    sdf = export_vehicle(vehicle, "sdf")
+    assert "<maxRotVelocity>1600<" in sdf.text and any("lowest rotor speed of 320 rad/s" in s for s in sdf.left_out)
+    motor = ElementTree.fromstring(export_vehicle(vehicle, "mjcf").text).find("actuator/general")
+    np.testing.assert_allclose(numbers(motor.get("ctrlrange")), 1.3877e-6 * np.array([320.0, 1600.0]) ** 2, rtol=1e-8)
+    assert not any("command_saturation" in s for s in (*rotorpy.left_out, *sdf.left_out))
+    # Without limits nothing says what the shares are of.
+    assert export_vehicle(with_effects(high), "rotorpy").left_out[0].startswith("command_saturation")
+
+
+def test_px4_has_a_map_of_its_own_for_a_thrust_curve_of_the_throttle() -> None:
+    curve = ("throttle_curve", "thrust curve of the throttle", {"b": 0.3})
+    for vehicle in (limited(curve), with_effects(curve)):
+        exported = export_vehicle(vehicle, "px4")
+        assert "THR_MDL_FAC\t0.7\t" in exported.text
+        assert not any("throttle_curve" in s for s in exported.left_out)
+    assert "THR_MDL_FAC\t1\t" in export_vehicle(limited(), "px4").text
+
+
+def exported_by_command(folder, vehicle: Vehicle, form: str, file: str):
+    write_vehicle(vehicle, folder / "v.yaml")
+    return CliRunner().invoke(app, ["export", str(folder / "v.yaml"), "--to", form, "-o", str(folder / "out" / file)])
+
+
+@pytest.mark.parametrize(("form", "module"), [("rotorpy", "rotorpy"), ("mjcf", "mujoco")])
+def test_the_trial_flight_is_made_for_any_chain(tmp_path, monkeypatch, form: str, module: str) -> None:
+    pytest.importorskip(module)
+    done = exported_by_command(tmp_path, with_effects(*CHAIN, NEAR_GROUND, DRAG), form, "vehicle")
+    assert done.exit_code == 0, done.output
+    assert "beside ours, with what the file expresses" in done.output and (tmp_path / "out" / "vehicle").is_file()
+    fly = {"rotorpy": in_rotorpy, "mjcf": in_mujoco}[form]
+    vehicle = with_effects(*CHAIN)
+    exported = export_vehicle(vehicle, form)
+    found = fly(vehicle, exported)
+    assert found.position_m < 1e-4 * found.flown_m and found.angle_rad < 5e-3 * found.turned_rad
+    # Twice the lag shows: the comparison could fail.
+    other = export_vehicle(with_effects(("motor_lag", "on thrust", {"tau": 0.08})), form)
+    monkeypatch.setattr(flown, "lagging", lambda speeds, up_s, down_s: lagging(speeds, up_s / 2, down_s / 2))
+    assert fly(vehicle, other).angle_rad > 10 * found.angle_rad
+
+
+@pytest.mark.parametrize("trouble", [ImportError("no module", name="rotorpy"), ValueError("it\nfell")])
+def test_a_trial_that_fails_is_one_sentence_and_the_file_is_there(tmp_path, monkeypatch, trouble: Exception) -> None:
+    def fail(vehicle, exported):
+        raise trouble
+
+    monkeypatch.setitem(flown.FLYERS, "rotorpy", ("a_module_that_nobody_has", fail))
+    done = exported_by_command(tmp_path, with_effects(THRUST_LAG), "rotorpy", "vehicle.py")
+    assert done.exit_code == 0, done.output
+    last = done.output.splitlines()[-1].strip()
+    assert last.startswith("not flown there") or last == "the trial flight there did not end: it fell"
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["vehicle.py"]
+
+
+def test_a_file_that_the_tool_does_not_read_is_not_written(tmp_path) -> None:
+    pytest.importorskip("mujoco")
+    flat = Inertia(xx=0.002, yy=0.002, zz=0.02)  # more than xx + yy: of no body
+    done = exported_by_command(tmp_path, with_effects().model_copy(update={"inertia_kg_m2": flat}), "mjcf", "v.xml")
+    assert done.exit_code == 1 and "MuJoCo does not read the exported vehicle" in done.output
+    assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()

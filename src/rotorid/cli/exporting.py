@@ -17,7 +17,8 @@ def export(
 ) -> None:
     """Write the vehicle, with its effects as far as the form knows them, for another tool.
 
-    What the form cannot express is named, on the screen and in the file.
+    What the form cannot express is named, on the screen and in the file. Where the tool is installed the vehicle is
+    flown there beside ours first: a file that the tool does not read is not written.
 
     Example: `rotorid export flights-verdict/improved_vehicle.yaml --to rotorpy`
     """
@@ -25,15 +26,16 @@ def export(
         from rotorid.exports import export_vehicle
         from rotorid.exports.flown import try_out
         from rotorid.recordings import read_vehicle
+        from rotorid.writing import all_or_none
 
         vehicle = read_vehicle(vehicle_file)
         exported = export_vehicle(vehicle, to)
+        flown = try_out(vehicle, to, exported)
         path = out or Path(exported.file_name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(exported.text, encoding="utf-8")
+        with all_or_none(path) as (part,):
+            part.write_text(exported.text, encoding="utf-8")
         typer.echo(f"{path}: written for {to}")
         for sentence in exported.left_out:
             typer.echo(f"  - not expressed: {sentence}")
-        flown = try_out(vehicle, to, exported)
         if flown:
             typer.echo(f"  {flown}")

@@ -21,17 +21,21 @@ def simulate(
     """Fly a vehicle, with the effects its file states, and write the flights as a recording set.
 
     The vehicle swings in roll and pitch about hover under an attitude controller; sensors are noisy. The set's own
-    vehicle.yaml is the one without the effects, so that `rotorid verdict` has something to find.
+    vehicle.yaml is the one without the effects, so that `rotorid verdict` has something to find. What cannot be flown
+    as the file says is named.
 
     Example: `rotorid simulate flights-verdict/improved_vehicle.yaml -o simulated`
     """
     with one_sentence():
+        from rotorid.control.swings import remarks
         from rotorid.recordings import read_vehicle
 
         vehicle = read_vehicle(vehicle_file)
         folder = out or Path(f"{vehicle_file.resolve().parent.name}-simulated")
         if (folder / "vehicle.yaml").exists():
             raise InputError(f"{folder / 'vehicle.yaml'} is there already; choose another folder with -o")
+        for sentence in remarks(vehicle):
+            typer.echo(f"  - {sentence}")
         written = fly(vehicle, folder, seconds, flights, seed)
         typer.echo(f"{written}: {flights} flights of {seconds:g} s. Next: `rotorid verdict {written}`")
 

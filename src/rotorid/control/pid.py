@@ -69,7 +69,7 @@ class AttitudePid:
     """The thesis's attitude controller (fig. 4.8): PID moments and a set thrust, allocated to rotor speeds.
 
     Implements `Controller` of `rotorid.vehicle.simulator`. `derivative_time_s` and `limit_n_m` are the
-    options of `pid_step`; the thesis has neither.
+    options of `pid_step`; the thesis has neither. `trim_n_m` (3,), N m, is added to the moments, beyond their limit.
     """
 
     def __init__(
@@ -79,12 +79,14 @@ class AttitudePid:
         gains: Gains = THESIS_GAINS,
         derivative_time_s: float = 0.0,
         limit_n_m: tuple[float, float, float] | None = None,
+        trim_n_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ):
         self.reference = reference
         self.gains = gains
         self.derivative_time_s = derivative_time_s
         self.limit_n_m = None if limit_n_m is None else np.asarray(limit_n_m, float)
         self._allocation = allocation_matrix(vehicle).T
+        self._trim = np.array([0.0, *trim_n_m]) @ self._allocation
         self._memory: Memory | None = None
         self._time_s: float | None = None
 
@@ -105,7 +107,7 @@ class AttitudePid:
             )
         self._time_s = time_s
         wanted = np.concatenate([np.full((len(error), 1), self.reference.thrust_n), moment], axis=1)
-        return np.sqrt(np.maximum(wanted @ self._allocation, 0.0))
+        return np.sqrt(np.maximum(np.maximum(wanted @ self._allocation, 0.0) + self._trim, 0.0))
 
     def attitude_loop(self, time_s: np.ndarray) -> AttitudeLoop | None:
         """The controller laid out for instants (m,), s, so that it flies compiled; None once it has been called."""
@@ -118,4 +120,5 @@ class AttitudePid:
             reference=np.column_stack([angles, np.full(len(time_s), self.reference.thrust_n)]),
             derivative_time_s=self.derivative_time_s,
             limit_n_m=self.limit_n_m,
+            more=np.tile(self._trim, (len(time_s), 1)) if self._trim.any() else None,
         )

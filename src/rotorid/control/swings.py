@@ -1,4 +1,8 @@
-"""Flights for a first look at a vehicle: swings in roll, pitch and yaw about hover under an attitude controller."""
+"""Flights for a first look at a vehicle: swings in roll, pitch and yaw about hover under an attitude controller.
+
+The pilot knows the believed vehicle alone. As a pilot does, he finds the throttle that carries what he flies, and turns
+his gains down where the rotors answer more strongly or later than believed.
+"""
 
 from __future__ import annotations
 
@@ -6,29 +10,57 @@ import numpy as np
 
 from rotorid.control.pid import AttitudePid, Gains
 from rotorid.control.references import AttitudeReference
+from rotorid.effects.contract import DELAY, LAG
 from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet, Run, Vehicle
-from rotorid.vehicle.improved import record_as_stated, simulate_as_stated
-from rotorid.vehicle.simulator import Noise
+from rotorid.vehicle.flyable import flyable
+from rotorid.vehicle.hover import hover
+from rotorid.vehicle.improved import active_speed_forms, command_path, record_as_stated, simulate_as_stated
+from rotorid.vehicle.simulator import Noise, Start
 
 STIFFNESS_RAD_S, DAMPING = 10.0, 0.8
 """Natural frequency and damping of the attitude loop that flies the vehicle."""
+DERIVATIVE_S = 0.02
+"""Time over which the pilot's rate of turn is smoothed."""
+LATE_RAD = 0.4
+"""Natural frequency times all that comes late, at most: at the crossover of such a loop, twice the natural frequency,
+this leaves half of its phase margin of about 70 degrees."""
+MEAN_TILT_COSINE = 0.96
+"""Of the swings, roughly."""
+START_HEIGHT_M = 100.0
+"""Above the ground at the start: out of its effect, and in the air until the end though nobody holds the height."""
+
+
+def remarks(vehicle: Vehicle) -> tuple[str, ...]:
+    """What `swings` flies otherwise than the file says, a sentence each; InputError for what does not fly."""
+    flown, said = flyable(vehicle)
+    found = hover(flown, command_path(flown), START_HEIGHT_M)
+    if found.carried < 1:
+        share = 100 * max(found.carried, 0.0)
+        said += (f"The vehicle sinks: all that its rotors can do carries {share:.0f} % of what hover needs.",)
+    return said
 
 
 def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int, every: int = 2) -> RecordingSet:
     """`flights` simulated flights of a vehicle with the effects that it states, as noisy sensors record them.
 
     Every how many steps of 2 ms a sample is kept is `every`. The set's vehicle is the one without the effects.
-    InputError for a bench, or where a number makes no flight.
+    InputError for what does not fly, or where a number makes no flight.
     """
-    if vehicle.kind == "bench":
-        raise InputError(f"{vehicle.name}: a bench does not fly")
     if not seconds > 0 or flights < 1:
         raise InputError("seconds must be more than 0 and flights at least 1")
-    j = np.diag(vehicle.inertia_kg_m2.matrix())
-    gains = Gains(tuple(j * STIFFNESS_RAD_S**2), (0.0,) * 3, tuple(2 * DAMPING * STIFFNESS_RAD_S * j))
+    vehicle, _ = flyable(vehicle)
+    steady = hover(vehicle, command_path(vehicle), START_HEIGHT_M)
+    stiffness = min(STIFFNESS_RAD_S, LATE_RAD / (DERIVATIVE_S + lateness_s(vehicle)))
+    # Tilted by the swings a vehicle needs a little more than level.
+    tilted = (1 / MEAN_TILT_COSINE - 1) * vehicle.mass_kg * vehicle.gravity_m_s2
+    thrust_n = steady.thrust_n + tilted / steady.gain
+    j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
+    gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * DAMPING * stiffness * j))
     noise = Noise(0.0, 0.01, 0.0, 0.1, 0.02, 0.01, 0.003)
-    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    start = Start()
+    if vehicle.ground_z_m is not None:
+        start = Start(position_m=np.array([[0.0, 0.0, vehicle.ground_z_m - START_HEIGHT_M]]))
     runs: list[Run] = []
     believed = vehicle
     for number in range(flights):
@@ -39,9 +71,16 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
             swing = np.sin(np.array([0.9, 0.7, 0.5]) * t + phase) + 0.5 * np.sin(np.array([3.1, 3.7, 1.3]) * t)
             return np.array([0.25, 0.25, 0.4]) * (swing + 0.3 * np.sin(np.array([9.1, 11.3, 7.1]) * t + phase[::-1]))
 
-        pilot = AttitudePid(vehicle, AttitudeReference("swings", weight / 0.96, wanted), gains, 0.02)
-        trace = simulate_as_stated(vehicle, pilot, seconds, 0.002)
+        pilot = AttitudePid(
+            vehicle, AttitudeReference("swings", thrust_n, wanted), gains, DERIVATIVE_S, None, steady.moments_n_m
+        )
+        trace = simulate_as_stated(vehicle, pilot, seconds, 0.002, start=start)
         made = record_as_stated(trace, vehicle, f"flight_{number + 1}", noise, rng, every=every)
         believed = made.vehicle
         runs += made.runs
     return RecordingSet(name, believed, tuple(runs))
+
+
+def lateness_s(vehicle: Vehicle) -> float:
+    """Delays and time constants between command and rotor speed together, s."""
+    return sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))

@@ -1,23 +1,28 @@
-"""An exported vehicle flown in the tool it is for, beside ours, on the same rotor speeds.
+"""An exported vehicle flown in the tool it is for, beside ours with what the file expresses, on the same commands.
 
-RotorPy and MuJoCo fly their file themselves. Gazebo and gym-pybullet-drones are no packages that pip installs: their
-file is read and integrated by an engine that is one (Drake reads SDF, Bullet is gym-pybullet-drones' own), and what
-their own code adds, the forces of the rotors, is written here by their published equations from the file's numbers.
+What a file cannot express is named by `rotorid.exports.forms`; a flight here shows that what it does express flies as
+it does with us. RotorPy and MuJoCo fly their file themselves. Gazebo and gym-pybullet-drones are no packages that pip
+installs: their file is read and integrated by an engine that is one (Drake reads SDF, Bullet is gym-pybullet-drones'
+own), and what their own code adds, the forces of the rotors, is written here by their published equations from the
+file's numbers.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from rotorid.exports.forms import AT_ONCE_S, FLU, Exported
+from rotorid.errors import InputError
+from rotorid.exports.forms import AT_ONCE_S, FLU, Exported, expressed
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.improved import simulate_as_stated
+from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.simulator import Commands, Start
 
 STEP_S = 0.001
@@ -38,15 +43,16 @@ class Difference:
     @property
     def sentence(self) -> str:
         return (
-            f"flown in {self.where} beside ours on the same commands: at most {self.position_m:.2g} m apart after "
-            f"{self.flown_m:.2g} m of way and {self.angle_rad:.2g} rad after {self.turned_rad:.2g} rad of turning"
+            f"flown in {self.where} beside ours, with what the file expresses, on the same commands: at most "
+            f"{self.position_m:.2g} m apart after {self.flown_m:.2g} m of way and "
+            f"{self.angle_rad:.2g} rad after {self.turned_rad:.2g} rad of turning"
         )
 
 
 def commands_of(vehicle: Vehicle, duration_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Times (n,) and rotor speeds (n, k), rad/s, about hover that turn the vehicle about every axis in turn."""
     time = np.arange(int(duration_s / STEP_S) + 1) * STEP_S
-    hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum())
+    hover = hover_speed_rad_s(vehicle)
     phase = 2 * np.pi * np.arange(vehicle.rotor_count) / vehicle.rotor_count
     # Phases around the vehicle roll and pitch it; their torques cancel, so yaw has a swing of its own.
     swing = 0.004 * np.sin(2 * np.pi * 1.5 * time[:, None] + phase) + 0.02 * np.sin(2 * np.pi * 0.7 * time)[:, None]
@@ -54,15 +60,14 @@ def commands_of(vehicle: Vehicle, duration_s: float) -> tuple[np.ndarray, np.nda
     return time, hover * (1 + swing)
 
 
-def ours(vehicle: Vehicle, duration_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position (n, 3), attitude (n, 4), scalar first, and rotor speeds (n, k), forward-left-up, as we fly it."""
-    time, speeds = commands_of(vehicle, duration_s)
+def ours(vehicle: Vehicle, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position (n, 3), attitude (n, 4), scalar first, and rotor speeds (n, k), forward-left-up, as we fly it.
+
+    `speeds` (n, k), rad/s, are those of the rotors, each held for a step.
+    """
     start = Start(velocity_m_s=np.array([[START_M_S, START_M_S, 0.0]]), rotor_speed_rad_s=speeds[:1])
-    flown = vehicle.model_copy(update={"effects": tuple(e for e in vehicle.effects if e["id"] != "motor_lag")})
-    lag = next((e["parameters"] for e in vehicle.effects if e["id"] == "motor_lag"), {})
-    # The lag as those tools have it, sample by sample.
-    speeds = lagging(speeds, float(lag.get("tau_up", lag.get("tau", 0))), float(lag.get("tau_down", lag.get("tau", 0))))
-    trace = simulate_as_stated(flown, Commands(time, speeds), duration_s, STEP_S, start=start)
+    time = STEP_S * np.arange(len(speeds))
+    trace = simulate_as_stated(vehicle, Commands(time, speeds), time[-1], STEP_S, start=start)
     quaternion = trace.quaternion[0] * np.array([1.0, *FLU])
     return trace.position[0] * FLU, quaternion, trace.rotor_speed[0]
 
@@ -103,13 +108,15 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
     from rotorpy.vehicles.multirotor import Multirotor
 
     time, speeds = commands_of(vehicle, duration_s)
+    tau_s = exported.parameters["tau_m"]
     state = {
         "x": np.zeros(3), "v": np.array([START_M_S, -START_M_S, 0.0]), "q": np.array([0.0, 0.0, 0.0, 1.0]),
         "w": np.zeros(3), "wind": np.zeros(3), "rotor_speeds": speeds[0],
     }  # fmt: skip
     tight = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}
-    flyer = Multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds", integrator_kwargs=tight)
-    at_once = exported.parameters["tau_m"] == AT_ONCE_S
+    with read_by("RotorPy"):
+        flyer = Multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds", integrator_kwargs=tight)
+    at_once = tau_s == AT_ONCE_S
     if at_once:  # the speed is set at every step and stays over it
         flyer.tau_m = 1e6
     position, attitude = [state["x"]], [np.array([1.0, 0, 0, 0])]
@@ -119,31 +126,41 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
         state = flyer.step(state, {"cmd_motor_speeds": speeds[k]}, STEP_S)
         position.append(state["x"])
         attitude.append(np.asarray(state["q"])[[3, 0, 1, 2]])
-    return difference((np.array(position), np.array(attitude)), ours(vehicle, duration_s), "RotorPy")
+    turning = speeds if at_once else lagging(speeds, tau_s, tau_s)
+    here = ours(expressed(vehicle, "rotorpy"), turning)
+    return difference((np.array(position), np.array(attitude)), here, "RotorPy")
 
 
 def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
     """Fly the exported model in MuJoCo beside ours without the effects that the model cannot express."""
     import mujoco
 
-    same = with_these(vehicle, "com_offset", "inertia_products")
-    model = mujoco.MjModel.from_xml_string(exported.text)
+    with read_by("MuJoCo"):
+        model = mujoco.MjModel.from_xml_string(exported.text)
     data = mujoco.MjData(model)
     data.qpos[:] = [0, 0, 0, 1, 0, 0, 0]
     data.qvel[:3] = [START_M_S, -START_M_S, 0.0]
-    time, speeds = commands_of(same, duration_s)
+    time, speeds = commands_of(vehicle, duration_s)
+    thrust = vehicle.thrust_coefficients_n_s2() * speeds**2
+    tau_s = float(model.actuator_dynprm[0, 0]) if model.na else 0.0
+    data.act[:] = thrust[0, : model.na]
     position, attitude = [data.qpos[:3].copy()], [data.qpos[3:7].copy()]
     for k in range(len(time) - 1):
-        data.ctrl[:] = same.thrust_coefficients_n_s2() * speeds[k] ** 2
+        data.ctrl[:] = thrust[k]
         mujoco.mj_step(model, data)
         position.append(data.qpos[:3].copy())
         attitude.append(data.qpos[3:7].copy())
-    return difference((np.array(position), np.array(attitude)), ours(same, duration_s), "MuJoCo")
+    here = ours(expressed(vehicle, "mjcf"), np.sqrt(lagging(speeds**2, tau_s, tau_s)))
+    return difference((np.array(position), np.array(attitude)), here, "MuJoCo")
 
 
-def with_these(vehicle: Vehicle, *names: str) -> Vehicle:
-    """The vehicle with those of its effects that a form can express."""
-    return vehicle.model_copy(update={"effects": tuple(e for e in vehicle.effects if e["id"] in names)})
+@contextmanager
+def read_by(tool: str) -> Iterator[None]:
+    """What a tool says of a file that it does not read, in one sentence."""
+    try:
+        yield
+    except Exception as error:  # each tool has errors of its own
+        raise InputError(f"{tool} does not read the exported vehicle: {' '.join(str(error).split())}") from error
 
 
 @dataclass(frozen=True)
@@ -188,9 +205,8 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
     from pydrake.systems.analysis import Simulator
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-    same = with_these(vehicle, "rotor_drag", "motor_lag", "com_offset", "inertia_products")
     motors = GazeboMotor.all_of(exported.text)
-    time, speeds = commands_of(same, duration_s)
+    time, speeds = commands_of(vehicle, duration_s)
     turning = np.stack(
         [
             speeds[:, i] if m.up_s == AT_ONCE_S else lagging(speeds[:, [i]], m.up_s, m.down_s)[:, 0]
@@ -200,7 +216,8 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
     )
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
-    Parser(plant).AddModelsFromString(exported.text, "sdf")
+    with read_by("Drake"):
+        Parser(plant).AddModelsFromString(exported.text, "sdf")
     plant.mutable_gravity_field().set_gravity_vector([0, 0, -vehicle.gravity_m_s2])
     plant.Finalize()
     base = plant.GetBodyByName("base_link")
@@ -249,7 +266,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
         position.append(pose.translation() - start)
         attitude.append(RotationMatrix(pose.rotation()).ToQuaternion().wxyz())
     where = "Drake by the equations of Gazebo's motor model"
-    return difference((np.array(position), np.array(attitude)), ours(same, duration_s), where)
+    return difference((np.array(position), np.array(attitude)), ours(expressed(vehicle, "sdf"), turning), where)
 
 
 BULLET_DAMPING = 0.04
@@ -269,16 +286,13 @@ def in_pybullet(
     import pybullet
     from pybullet_utils.bullet_client import BulletClient
 
-    same = with_these(vehicle, "rotor_drag", "com_offset")
+    same = expressed(vehicle, "gym-pybullet-drones")
+    at_centre = {"form": "at the centre of mass"}  # where that tool has its drag
     same = same.model_copy(
-        update={
-            "effects": tuple(
-                e | {"form": "at the centre of mass"} if e["id"] == "rotor_drag" else e for e in same.effects
-            )
-        }
+        update={"effects": tuple(e | at_centre if e["id"] == "rotor_drag" else e for e in same.effects)}
     )
     says = {k: float(v) for k, v in ElementTree.fromstring(exported.text)[0].attrib.items()}
-    time, speeds = commands_of(same, duration_s)
+    time, speeds = commands_of(vehicle, duration_s)
     order = exported.rotor_order
     substeps = 10  # its integrator is of first order
     client = BulletClient(pybullet.DIRECT)
@@ -289,7 +303,8 @@ def in_pybullet(
             path = f"{folder}/{exported.file_name}"
             with open(path, "w", encoding="utf-8") as file:
                 file.write(exported.text)
-            body = client.loadURDF(path, flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
+            with read_by("Bullet"):
+                body = client.loadURDF(path, flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
         client.changeDynamics(body, -1, linearDamping=damping, angularDamping=damping)
         client.resetBaseVelocity(body, [START_M_S, -START_M_S, 0], [0, 0, 0])
         position, attitude = [np.zeros(3)], [np.array([1.0, 0, 0, 0])]
@@ -314,7 +329,7 @@ def in_pybullet(
     finally:
         client.disconnect()
     where = "Bullet by the equations of gym-pybullet-drones"
-    return difference((np.array(position), np.array(attitude)), ours(same, duration_s), where)
+    return difference((np.array(position), np.array(attitude)), ours(same, speeds), where)
 
 
 FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], Difference]]] = {
@@ -327,13 +342,20 @@ FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], Difference]]] = {
 
 
 def try_out(vehicle: Vehicle, to: str, exported: Exported) -> str:
-    """What a flight beside ours showed, or why none was made; empty for a form that no tool flies."""
+    """What a flight beside ours showed, or why none was made; empty for a form that no tool flies.
+
+    InputError where the tool does not read the file.
+    """
     if to not in FLYERS:
         return ""
     package, fly = FLYERS[to]
     try:
         return fly(vehicle, exported).sentence
+    except InputError:
+        raise
     except ImportError as error:
         if error.name != package and package not in sys.modules:
             return f"not flown there: {error}"
         return f"not flown there: {package} is not installed"
+    except Exception as error:  # whatever another tool ends with, the file that it has read is right
+        return f"the trial flight there did not end: {' '.join(str(error).split())}"

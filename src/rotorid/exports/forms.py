@@ -15,6 +15,7 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.mixer import hover_speed_rad_s
 
 FLU = np.array([1.0, -1.0, -1.0])
 AT_ONCE_S = 1e-3
@@ -48,35 +49,67 @@ class Parts:
     thrust: np.ndarray
     """C_F by rotor, (n,), N s2."""
     torque: np.ndarray
+    limits_rad_s: tuple[float, float] | None = None
+    """Lowest and highest rotor speed, with what saturates them."""
     tau_s: tuple[float, float] = (0.0, 0.0)
-    """Time constants of the rotor speed, up and down."""
+    """Time constants of the rotor speed, up and down; near hover those of the thrust, too."""
     drag: tuple[float, float] = (0.0, 0.0)
     """Rotor drag k_d along x and y, N s2/(rad m)."""
     inflow: float = 0.0
     lift: float = 0.0
     flap: float = 0.0
     frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    curve: float = 0.0
+    """Linear share b of T/T_max = b u + (1 − b) u²."""
+    taken: tuple[dict, ...] = ()
+    """Entries of the vehicle's effects that found a place."""
     left_out: tuple[str, ...] = ()
 
 
-def parts_of(vehicle: Vehicle, knows: set[str]) -> Parts:
+KNOWS = {
+    "rotorpy": frozenset(
+        {"rotor_drag", "axial_inflow", "translational_lift", "flapping_moment", "frame_drag", "motor_lag"}
+        | {"com_offset", "inertia_products", "command_saturation"}
+    ),
+    "mjcf": frozenset({"com_offset", "inertia_products", "motor_lag", "command_saturation"}),
+    "sdf": frozenset({"rotor_drag", "motor_lag", "com_offset", "inertia_products", "command_saturation"}),
+    "gym-pybullet-drones": frozenset({"rotor_drag", "com_offset", "command_saturation"}),
+    "px4": frozenset({"com_offset", "throttle_curve"}),
+}
+"""By form, ids of the effects that it has a place for."""
+
+
+def expressed(vehicle: Vehicle, to: str) -> Vehicle:
+    """The vehicle with those of its effects that a form takes, and the file's limits.
+
+    The lag of the motors is left to who flies it: each tool has its own.
+    """
+    parts = parts_of(vehicle, KNOWS[to])
+    kept = tuple(e for e in parts.taken if e["id"] not in ("motor_lag", "command_saturation"))
+    return vehicle.model_copy(update={"effects": kept, "rotor_speed_limits_rad_s": parts.limits_rad_s})
+
+
+def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
     """What a form that `knows` these effects can take of a vehicle; the rest goes to `left_out`."""
     values: dict = {
+        "limits_rad_s": vehicle.rotor_speed_limits_rad_s,
         "inertia": vehicle.inertia_kg_m2.matrix(),
         "places": vehicle.rotor_positions_m(),
         "thrust": vehicle.thrust_coefficients_n_s2(),
         "torque": vehicle.torque_coefficients_n_m_s2(),
     }
-    left = []
+    left, kept = [], []
     for entry in vehicle.effects:
         name, form, p = entry["id"], entry.get("form", ""), {k: float(v) for k, v in entry["parameters"].items()}
         said = f"{name} ({form}: {', '.join(f'{k} = {v:.4g}' for k, v in p.items())})"
         taken = name in knows and _take(values, name, form, p)
         if not taken:
             left.append(said)
-        elif isinstance(taken, str):
+            continue
+        kept.append(entry)
+        if isinstance(taken, str):
             left.append(f"{said}: {taken}")
-    return Parts(vehicle.mass_kg, left_out=tuple(left), **values)
+    return Parts(vehicle.mass_kg, taken=tuple(kept), left_out=tuple(left), **values)
 
 
 def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str:
@@ -102,6 +135,19 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
     if name == "motor_lag" and form == "up and down":
         values["tau_s"] = (p["tau_up"], p["tau_down"])
         return True
+    if name == "motor_lag" and form == "on thrust":
+        values["tau_s"] = (p["tau"], p["tau"])
+        return "taken as a lag of the rotor speed, which near hover has the same time constant"
+    if name == "command_saturation" and values["limits_rad_s"] is not None:
+        low, high = values["limits_rad_s"]
+        if form == "upper limit":
+            values["limits_rad_s"] = (low, min(high, p["w_high"] * high))
+        else:
+            values["limits_rad_s"] = (max(low, p["w_low"] * high), high)
+        return True
+    if name == "throttle_curve" and form == "thrust curve of the throttle" and 0 <= p["b"] <= 1:
+        values["curve"] = p["b"]
+        return True
     if name == "com_offset" and form == "moment":
         values["places"] = values["places"] - np.array([p["r_x"], p["r_y"], 0.0])
         return "taken as rotors that sit elsewhere, so that their drag acts there, too"
@@ -121,9 +167,7 @@ def _in_flu(inertia: np.ndarray) -> np.ndarray:
 
 def rotorpy(vehicle: Vehicle) -> Exported:
     """RotorPy's `quad_params` as a Python file."""
-    knows = {"rotor_drag", "axial_inflow", "translational_lift", "flapping_moment", "frame_drag", "motor_lag",
-             "com_offset", "inertia_products"}  # fmt: skip
-    parts = parts_of(vehicle, knows)
+    parts = parts_of(vehicle, KNOWS["rotorpy"])
     left = list(parts.left_out)
     left += _left_of_each_rotor(parts)
     up, down = parts.tau_s
@@ -134,7 +178,7 @@ def rotorpy(vehicle: Vehicle) -> Exported:
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: RotorPy has 9.81")
     j = _in_flu(parts.inertia)
-    low, high = vehicle.rotor_speed_limits_rad_s or (0.0, 10 * _hover(vehicle))
+    low, high = parts.limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle))
     values = {
         "mass": parts.mass_kg,
         **{f"I{a}{b}": float(j["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "yz", "xz")},
@@ -168,33 +212,40 @@ def rotorpy(vehicle: Vehicle) -> Exported:
     return Exported("\n".join(lines), "rotorpy_params.py", tuple(left), arrays)
 
 
-def _hover(vehicle: Vehicle) -> float:
-    return float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum()))
-
-
 def mjcf(vehicle: Vehicle) -> Exported:
     """A MuJoCo model: a free body, a site and a motor a rotor; control i is the thrust of rotor i, N.
 
-    The thrust of a rotor speed ω is C_F ω²; the torque goes along by the motor's gear.
+    The thrust of a rotor speed ω is C_F ω²; the torque goes along by the motor's gear. A lag is the actuator's own
+    (`dyntype="filterexact"`), of the thrust; `data.act` is then the thrust to start with.
     """
-    parts = parts_of(vehicle, {"com_offset", "inertia_products"})
+    parts = parts_of(vehicle, KNOWS["mjcf"])
     left = list(parts.left_out)
+    tau_s, lag = 0.0, next((e for e in parts.taken if e["id"] == "motor_lag"), None)
+    if lag is not None:
+        tau_s = sum(parts.tau_s) / 2
+        if lag["form"] == "on thrust":  # what it has is just that
+            left = [sentence for sentence in left if not sentence.startswith("motor_lag")]
+        else:
+            left.append(f"motor_lag: a lag of the rotor speed is taken as one of the thrust, {tau_s:.4g} s")
     j = _in_flu(parts.inertia)
     full = " ".join(f"{v:.9g}" for v in (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
-    limit = vehicle.rotor_speed_limits_rad_s
+    limit = parts.limits_rad_s
+    dynamics = f' dyntype="filterexact" dynprm="{tau_s:.9g}"' if tau_s > 0 else ""
     sites, motors = [], []
     for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True), 1):
         at = " ".join(f"{v:.9g}" for v in place * FLU)
         ratio = -signed * parts.torque[i - 1] / parts.thrust[i - 1]
-        most = f' ctrlrange="0 {parts.thrust[i - 1] * limit[1] ** 2:.9g}"' if limit else ""
+        ends = " ".join(f"{parts.thrust[i - 1] * speed**2:.9g}" for speed in limit) if limit else ""
+        most = f' ctrlrange="{ends}"' if limit else ""
         sites.append(f'      <site name="rotor_{i}" pos="{at}"/>')
-        motors.append(f'    <motor name="rotor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {ratio:.9g}"{most}/>')
+        motors.append(f'    <general name="rotor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {ratio:.9g}"{most}{dynamics}/>')
     comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
     c_f = ", ".join(f"{v:.6g}" for v in parts.thrust)
+    late = "\n  <!-- Thrust follows its control late: set data.act to the first thrust. -->" if tau_s > 0 else ""
     name = quoteattr(vehicle.name)
     nl = "\n"
     text = f"""<mujoco model={name}>
-{comments}  <!-- Control i is the thrust of rotor i in N: C_F times the square of its speed, C_F = {c_f} N s2. -->
+{comments}  <!-- Control i is the thrust of rotor i in N: C_F times the square of its speed, C_F = {c_f} N s2. -->{late}
   <option timestep="0.001" gravity="0 0 -{vehicle.gravity_m_s2:g}" integrator="RK4"/>
   <worldbody>
     <body name="vehicle" pos="0 0 1">
@@ -214,7 +265,7 @@ def mjcf(vehicle: Vehicle) -> Exported:
 
 def px4(vehicle: Vehicle) -> Exported:
     """Parameters of PX4's control allocation and thrust model, as QGroundControl loads them."""
-    parts = parts_of(vehicle, {"com_offset"})
+    parts = parts_of(vehicle, KNOWS["px4"])
     left = [*parts.left_out, "mass and inertia: PX4 has no parameters for them"]
     rows: list[tuple[str, float, int]] = [("CA_AIRFRAME", 0, 6), ("CA_ROTOR_COUNT", vehicle.rotor_count, 6)]
     strongest = parts.thrust.max()
@@ -223,10 +274,11 @@ def px4(vehicle: Vehicle) -> Exported:
         values = {"PX": place[0], "PY": place[1], "PZ": place[2], "KM": signed * ratio}
         values["CT"] = 6.5 * parts.thrust[i] / strongest
         rows += [(f"CA_ROTOR{i}_{k}", float(v), 9) for k, v in values.items()]
-    limit = vehicle.rotor_speed_limits_rad_s
+    limit = parts.limits_rad_s
+    if limit or parts.curve:
+        rows.append(("THR_MDL_FAC", 1.0 - parts.curve, 9))
     if limit:
         full = float((parts.thrust * limit[1] ** 2).sum())
-        rows.append(("THR_MDL_FAC", 1.0, 9))
         rows.append(("MPC_THR_HOVER", min(max(vehicle.mass_kg * vehicle.gravity_m_s2 / full, 0.1), 0.8), 9))
     else:
         left.append("hover thrust: rotor_speed_limits_rad_s is not stated")
@@ -246,6 +298,12 @@ def _left_of_each_rotor(parts: Parts) -> list[str]:
     return left
 
 
+def _left_of_the_lowest_speed(parts: Parts) -> list[str]:
+    """A sentence for tools that know no lowest rotor speed."""
+    low = 0.0 if parts.limits_rad_s is None else parts.limits_rad_s[0]
+    return [f"lowest rotor speed of {low:.4g} rad/s: rotors may stand still there"] if low > 0 else []
+
+
 def sdf(vehicle: Vehicle) -> Exported:
     """A Gazebo model: a body with a link and a joint a rotor, each driven by Gazebo's multicopter motor model.
 
@@ -253,15 +311,15 @@ def sdf(vehicle: Vehicle) -> Exported:
     −rotorDragCoefficient |ω| v⊥. Rotor speeds are commanded in rad/s on `command/motor_speed`. Source: gz-sim,
     `src/systems/multicopter_motor_model`; the models of PX4's x500.
     """
-    parts = parts_of(vehicle, {"rotor_drag", "motor_lag", "com_offset", "inertia_products"})
-    left = list(parts.left_out)
+    parts = parts_of(vehicle, KNOWS["sdf"])
+    left = [*parts.left_out, *_left_of_the_lowest_speed(parts)]
     up, down = parts.tau_s
     if up == 0:
         left.append(f"rotors that follow at once: Gazebo's motor model needs a lag, {AT_ONCE_S:g} s is taken")
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it belongs to Gazebo's world file")
     j = _in_flu(parts.inertia)
-    most = (vehicle.rotor_speed_limits_rad_s or (0.0, 10 * _hover(vehicle)))[1]
+    most = (parts.limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle)))[1]
     share = min(1e-3 * parts.mass_kg, 0.005)
     radius = vehicle.rotor_radius_m or 0.05
     links, motors = [], []
@@ -340,8 +398,8 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     """
     if vehicle.rotor_count != 4:
         raise InputError(f"{vehicle.name}: gym-pybullet-drones knows four rotors, found {vehicle.rotor_count}")
-    parts = parts_of(vehicle, {"rotor_drag", "com_offset"})
-    left = [*parts.left_out, *_left_of_each_rotor(parts)]
+    parts = parts_of(vehicle, KNOWS["gym-pybullet-drones"])
+    left = [*parts.left_out, *_left_of_each_rotor(parts), *_left_of_the_lowest_speed(parts)]
     if parts.drag[0]:
         left.append("rotor drag at the hubs: it acts at the centre of mass there, and with Physics.PYB_DRAG alone")
     order, turned = _round_the_left(parts.places, vehicle.yaw_signs(), vehicle.name)
@@ -355,8 +413,8 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     left.append(
         "air without friction: it leaves on Bullet's damping, a deceleration of 0.04 (1 + |v|) v and so for turning"
     )
-    hover = _hover(vehicle)
-    limit = (vehicle.rotor_speed_limits_rad_s or (0.0, 2 * hover))[1]
+    hover = hover_speed_rad_s(vehicle)
+    limit = (parts.limits_rad_s or (0.0, 2 * hover))[1]
     lift = float(parts.thrust.sum() * limit**2 / (parts.mass_kg * vehicle.gravity_m_s2))
     # kf and km are by the square of turns a minute, the drag by the sum of rad/s.
     per_rpm = (2 * np.pi / 60) ** 2

@@ -6,13 +6,16 @@ rotor speed; `record_as_stated` writes what the sensors of such a flight read, w
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import Effect, Form, SetForm, SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, LIMIT, Effect, Form, SetForm, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.command_path import CommandPath
 from rotorid.vehicle.simulator import Commands, Controller, Motors, Noise, Trace, recording, simulate
 
 LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
@@ -104,6 +107,43 @@ def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | ActiveSp
     return form, values
 
 
+def command_path(
+    vehicle: Vehicle, voltage_v: np.ndarray | None = None, full_voltage_v: float | None = None
+) -> CommandPath | None:
+    """What the vehicle's effects put between command and rotor speed, to be flown step by step; None for nothing.
+
+    `voltage_v` (m,) is the battery's voltage at each step; without any it is the full one throughout.
+    InputError where a form refers to the speed of the full command and the file states no limits.
+    """
+    forms = active_speed_forms(vehicle)
+    if not forms:
+        return None
+    limits = vehicle.rotor_speed_limits_rad_s
+    unscaled = [form.name for form, _ in forms if form.stage in (CURVE, LIMIT)]
+    if unscaled and limits is None:
+        raise InputError(
+            f"vehicle {vehicle.name}: effect form {unscaled[0]!r} needs rotor_speed_limits_rad_s, the speed of the "
+            "full command (rotorid.vehicle.flyable states it)"
+        )
+    if full_voltage_v is None:
+        full_voltage_v = 1.0 if voltage_v is None else float(np.max(voltage_v))
+    return CommandPath(tuple(forms), 0.0 if limits is None else limits[1], voltage_v, full_voltage_v)
+
+
+def motors_of(vehicle: Vehicle, step_s: float) -> Motors | None:
+    """The vehicle's speed forms as motors of the simulator, where one lag of the speed is all there is; else None.
+
+    A lag below a step is left to `CommandPath`, whose law is exact for any step.
+    """
+    forms = active_speed_forms(vehicle)
+    if not forms:
+        return Motors(limits_rad_s=vehicle.rotor_speed_limits_rad_s)
+    form, values = forms[0]
+    if len(forms) == 1 and form.name in LAGS_OF_SPEED and min(values) > step_s:
+        return Motors(values[0], values[-1], vehicle.rotor_speed_limits_rad_s)
+    return None
+
+
 def simulate_as_stated(
     vehicle: Vehicle,
     controller: Controller,
@@ -116,38 +156,34 @@ def simulate_as_stated(
     """Fly a vehicle with every effect that its file states switched on; `settings` as for `simulate`.
 
     What lies between command and rotor speed is applied to the whole series where the commands are known
-    (`Commands`). Under any other controller only a lag of the speed can be flown, since the other forms need the
-    series; InputError says so. `voltage_v` is constant or a series over the steps, (steps + 1,); `full_voltage_v`
-    is the voltage at which commands are right (default the largest).
+    (`Commands`), and step by step under any other controller. `voltage_v` is constant or a series over the steps,
+    (steps + 1,), the full one without any; `full_voltage_v` is the voltage at which commands are right (default the
+    largest). What a file may lack for this, `rotorid.vehicle.flyable` states.
     """
-    speed_forms = active_speed_forms(vehicle)
-    motors = Motors(limits_rad_s=vehicle.rotor_speed_limits_rad_s)
     steps = int(round(duration_s / step_s))
-    voltage = None if voltage_v is None else np.broadcast_to(np.asarray(voltage_v, float), (steps + 1,))
+    voltage = np.broadcast_to(np.asarray(1.0 if voltage_v is None else voltage_v, float), (steps + 1,))
+    motors, path, command = motors_of(vehicle, step_s), None, None
     if isinstance(controller, Commands):
         time_s = step_s * np.arange(steps + 1)
         held = np.searchsorted(controller.time_s, time_s + 1e-9, side="right") - 1
         command = controller.rotor_speed[np.maximum(held, 0)]
         speed = speeds_of_commands(vehicle, command, time_s, voltage, full_voltage_v)
         controller = Commands(time_s, speed, np.gradient(speed, step_s, axis=0))
-    else:
-        for form, values in speed_forms:
-            if form.name not in LAGS_OF_SPEED:
-                raise InputError(
-                    f"vehicle {vehicle.name}: effect form {form.name!r} needs the whole series of commands; "
-                    "give them as Commands instead of a controller"
-                )
-            motors = Motors(values[0], values[-1], vehicle.rotor_speed_limits_rad_s)
-    return simulate(
+        motors = None
+    elif motors is None:
+        path = command_path(vehicle, voltage, full_voltage_v)
+    trace = simulate(
         vehicle,
         controller,
         duration_s,
         step_s,
-        motors=motors,
+        motors=motors or Motors(limits_rad_s=vehicle.rotor_speed_limits_rad_s),
         effects=active_forms(vehicle),
-        voltage_v=None if voltage is None else float(voltage.mean()),
+        voltage_v=None if voltage_v is None else float(voltage.mean()),
+        path=path,
         **settings,
     )
+    return trace if command is None else replace(trace, rotor_command=np.broadcast_to(command, trace.rotor_speed.shape))
 
 
 def record_as_stated(

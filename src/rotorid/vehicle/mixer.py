@@ -37,3 +37,9 @@ def allocation_matrix(vehicle: Vehicle) -> np.ndarray:
     if vehicle.rotor_count == 4:
         return np.linalg.inv(matrix)
     return np.linalg.pinv(matrix)
+
+
+def hover_speed_rad_s(vehicle: Vehicle) -> float:
+    """Rotor speed, rad/s, at which the believed thrust, the same speed on every rotor, carries the weight."""
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    return float(np.sqrt(weight / vehicle.thrust_coefficients_n_s2().sum()))

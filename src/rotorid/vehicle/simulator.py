@@ -3,7 +3,8 @@
 Rigid body by quaternion inside, Euler angles outside. The controller and the disturbance are held over each
 step; the motion between is integrated by the classical Runge-Kutta method. It flies compiled where every effect has a
 kernel and the commands, or the controller's whole plan, are known beforehand (`rotorid.vehicle.fast`), else by array
-code that calls the effects' own functions. A test holds that both fly the same.
+code that calls the effects' own functions. A test holds that both fly the same. What lies between command and rotor
+speed (`rotorid.vehicle.command_path`) is flown by array code, a lag of the motors alone (`Motors`) by either.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from rotorid.vehicle.attitude import (
     quaternion_rate,
     rotation_from_quaternion,
 )
+from rotorid.vehicle.command_path import CommandPath
 from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
 from rotorid.vehicle.integrate import rk4_step
 from rotorid.vehicle.kernels import body_of, kernels_of
@@ -158,6 +160,7 @@ def simulate(
     rng: np.random.Generator | None = None,
     wind_m_s: np.ndarray | None = None,
     voltage_v: float | None = None,
+    path: CommandPath | None = None,
     compiled: bool = True,
 ) -> Trace:
     """Fly n vehicles (as many as `start` has) for `duration_s` in steps of `step_s`.
@@ -165,7 +168,9 @@ def simulate(
     `effects` as from `rotorid.vehicle.improved.active_forms`. `noise` reaches the controller through the
     measured attitude; readings with noise are made of the trace by `recording`. `rng` is needed with noise or
     disturbance. `wind_m_s` (3,) is the velocity of the air, world axes. Heights come from the vehicle's
-    `ground_z_m`. `compiled` False flies by array code whatever could be flown compiled.
+    `ground_z_m`. `path` makes rotor speeds of the commands, which then hold over each step, in place of the motors'
+    lag; the limits of `motors` hold for commands and for speeds. `compiled` False flies by array code whatever could be
+    flown compiled.
     """
     start, motors = start or Start(), motors or Motors()
     noise, disturbance = noise or Noise(), disturbance or Disturbance()
@@ -185,7 +190,7 @@ def simulate(
     readings = np.zeros((steps + 1, start.size, 3))
     if noise.attitude_rad > 0:
         readings = rng.normal(0.0, noise.attitude_rad, readings.shape)
-    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, compiled)
+    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, path, compiled)
     trace = flight.fly(_fresh(controller), pushes, readings)
     # A load as heavy as the vehicle would make plain repetition diverge: Aitken's relaxation (Küttler and Wall,
     # Computational Mechanics 43, 2008) takes the step from how the last one turned out.
@@ -199,7 +204,7 @@ def simulate(
             change = gap - last
             share *= -float((last * change).sum() / (change**2).sum())
         added, last = added + share * gap, gap
-        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, compiled)
+        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, path, compiled)
         trace = flight.fly(_fresh(controller), pushes + added, readings)
     return trace
 
@@ -237,13 +242,14 @@ def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) ->
 class _Flight:
     """One simulation: state columns rates 0:3, quaternion 3:7, velocity 7:10, position 10:13, rotors 13:."""
 
-    def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, voltage_v, compiled=True):
+    def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, voltage_v, path, compiled):
         self.vehicle, self.motors, self.step_s = vehicle, motors, step_s
+        self.path = None if path is None else path.start(step_s, start.rotor_speed_rad_s)
         self.start, self.size = start, start.size
         self.dynamics = Dynamics(vehicle, effects, start.size)
         self.wind = None if wind_m_s is None else np.asarray(wind_m_s, float)
         self.voltage = None if voltage_v is None else np.full(start.size, float(voltage_v))
-        self.kernels = kernels_of(effects, vehicle) if compiled else None
+        self.kernels = kernels_of(effects, vehicle) if compiled and path is None else None
 
     def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
         """The flight under a controller, a disturbance (steps + 1, n, 6) and errors of attitude (steps + 1, n, 3)."""
@@ -305,14 +311,21 @@ class _Flight:
             command = np.asarray(controller.rotor_command(time_s, euler), float)
             if command.shape != (self.size, k):
                 raise InputError(f"the controller gave commands {command.shape}, expected {(self.size, k)}")
-            if self.motors.limits_rad_s is not None:
-                command = np.clip(command, *self.motors.limits_rad_s)
+            limits = self.motors.limits_rad_s
+            if limits is not None:
+                command = np.clip(command, *limits)
+            speed = command
+            if self.path is not None:
+                speed = self.path.speed(command)
+                speed = speed if limits is None else np.clip(speed, *limits)
             if i == 0 and self.start.rotor_speed_rad_s is not None:
                 state[:, 13:] = self.start.rotor_speed_rad_s
             elif i == 0 or self.motors.time_up_s == 0.0:
-                state[:, 13:] = command
+                state[:, 13:] = speed
             self.command, self.push, self.now_s = command, pushes[i], time_s
             self.following = controller.acceleration(time_s) if isinstance(controller, Commands) else 0.0
+            if self.path is not None and i > 0:
+                self.following = (state[:, 13:] - states[i - 1][:, 13:]) / self.step_s
             rounds = 3 if i == 0 and self.dynamics.effects else 1
             for _ in range(rounds):
                 self.derivative(0.0, state)

@@ -159,7 +159,7 @@ def test_all_together_with_wind_and_disturbance(motors):
     assert_same(fast, slow)
 
 
-@pytest.mark.parametrize("kind", ["pid", "limited pid", "excited"])
+@pytest.mark.parametrize("kind", ["pid", "limited pid", "trimmed pid", "excited"])
 def test_a_controller_flies_compiled_as_it_is_called(kind):
     if kind == "excited":
         waves = Multisine(2.0, np.array([1.0, 2.0, 3.0]), np.eye(3) * [0.01, 0.01, 0.002], np.zeros((3, 3)))
@@ -167,7 +167,8 @@ def test_a_controller_flies_compiled_as_it_is_called(kind):
     else:
         gains = Gains((0.25, 0.25, 0.5), (0.3, 0.3, 0.1), (0.04, 0.04, 0.07))
         limit = (0.1, 0.1, 0.02) if kind == "limited pid" else None
-        pilot = AttitudePid(VEHICLE, training_reference(6.4), gains, 0.02, limit)
+        trim = (0.02, -0.03, 0.005) if kind == "trimmed pid" else (0.0, 0.0, 0.0)
+        pilot = AttitudePid(VEHICLE, training_reference(6.4), gains, 0.02, limit, trim)
     begin = Start(
         euler_rad=np.array([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]]),
         position_m=np.array([[0, 0, -0.4], [0, 0, -9.0]]),

@@ -1,0 +1,121 @@
+"""What a vehicle with its effects must be asked for to hover, found at rest in still air.
+
+A controller that knows the believed vehicle asks for a thrust and moments; a curve between command and speed, a payload
+or unequal rotors make others of them. A pilot trims his vehicle until it hovers level, and so does this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq, least_squares
+
+from rotorid.effects.contract import Motion
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.command_path import CommandPath
+from rotorid.vehicle.dynamics import Dynamics, has_memory
+from rotorid.vehicle.improved import active_forms
+from rotorid.vehicle.mixer import allocation_matrix
+
+LARGEST_SHARE = 10.0
+"""Thrust, over the weight, up to which is asked where the file states no limits of the rotor speed."""
+SLOPE_SHARE = 0.02
+"""Change of the thrust asked for, as a share of it, over which the gain is measured."""
+HUNG_S, HUNG_SAMPLES = 2.0, 100
+"""Time at rest over which the force of what has a memory (a slung payload) is averaged, and its instants."""
+ROUNDS = 5
+"""Evaluations until an added mass has settled in the accelerations that it depends on."""
+CLOSE = 1e-9
+"""Share of the weight (and of the weight on a rotor's arm) within which a force or moment counts as none."""
+
+
+@dataclass(frozen=True)
+class Hover:
+    """What to ask for."""
+
+    thrust_n: float
+    moments_n_m: tuple[float, float, float]
+    """About roll, pitch and yaw."""
+    gain: float
+    """Force, N, that a further newton of thrust makes."""
+    carried: float = 1.0
+    """Upward force over what hover needs; below 1 where all that the rotors can do does not carry the vehicle."""
+
+
+def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> Hover:
+    """The hover of a vehicle with the effects that its file states, at a height above its ground, m.
+
+    `path` is what lies between its command and rotor speed. Where the rotors cannot balance every moment, what is
+    asked for leaves the least of them.
+    """
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    units = weight * np.array([1.0, *np.repeat(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).mean(), 3)])
+    limits = vehicle.rotor_speed_limits_rad_s
+    most = LARGEST_SHARE * weight
+    if limits is not None:
+        most = float((vehicle.thrust_coefficients_n_s2() * limits[1] ** 2).sum())
+
+    def missing(asked: np.ndarray) -> np.ndarray:
+        """Force and moments beyond those of a level hover, over `units`, for thrust and moments over them."""
+        return wrench_at_rest(vehicle, path, asked * units, height_m) / units - [1.0, 0.0, 0.0, 0.0]
+
+    def rising(share: float) -> float:
+        return float(missing(np.array([share, 0.0, 0.0, 0.0]))[0])
+
+    share = 1.0
+    if abs(rising(share)) > CLOSE:
+        if (highest := rising(most / weight)) <= 0:
+            return Hover(most, (0.0, 0.0, 0.0), 1.0, 1.0 + highest)
+        if rising(0.0) < 0:
+            share = brentq(rising, 0.0, most / weight, xtol=CLOSE)
+    asked = np.array([share, 0.0, 0.0, 0.0])
+    if np.abs(missing(asked)).max() > CLOSE:
+        asked = least_squares(missing, asked).x
+    less = asked - [SLOPE_SHARE * asked[0], 0.0, 0.0, 0.0]
+    gain = float((missing(asked) - missing(less))[0] / (SLOPE_SHARE * asked[0]))
+    thrust, *moments = (float(v) for v in asked * units)
+    return Hover(thrust, tuple(moments), gain if gain > 0 else 1.0)
+
+
+def wrench_at_rest(vehicle: Vehicle, path: CommandPath | None, asked: np.ndarray, height_m: float) -> np.ndarray:
+    """Upward force, N, and moments, N m, (4,), on the level vehicle at rest where a believed wrench (4,) is asked for.
+
+    They are the accelerations times the believed mass and inertia.
+    """
+    command = np.sqrt(np.maximum(allocation_matrix(vehicle) @ asked, 0.0))[None]
+    limits = vehicle.rotor_speed_limits_rad_s or (0.0, np.inf)
+    command = np.clip(command, *limits)
+    speed = command if path is None else np.clip(path.steady(command), *limits)
+    every = active_forms(vehicle)
+    instant = Dynamics(vehicle, [pair for pair in every if not has_memory(pair[0])], 1)
+    at_rest = _at_rest(vehicle, np.zeros(1), height_m)
+    for _ in range(ROUNDS if instant.rounds > 1 else 1):
+        turning, specific_force = instant.accelerations(np.zeros((1, 3)), speed, at_rest)
+    up = -vehicle.mass_kg * specific_force[0, 2]
+    moments = turning[0] @ vehicle.inertia_kg_m2.matrix().T
+    time_s = np.linspace(0.0, HUNG_S, HUNG_SAMPLES)
+    hanging = Motion(
+        rotor_speed=np.repeat(speed, len(time_s), axis=0),
+        angular_velocity=np.zeros((len(time_s), 3)),
+        angular_acceleration=np.zeros((len(time_s), 3)),
+        specific_force=np.repeat([[0.0, 0.0, -vehicle.gravity_m_s2]], len(time_s), axis=0),
+        **_at_rest(vehicle, time_s, height_m),
+    )
+    for form, values in every:
+        if has_memory(form) and (added := form.contribution(hanging, vehicle, values)).force is not None:
+            up -= added.force[:, 2].mean()
+    return np.array([up, *moments])
+
+
+def _at_rest(vehicle: Vehicle, time_s: np.ndarray, height_m: float) -> dict[str, np.ndarray]:
+    """Fields of `Motion` of a level vehicle that does not move, at instants (n,), s."""
+    count = len(time_s)
+    return dict(
+        time_s=time_s,
+        rotation=np.repeat(np.eye(3)[None], count, axis=0),
+        velocity=np.zeros((count, 3)),
+        position=np.zeros((count, 3)),
+        rotor_acceleration=np.zeros((count, vehicle.rotor_count)),
+        height=np.full(count, height_m),
+    )

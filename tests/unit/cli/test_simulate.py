@@ -1,0 +1,96 @@
+"""`rotorid simulate` flies every vehicle file: each form of the catalogue in turn, and what it says."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rotorid import templates
+from rotorid.cli import app
+from rotorid.control.swings import START_HEIGHT_M
+from rotorid.recordings import Vehicle, read_set, write_vehicle
+from tests.unit.effects.flown import entry, typical_values
+from tests.unit.effects.test_catalogue_audit import set_forms, speed_forms, speed_values, wrench_forms
+
+
+def run(*words: str):
+    return CliRunner().invoke(app, [str(w) for w in words])
+
+
+def simulated(folder, *effects: dict, like: str = "thesis", **changes):
+    """The command's result, and the set that it wrote, of a template that states some effects."""
+    vehicle = templates.read(like).model_copy(update={"effects": effects, **changes})
+    write_vehicle(vehicle, folder / "improved_vehicle.yaml")
+    out = folder / "flown"
+    done = run("simulate", folder / "improved_vehicle.yaml", "-o", out, "--seconds", "1", "--flights", "1")
+    return done, read_set(out) if done.exit_code == 0 else None
+
+
+def tilt_rad(table) -> float:
+    """Largest angle from level, by the recorded attitude."""
+    _, x, y, _ = table[[f"quaternion_{a}" for a in "wxyz"]].to_numpy().T
+    return float(np.arccos(1 - 2 * (x**2 + y**2)).max())
+
+
+def of_a_vehicle():
+    """Every form of the vehicle, of its command path and of its sensors."""
+    return [*wrench_forms(), *speed_forms()]
+
+
+@pytest.mark.parametrize(("effect", "form"), of_a_vehicle())
+def test_every_form_flies_and_is_held_in_the_air(tmp_path, effect, form):
+    values = speed_values(form) if effect.speed_forms and not hasattr(form, "contribution") else None
+    values = typical_values(effect.id, form) if values is None else values
+    if form.name == "lower limit":
+        values = [0.3]  # of a full command that is stated as twice the speed of hover
+    done, flown = simulated(tmp_path, entry(effect.id, form, values))
+    assert done.exit_code == 0, done.output
+    table = flown.runs[0].table
+    assert tilt_rad(table) < 1.0
+    assert np.abs(table["position_z_m"] - table["position_z_m"].iloc[0]).max() < 2.0
+    needs_ground = "height" in form.requires
+    assert (table["position_z_m"].iloc[0] < -0.9 * START_HEIGHT_M) == needs_ground
+    assert flown.vehicle.effects == ()
+
+
+@pytest.mark.parametrize(("effect", "form"), list(set_forms()))
+def test_every_fault_of_a_set_is_written(tmp_path, effect, form):
+    done, _ = simulated(tmp_path, entry(effect.id, form, form.example))
+    assert done.exit_code == 0, done.output
+
+
+def test_a_crazyflie_with_all_that_lies_between_command_and_speed(tmp_path):
+    """As verdicts of logs state it, slow rotors and all: no form needs the whole series of commands."""
+    chain = (
+        {"id": "throttle_curve", "form": "power of the throttle", "parameters": {"n": 0.6}},
+        {"id": "battery_sag", "form": "drift in time", "parameters": {"k": 0.05}},
+        {"id": "delay", "form": "of the command", "parameters": {"T": 0.02}},
+        {"id": "motor_lag", "form": "on thrust", "parameters": {"tau": 0.09}},
+        {"id": "rotor_drag", "form": "at the hubs", "parameters": {"k_d": 1e-7}},
+    )
+    done, flown = simulated(tmp_path, *chain, like="crazyflie-2.1", rotor_speed_limits_rad_s=(0.0, 2800.0))
+    assert done.exit_code == 0, done.output
+    table = flown.runs[0].table
+    speed, command = (table[f"rotor_{kind}_1_rad_s"].to_numpy() for kind in ("speed", "command"))
+    assert tilt_rad(table) < 1.0 and abs(table["position_z_m"].iloc[-1]) < 2.0
+    assert speed.mean() == pytest.approx(2800 * (command.mean() / 2800) ** 0.6, rel=0.02)
+
+
+def test_what_is_flown_otherwise_is_said(tmp_path):
+    early = {"id": "delay", "form": "of the command", "parameters": {"T": -0.02}}
+    weak = {"id": "command_saturation", "form": "upper limit", "parameters": {"w_high": 0.4}}
+    done, _ = simulated(tmp_path, early, weak)
+    assert done.exit_code == 0, done.output
+    said = [line for line in done.output.splitlines() if line.startswith("  - ")]
+    assert len(said) == 3 and "left out" in said[0] and "full command" in said[1]
+    assert said[2].endswith("The vehicle sinks: all that its rotors can do carries 64 % of what hover needs.")
+
+
+@pytest.mark.parametrize("kind", ["stand", "bench"])
+def test_what_does_not_fly_is_one_sentence(tmp_path, kind: str):
+    creep = {"id": "creep", "form": "one time constant", "parameters": {}}
+    vehicle = Vehicle.model_validate({**templates.read("thesis").model_dump(), "kind": kind, "effects": (creep,)})
+    write_vehicle(vehicle, tmp_path / "improved_vehicle.yaml")
+    done = run("simulate", tmp_path / "improved_vehicle.yaml", "-o", tmp_path / "flown")
+    assert done.exit_code == 1 and f"a {kind} does not fly" in done.output
+    assert len(done.output.strip().splitlines()) == 1
+    assert not (tmp_path / "flown").exists()
