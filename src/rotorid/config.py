@@ -202,6 +202,9 @@ class Proof(Section):
     )
     cases: list[Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
     batch: int = Field(ge=1, description="Cases that one job treats [1].")
+    delivered: int = Field(
+        ge=1, description="Concealed cases, evenly over the list, whose delivered vehicle is put to the test [1]."
+    )
     peers: bool = Field(description="Whether other methods are asked about the same recordings [true, false].")
     real: bool = Field(description="Whether the public real recordings are studied [true, false].")
     tables: Text = Field(

@@ -16,6 +16,8 @@ except InputError as error:
 CHOSEN = plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases)
 RELEASED = plan.choose(plan.released(CASES, CONFIG.proof.release), CONFIG.proof.released, CONFIG.proof.cases)
 BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)
+# Concealed sets whose delivered vehicle is put to the test: as many, evenly over the whole list.
+DELIVERED = plan.batches(plan.spread(CASES, CONFIG.proof.delivered), CONFIG.proof.batch)
 # Recordings come from code outside the library: its hash stands beside that of the script.
 CONCEALING = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))]
 STUDIES = [study.name for study in real.STUDIES] if CONFIG.proof.real else []
@@ -27,7 +29,7 @@ if "proof" in sys.argv:
 
 def cases_of(wildcards):
     """Names of the cases in a batch."""
-    return [entry.case for entry in BATCHES[wildcards.batch]]
+    return [entry.case for entry in {**DELIVERED, **BATCHES}[wildcards.batch]]
 
 
 def peers_asked(wildcards):

@@ -284,6 +284,7 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
     notes = [fell_back_note(k, why) for k, why in gated.fell_back.items()]
     return replace(
         with_shares(last),
+        worse_elsewhere=tuple(map(str, gated.worse(model))),
         withheld_values=withheld,
         notes=(*last.notes, *notes),
         believed_values=value_rows(model, settled, last.improved, vehicle),

@@ -182,6 +182,9 @@ class Analysis:
     """Values corrected within their trust, in words: `thrust coefficient −0.7 %`."""
     doubts: tuple[Doubt, ...] = ()
     """What `check` doubts in the set, and values that are only proposed."""
+    worse_elsewhere: tuple[str, ...] = ()
+    """Channels that what is delivered predicts worse than the refitted vehicle where neither was fitted, in words;
+    the gate lets none pass."""
     withheld_values: Mapping[str, str] = field(default_factory=dict)
     """Wrong value (by its contract name) that the gate keeps out of the vehicle, to the reason."""
     believed_values: tuple[ValueRow, ...] = ()

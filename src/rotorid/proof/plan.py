@@ -68,6 +68,13 @@ def choose(entries: Sequence[Entry], seeds: Mapping[str, int], patterns: Sequenc
     ]
 
 
+def spread(entries: Sequence[Entry], count: int) -> list[Entry]:
+    """So many of the cases, evenly over the list, which is in the order of its families."""
+    if count >= len(entries):
+        return list(entries)
+    return [entries[k * len(entries) // count] for k in range(count)]
+
+
 def check_families(entries: Sequence[Entry], seeds: Mapping[str, int]) -> None:
     """InputError where `seeds` names a family that is not there: a misspelled one would leave its cases out."""
     families = list(dict.fromkeys(e.family for e in entries))

@@ -79,6 +79,10 @@ class Gated:
     fell_back: Mapping[str, str] = field(default_factory=dict)
     """Key of a value of the refitted vehicle that is as believed to the reason."""
 
+    def worse(self, model: FittedModel) -> list[Worse]:
+        """Channels that what passes predicts worse than the refitted vehicle: none."""
+        return worse_than(model, self.refitted.left, self.settled.left)
+
     @property
     def passes_whole(self) -> bool:
         """Whether nothing was kept out."""

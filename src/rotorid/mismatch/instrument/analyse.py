@@ -273,6 +273,7 @@ def as_delivered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Val
     reasons = gated.withheld_values
     return replace(
         with_shares(last),
+        worse_elsewhere=tuple(map(str, gated.worse(fewer))),
         withheld_values={n: reasons[k] for n, keys in names.items() for k in keys if k in reasons},
         notes=(*last.notes, *(fell_back_note(k, why, VALUE_NAMES) for k, why in gated.fell_back.items())),
         believed_values=value_rows(fewer, final, last.improved, choice.setup.vehicle, VALUE_NAMES),
