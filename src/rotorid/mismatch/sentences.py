@@ -88,7 +88,7 @@ def headline(told: Told) -> str:
         return first_words(capital(f"{where}; {_rest(told)}"))
     better = _better_in_short(main, told.channels)
     rest = "" if told.word == "explained" else f"; {100 * told.left:.0f} % stays unexplained"
-    still = _still_off(told)
+    still = _still_off(told, main)
     off = off_words(main, told.channels, scales(analysis))
     for parts in (
         (where, causes, better, rest, still),
@@ -103,8 +103,11 @@ def headline(told: Told) -> str:
     return first_words(capital(f"{causes}{still or rest}."))
 
 
-def _still_off(told: Told) -> str:
-    """The channel that stays off most with what was found, as a clause; empty where none is worth a word."""
+def _still_off(told: Told, main: str) -> str:
+    """The channel that stays off most with what was found, as a clause.
+
+    Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
+    """
     known = scales(told.analysis)
     left = {}
     for channel, own in told.channels.items():
@@ -112,7 +115,7 @@ def _still_off(told: Told) -> str:
         if channel in known and after is not None:
             left[channel] = math.sqrt(max(after**2 - (own.noise_floor or 0.0) ** 2, 0.0))
     most = max(left, key=lambda c: left[c] / known[c].value, default=None)
-    if most is None or left[most] < WORTH_A_WORD * known[most].value:
+    if most in (None, main) or left[most] < WORTH_A_WORD * known[most].value:
         return ""
     off = f"{number(left[most])} {told.channels[most].unit}"
     return f"; the {channel_words(most)} stays {off} off ({share_words(left[most], most, known)})"

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotorid.mismatch.findings import ValueRow
 from rotorid.mismatch.locate import locate
 from rotorid.mismatch.verdict import (
     SCHEMA_PATH,
@@ -18,6 +19,7 @@ from rotorid.mismatch.verdict import (
     make_verdict,
     schema_text,
 )
+from rotorid.recordings.doubts import Doubt
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 
 
@@ -32,7 +34,8 @@ def test_the_schema_is_in_step():
 def test_the_file_has_the_keys_of_the_contract():
     content = json.loads(verdict_of(analysis(findings=[drag_finding()])).text())
     assert list(content) == [
-        *("set", "kind", "runs", "verdict", "sentence", "details", "channels", "locations", "effects", "parameters"),
+        *("set", "kind", "runs", "verdict", "doubts", "sentence", "details", "warnings", "channels", "locations"),
+        *("effects", "absent", "parameters", "believed_values", "correlations"),
         *("not_testable", "unexplained", "next_experiment"),
     ]
     channel = content["channels"]["force_x"]
@@ -99,7 +102,8 @@ def test_an_error_that_did_not_get_smaller_is_not_sold_as_a_gain():
     worse = replace(made, traces=tuple(replace(t, after=1.2 * t.before) for t in made.traces))
     found = make_verdict(worse, [], {})
     assert "is not smaller with this" in found.sentence and "goes from" not in " ".join(found.details)
-    assert any(text.startswith("Warning: the forward force is worse") for text in found.details)
+    assert any("the forward force is worse with what is delivered" in text for text in found.warnings)
+    assert not make_verdict(made, [], {}).warnings
     assert "goes from" in " ".join(make_verdict(made, [], {}).details)
 
 
@@ -142,6 +146,53 @@ def test_the_simulation_run_forward_is_told_as_it_is():
         return Channel(unit="m", noise_floor=0.1, rmse=SplitErrors(training=errors, held_out=errors), p_value=none)
 
     forward = {"position": channel(1.0, 0.5), "attitude": channel(1.27, 1.27), "velocity": channel(1.0, 1.4)}
-    told = " ".join(verdict_of(made, forward).details)
-    assert "better: position (1.0 before, 0.50 m after)" in told and "no better: attitude (1.3 before" in told
-    assert "Warning: the simulation run forward is worse in velocity." in told
+    found = verdict_of(made, forward)
+    said = " ".join(found.details)
+    assert "better: position (1.0 before, 0.50 m after)" in said and "no better: attitude (1.3 before" in said
+    (warning,) = found.warnings
+    assert "velocity after half a second is worse with what is delivered: 1.4 m, 1.0 with the refitted" in warning
+
+
+def test_the_sentence_goes_by_size_and_names_what_stays_off():
+    """0.015 N sideways is seven times its noise and nothing to a vehicle of 6.4 N; half a newton metre is not."""
+    rng = np.random.default_rng(3)
+    made = analysis(findings=[drag_finding(channels=("force_x",))])
+
+    def changed(trace):
+        if trace.channel == "force_x":
+            small = 0.015 * rng.normal(size=len(trace.before))
+            return replace(trace, before=small, refitted=small, after=0.1 * small)
+        if trace.channel == "moment_y":
+            large = 0.45 * np.sin(trace.time_s)
+            return replace(trace, before=large, refitted=large, after=large)
+        return trace
+
+    made = replace(made, traces=tuple(map(changed, made.traces)), noise_floor=made.noise_floor | {"force_x": 0.002})
+    found = verdict_of(made)
+    assert "the pitch moment stays 0.32 N m off" in found.sentence
+    assert "% of the pitch moment it can make" in found.sentence
+    assert "rotor drag" in found.sentence
+
+
+def test_a_doubt_that_stops_makes_the_set_not_judged():
+    doubt = Doubt("mass_kg", "mass_kg is 652: the rotors lift 6.4 N; it would fit in grams.", stops=True)
+    mild = Doubt("inertia_kg_m2", "inertia_kg_m2 is only proposed.", stops=False)
+    found = verdict_of(replace(analysis(findings=[drag_finding()]), doubts=(mild, doubt)))
+    assert found.verdict == "not_judged" and found.sentence.startswith("Not judged. mass_kg is 652")
+    assert [d.what for d in found.doubts] == ["inertia_kg_m2", "mass_kg"]
+    assert verdict_of(replace(analysis(findings=[drag_finding()]), doubts=(mild,))).verdict == "explained"
+
+
+def test_all_believed_values_stand_in_one_table():
+    row = ValueRow("mass_kg", 0.652, 0.70, 0.68, 0.72, 0.652)
+    made = analysis(findings=[drag_finding()])
+    made = replace(
+        made,
+        believed_values=(row,),
+        withheld_values={"mass_kg": "where it was not fitted, the error of the vertical force is 40 % larger with it"},
+        value_correlations={("mass_kg", "thrust_coefficient_n_s2"): 0.999},
+    )
+    found = verdict_of(made)
+    value = found.believed_values["mass_kg"]
+    assert (value.believed, value.estimate, value.interval_95, value.delivered) == (0.652, 0.70, (0.68, 0.72), 0.652)
+    assert "vertical force" in value.withheld and found.correlations[0].correlation == 0.999

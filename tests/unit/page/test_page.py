@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.deliver import verdict_of, write_files
-from rotorid.mismatch.headline import MOST_WORDS, headline, tiles
+from rotorid.mismatch.findings import ValueRow
+from rotorid.mismatch.sentences import MOST_WORDS
 from rotorid.mismatch.shares import segments_of
+from rotorid.mismatch.tiles import tiles
 from rotorid.mismatch.verdict import main_channel
 from rotorid.page.data import packed
-from rotorid.page.make import by_share, make_page
+from rotorid.page.make import by_share, make_page, pretty
 from rotorid.page.signals import fit_percent, measured
+from rotorid.recordings.doubts import Doubt
 from tests.browser import CHROMIUM, Browser
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 
@@ -39,14 +42,28 @@ OTHERS = [
 
 @pytest.mark.parametrize("findings", [(), (drag_finding(),), (CLASS,), (drag_finding(), *OTHERS), (CLASS, *OTHERS)])
 @pytest.mark.parametrize("share", [0.0, 0.4, 0.95])
-def test_the_headline_has_at_most_25_words_and_is_a_sentence(findings, share):
+def test_the_page_opens_with_the_sentence_of_the_verdict(findings, share):
     made = analysis(findings=findings, dash=bool(findings), unexplained_share=share)
     verdict = verdict_of(made)
-    text = headline(verdict, main_channel(made, verdict.locations, verdict.channels))
-    assert 4 <= len(text.split()) <= MOST_WORDS
-    assert text[0].isupper() and text.endswith(".")
-    if findings and verdict.verdict == "partly_explained":
-        assert "%" in text
+    assert f"<h1>{pretty(verdict.sentence)}</h1>" in make_page(made, verdict)
+    assert 4 <= len(verdict.sentence.split()) <= MOST_WORDS
+    assert verdict.sentence[0].isupper() and verdict.sentence.endswith(".")
+
+
+def test_the_page_begins_with_doubts_and_shows_warnings_values_and_what_is_withheld():
+    made = analysis(findings=[drag_finding(withheld="where it was not fitted, the roll moment is worse")], dash=True)
+    made = replace(
+        made,
+        doubts=(Doubt("mass_kg", "The mass is <in grams>.", stops=True),),
+        believed_values=(ValueRow("mass_kg", 0.652, 0.70, 0.68, 0.72, 0.652),),
+        traces=tuple(replace(t, after=1.5 * t.after, refitted=t.after) for t in made.traces),
+    )
+    page = page_of(made)
+    doubts, heading = page.index("Before you believe this"), page.index("<h1>")
+    assert doubts < heading and "The mass is &lt;in grams&gt;." in page and 'class="word not_judged"' in page
+    assert "What is delivered makes worse" in page and "is worse with what is delivered" in page
+    assert "All believed values" in page and "0.700 ± 0.020" in page
+    assert "Not delivered: where it was not fitted, the roll moment is worse." in page
 
 
 def test_the_tiles_say_what_where_and_how_much():

@@ -140,8 +140,10 @@ def gate(
     unusable
         Why the vehicle of a settled offer is no body that hovers and flies; empty where it is.
     """
-    refitted, fell_back = less_until(model, settle(model, Offer(plain, ()), believed), believed, lambda s: "")
-    settled, kept_out = less_until(model, settle(model, offer, refitted.left), refitted.left, unusable, refitted)
+    refitted, fell_back = without_worse(model, settle(model, Offer(plain, ()), believed), believed)
+    settled, kept_out = without_worse(model, settle(model, offer, refitted.left), refitted.left, refitted)
+    settled, unfit = without_unusable(model, settled, refitted, unusable)
+    kept_out |= unfit
     names = effect_names(model, offer.active)
     return Gated(
         settled,
@@ -160,29 +162,53 @@ def effect_names(model: FittedModel, active: Sequence[str]) -> dict[str, list[st
     return out
 
 
-def less_until(
-    model: FittedModel,
-    settled: Settled,
-    reference: Residuals,
-    unusable: Callable[[Settled], str],
-    last: Settled | None = None,
+def without_worse(
+    model: FittedModel, settled: Settled, reference: Residuals, last: Settled | None = None
 ) -> tuple[Settled, dict[str, str]]:
-    """The offer less the parts without which no channel is worse than the reference, and the vehicle is usable.
+    """The offer less the parts without which no channel is worse than the reference.
 
-    One part after the other goes, always the one that helps most. Where no single part helps, all go: `last` is what
-    is delivered then (default the believed vehicle). Ids and value keys that went are given with their reason.
+    One part after the other goes, always the one without which the channels are least worse, until all is well; then
+    each that went is tried once more, the last first, for two may only together be to blame. Where nothing is left, it
+    is `last` (default the believed vehicle). Ids and value keys that went are given with their reason.
     """
     gone: dict[str, str] = {}
-    while fault := fault_of(model, settled, reference, unusable):
+    steps: list[Settled] = []
+    while worse := worse_than(model, reference, settled.left):
         parts = parts_of(model, settled)
-        fewer = [(part, settle(model, less(settled.offer, part, model), reference)) for part in parts]
-        rated = [(rate(model, s, reference, unusable), part, s) for part, s in fewer]
-        best = min(rated, key=lambda r: r[0], default=None)
-        if best is None or not best[0] < rate(model, settled, reference, unusable):
-            gone |= {part: fault for part, _ in fewer}
+        if not parts:
             return last or nothing(model, reference), gone
-        gone[best[1]] = fault
-        settled = best[2]
+        fewer = [(part, settle(model, less(settled.offer, part, model), reference)) for part in parts]
+        best, better = min(fewer, key=lambda p: excess(worse_than(model, reference, p[1].left)))
+        gone[best] = f"where it was not fitted, {max(worse, key=lambda w: w.ratio)} with it"
+        steps.append(settled)
+        settled = better
+    for part, before in list(zip(gone, steps, strict=True))[-2::-1]:
+        again = settle(model, more(settled.offer, part, before.offer, model), reference)
+        if not worse_than(model, reference, again.left):
+            settled = again
+            del gone[part]
+    return settled, gone
+
+
+def without_unusable(
+    model: FittedModel, settled: Settled, refitted: Settled, unusable: Callable[[Settled], str]
+) -> tuple[Settled, dict[str, str]]:
+    """The offer less the parts that make its vehicle unusable; `refitted`, or as believed, where any part does.
+
+    No part goes whose going makes a channel worse.
+    """
+    gone: dict[str, str] = {}
+    while why := unusable(settled):
+        fewer = [
+            (part, settle(model, less(settled.offer, part, model), refitted.left)) for part in parts_of(model, settled)
+        ]
+        sound = [(part, s) for part, s in fewer if not worse_than(model, refitted.left, s.left)]
+        fit = next(((part, s) for part, s in sound if not unusable(s)), None)
+        if fit is None:
+            gone |= {part: why for part, _ in fewer}
+            return (nothing(model, refitted.left) if unusable(refitted) else refitted), gone
+        gone[fit[0]] = why
+        settled = fit[1]
     return settled, gone
 
 
@@ -196,23 +222,15 @@ def parts_of(model: FittedModel, settled: Settled) -> list[str]:
     return [*effect_names(model, settled.offer.active), *settled.offer.values]
 
 
+def more(offer: Offer, part: str, source: Offer, model: FittedModel) -> Offer:
+    """An offer with a part of another one once more, in the other's order."""
+    values = {k: v for k, v in source.values.items() if k in offer.values or k == part}
+    kept = {*offer.active, *effect_names(model, source.active).get(part, ())}
+    return Offer(values, tuple(k for k in source.active if k in kept))
+
+
 def less(offer: Offer, part: str, model: FittedModel) -> Offer:
     """An offer without an effect, or with a value as believed."""
     if part in offer.values:
         return replace(offer, values={k: v for k, v in offer.values.items() if k != part})
     return replace(offer, active=tuple(k for k in offer.active if model.search.terms[k].effect != part))
-
-
-def fault_of(model: FittedModel, settled: Settled, reference: Residuals, unusable: Callable[[Settled], str]) -> str:
-    """Why a settled offer is not delivered as it stands, in words; empty where it is."""
-    worse = worse_than(model, reference, settled.left)
-    if worse:
-        return f"where it was not fitted, {max(worse, key=lambda w: w.ratio)} with it"
-    return unusable(settled)
-
-
-def rate(
-    model: FittedModel, settled: Settled, reference: Residuals, unusable: Callable[[Settled], str]
-) -> tuple[float, bool]:
-    """How far an offer is from passing: the excess of its worse channels, then whether it is no usable vehicle."""
-    return excess(worse_than(model, reference, settled.left)), bool(unusable(settled))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.delivery import gate as module
-from rotorid.mismatch.delivery.gate import Offer, Settled, gate, less_until, worse_than
+from rotorid.mismatch.delivery.gate import Offer, Settled, gate, without_worse, worse_than
 
 RATE, SECONDS = 20, 60
 
@@ -75,15 +75,26 @@ def test_what_helps_passes_whole(monkeypatch):
     assert found.passes_whole and found.settled.offer.active == ("good",)
 
 
-def test_where_no_single_part_helps_all_go(monkeypatch):
+def test_where_nothing_helps_all_go(monkeypatch):
     def settle(m, offer, reference=None):
-        return Settled(offer, None, {}, noise(2, 2.0 if offer.active else 1.0))
+        return Settled(offer, None, {}, noise(2, 2.0))
 
     monkeypatch.setattr(module, "settle", settle)
     last = Settled(Offer({"mass": (0.1, 0.01)}, ()), None, {}, noise(2))
-    start = settle(None, Offer({}, ("a", "b")))
-    found, gone = less_until(model("a", "b"), start, noise(3), lambda s: "", last)
+    found, gone = without_worse(model("a", "b"), settle(None, Offer({}, ("a", "b"))), noise(3), last)
     assert found is last and set(gone) == {"a", "b"}
+
+
+def test_of_two_that_spoil_a_channel_together_one_stays(monkeypatch):
+    """Each alone is sound; beside each other they make the vertical force twice as bad, and so does the third."""
+
+    def settle(m, offer, reference=None):
+        bad = {"a", "b"} <= set(offer.active) or "c" in offer.active
+        return Settled(offer, None, {}, noise(2, np.array([1, 1, 2.0 if bad else 1.0, 1, 1, 1])))
+
+    monkeypatch.setattr(module, "settle", settle)
+    found, gone = without_worse(model("a", "b", "c"), settle(None, Offer({}, ("a", "b", "c"))), noise(3))
+    assert len(found.offer.active) == 1 and "c" in gone and len(gone) == 2
 
 
 def test_a_vehicle_that_is_not_usable_loses_the_part_that_makes_it_so(monkeypatch):
