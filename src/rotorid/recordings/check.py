@@ -14,7 +14,7 @@ import numpy as np
 from rotorid.recordings import columns as c
 from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import read_set
-from rotorid.recordings.physics import near_names, physical_doubts
+from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.sufficient import sufficient
 
@@ -182,8 +182,12 @@ def check_set(recordings: RecordingSet) -> SetCheck:
 
 def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """What cannot be right in a set, its vehicle and its runs together; empty where nothing is in doubt."""
-    physical = physical_doubts(recordings) if recordings.vehicle.kind == "flight" else ()
-    return (*near_names(recordings), *physical)
+    found = [*near_names(recordings), *voltages(recordings)]
+    if recordings.vehicle.kind != "bench":
+        found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
+    if recordings.vehicle.kind == "flight":
+        found += physical_doubts(recordings)
+    return tuple(found)
 
 
 def as_text(check: SetCheck) -> str:

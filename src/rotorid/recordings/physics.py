@@ -8,13 +8,16 @@ too.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rotorid.names import listed
 from rotorid.recordings import columns as c
+from rotorid.recordings.body import Body, Flown, body_of, impossible, quantities
 from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
@@ -23,17 +26,22 @@ STEP_S = 0.02
 """Step of the common clock; what is compared is slower than some hertz."""
 SMOOTH_S = 0.1
 LONGEST_GAP_S = 0.25
-WEIGHT_RATIO = (0.7, 1.4)
-"""Thrust over mass times specific force, outside of which no belief within its trust can be."""
+GRAVITY_M_S2 = (9.5, 10.1)
+LIFT_M_S2 = (5.0, 20.0)
+"""Where the median of an accelerometer in flight lies, in its unit and axes."""
+HIGHEST_VOLTAGE_V = 120.0
 LEAST_TURNING_RAD_S = 0.05
 """Spread of a body rate below which nothing can be said of it."""
 AGREES, CONTRADICTS = 0.5, -0.3
 """Correlations: above, two signals agree; below, one of them is turned round."""
+TOP = 0.99
+"""Share of the rotor speeds below their highest that counts: single samples may be faults."""
+SAME_UNIT = (0.2, 5.0)
+"""Of two signals that agree, the ratio of their spreads that noise and smoothing explain."""
 SLOW_S, LATEST_STEPS, LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
 SURE_Z, ALIKE, RIDGE = 6.0, 5.0, 0.02
 """Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, a share of the regressors."""
-RPM = 2 * np.pi / 60
 DEGREE = np.pi / 180
 LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
 LEAST_TIME_S = 20.0
@@ -51,7 +59,6 @@ def physical_doubts(recordings: RecordingSet) -> tuple[Doubt, ...]:
             continue
         for doubt in (
             *_accelerometer(run, clock, vehicle),
-            *_weight(run, clock, vehicle),
             *_gyroscope(run, clock),
             *_world(run, clock, vehicle),
             *_rotors(run, clock, vehicle),
@@ -66,8 +73,8 @@ def _once(found: list[tuple[str, Doubt]]) -> list[Doubt]:
     """Doubts by run as one for each thing in doubt: the first run's, with the number of runs that repeat it."""
     alike: dict[tuple[str, str], list[tuple[str, Doubt]]] = {}
     for run, doubt in found:
-        # Numbers differ between runs and stand in brackets.
-        alike.setdefault((doubt.what, doubt.sentence.split("(")[0]), []).append((run, doubt))
+        # Numbers differ between runs.
+        alike.setdefault((doubt.what, re.sub(r"[-\d.]+", "", doubt.sentence)), []).append((run, doubt))
     out = []
     for (run, first), *others in alike.values():
         more = f" The same in {len(others)} more." if others else ""
@@ -125,6 +132,83 @@ def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
+def flown(run: Run, vehicle: Vehicle) -> Flown | None:
+    """What a run says about the rotors in the air (on a stand: turning); None where it is short or says nothing."""
+    clock = _clock(run)
+    speeds = None if clock is None else _speeds(run, clock, vehicle)
+    if clock is None or speeds is None or not np.isfinite(speeds).any():
+        return None
+    coefficients = vehicle.thrust_coefficients_n_s2()
+    thrust = float(np.nanmedian((coefficients * speeds**2).sum(axis=1)))
+    if not thrust > 0:
+        return None
+    force = _on(run, clock, c.SPECIFIC_FORCE)
+    lift = None if force is None else -float(np.nanmedian(force[:, 2]))
+    if lift is None or not LIFT_M_S2[0] < lift < LIFT_M_S2[1]:
+        lift = 9.81  # On average a flight is carried; a wrong accelerometer is a doubt of its own.
+    kinds = ("rotor_speed", "rotor_command", "throttle")
+    column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
+    return Flown(
+        hover_rad_s=float(np.sqrt(thrust / coefficients.sum())),
+        top_rad_s=float(np.nanquantile(speeds, TOP)),
+        lift_m_s2=lift if vehicle.kind == "flight" else None,
+        column=column,
+    )
+
+
+def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """Believed values that no multirotor has together, by the rotor speeds of each run; each value once."""
+    vehicle = recordings.vehicle
+    speeds = {run.name: x for run in recordings.runs if (x := flown(run, vehicle))} or {"": None}
+    alike: dict[tuple[int, ...], list[str]] = {}
+    bodies: dict[tuple[int, ...], tuple[Body, str]] = {}
+    for run, turning in speeds.items():
+        body = body_of(vehicle, turning)
+        if body is None:
+            return ()
+        # Runs in which the same quantities are wrong have the same cause.
+        wrong = tuple(number for number, q in enumerate(quantities(body)) if not q.fits)
+        alike.setdefault(wrong, []).append(run)
+        bodies.setdefault(wrong, (body, turning.column if turning else ""))
+    found: dict[str, tuple[Doubt, list[str]]] = {}
+    for wrong, (body, column) in bodies.items():
+        for doubt in impossible(body, column):
+            found.setdefault(doubt.what, (doubt, []))[1].extend(alike[wrong])
+    return tuple(
+        doubt if len(runs) == len(speeds) else replace(doubt, sentence=f"{listed(runs)}: {doubt.sentence}")
+        for doubt, runs in found.values()
+    )
+
+
+def gravity(vehicle: Vehicle) -> tuple[Doubt, ...]:
+    """A gravity that is not the earth's."""
+    value, (low, high) = vehicle.gravity_m_s2, GRAVITY_M_S2
+    if low <= value <= high:
+        return ()
+    units = [
+        unit for unit, factor in {"g": 9.81, "ft/s²": 0.3048, "cm/s²": 0.01}.items() if low <= value * factor <= high
+    ]
+    fits = f"; {units[0]} would fit" if units else ""
+    sentence = f"gravity_m_s2 = {value:g}: expected that of the earth, {low:g} to {high:g} m/s²{fits}"
+    return (Doubt("gravity_m_s2", sentence, stops=True),)
+
+
+def voltages(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """A battery that no voltmeter reads in volts, in the first run that has it."""
+    name = c.BATTERY_VOLTAGE
+    for run in recordings.runs:
+        middle = float(np.nanmedian(run.column(name))) if run.has(name) else 0.0
+        if middle < 0:
+            said = "the sign is turned"
+        elif middle > HIGHEST_VOLTAGE_V:
+            said = "mV would fit" if 2 < middle / 1e3 < HIGHEST_VOLTAGE_V else "0.1 V would fit"
+        else:
+            continue
+        sentence = f"{run.name}: {name} has a median of {middle:.4g}, expected 0 to {HIGHEST_VOLTAGE_V:g} V: {said}"
+        return (Doubt(name, sentence, stops=True),)
+    return ()
+
+
 # Doubts -------------------------------------------------------------------------------------------
 
 
@@ -154,6 +238,22 @@ def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
             "specific force holds none",
             stops=True,
         )
+    elif size > LIFT_M_S2[1]:
+        unit = (
+            "ft/s²"
+            if 28 < size < 37
+            else "milli-g"
+            if 700 < size < 1400
+            else "cm/s²"
+            if 700 < size / 9.81 < 1400
+            else ""
+        )
+        yield Doubt(
+            c.SPECIFIC_FORCE[2],
+            f"the accelerometer's median is {size:.4g}, expected about 9.8 m/s²"
+            + (f": {unit} would fit" if unit else ""),
+            stops=True,
+        )
     elif -middle[2] < 0.7 * size:
         axis = "xyz"[int(np.argmax(np.abs(middle)))]
         yield Doubt(
@@ -161,32 +261,6 @@ def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
             f"the accelerometer feels the thrust along {axis}, not along -z: its axes are not the body's",
             stops=True,
         )
-
-
-def _weight(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
-    speeds = _speeds(run, clock, vehicle)
-    if speeds is None:
-        return
-    thrust = (vehicle.thrust_coefficients_n_s2() * speeds**2).sum(axis=1)
-    force = _on(run, clock, c.SPECIFIC_FORCE)
-    lift = vehicle.gravity_m_s2 if force is None else -np.nanmedian(force[:, 2])
-    if not lift > 5.0:
-        return
-    ratio = float(np.nanmedian(thrust)) / (vehicle.mass_kg * lift)
-    if WEIGHT_RATIO[0] <= ratio <= WEIGHT_RATIO[1]:
-        return
-    what, cause = "mass_kg", "mass, thrust coefficient or the unit of the rotor speeds is wrong"
-    if 0.7 < ratio * RPM**2 < 1.4:
-        what, cause = "rotor_speed_1_rad_s", "the rotor speeds are in revolutions per minute"
-    elif 0.7 < ratio * (2 * np.pi) ** 2 < 1.4:
-        what, cause = "rotor_speed_1_rad_s", "the rotor speeds are in revolutions per second"
-    elif 0.7 < ratio / 1000 < 1.4 or 0.7 < ratio * 1000 < 1.4:
-        cause = "the mass is in grams"
-    yield Doubt(
-        what,
-        f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force): {cause}",
-        stops=not 0.5 <= ratio <= 2.0,
-    )
 
 
 def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
@@ -257,6 +331,15 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
                         f"velocity_{axis}_m_s",
                         f"velocity_{axis}_m_s does not follow position_{axis}_m (correlation {r:.2f}): one of them is "
                         "in body axes, or axes are exchanged",
+                        stops=True,
+                    )
+                scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
+                if r > AGREES and not SAME_UNIT[0] < scale < SAME_UNIT[1]:
+                    # Units that are used beside metres are smaller: the column with the larger numbers is the one.
+                    yield Doubt(
+                        f"velocity_{axis}_m_s" if scale > 1 else f"position_{axis}_m",
+                        f"velocity_{axis}_m_s is {scale:.3g} times the derivative of position_{axis}_m, expected 1: "
+                        f"{'the velocity' if scale > 1 else 'the position'} is in another unit",
                         stops=True,
                     )
     if attitude is None or force is None:
