@@ -14,7 +14,7 @@ from rotorid.mismatch.headline import MOST_WORDS, headline, tiles
 from rotorid.mismatch.shares import segments_of
 from rotorid.mismatch.verdict import main_channel
 from rotorid.page.data import packed
-from rotorid.page.make import by_share, make_page
+from rotorid.page.make import by_share, make_page, strip
 from rotorid.page.signals import fit_percent, measured
 from tests.browser import CHROMIUM, Browser
 from tests.unit.mismatch.synthetic import analysis, drag_finding
@@ -180,3 +180,15 @@ def test_the_fit_is_a_hundred_where_nothing_is_left_and_nothing_where_the_mean_w
     for before, after in fits.values():
         assert after == pytest.approx(100)
         assert before == pytest.approx(0, abs=1e-6)
+
+
+def test_runs_that_are_shorter_than_a_cell_of_the_strip_are_shown():
+    """Before: IndexError on a bench or stand of ten rows a run."""
+    made = analysis(findings=(drag_finding(),))
+    rows = slice(0, 10)
+    short = [
+        replace(t, time_s=t.time_s[rows], before=t.before[rows], after=t.after[rows], refitted=t.refitted[rows])
+        for t in made.traces
+    ]
+    picture, _, _ = strip(replace(made, traces=short), verdict_of(made))
+    assert "svg" in picture
