@@ -182,6 +182,7 @@ def test_the_fit_is_a_hundred_where_nothing_is_left_and_nothing_where_the_mean_w
         assert before == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.filterwarnings("error")
 def test_runs_that_are_shorter_than_a_cell_of_the_strip_are_shown():
     """Before: IndexError on a bench or stand of ten rows a run."""
     made = analysis(findings=(drag_finding(),))
