@@ -10,8 +10,9 @@ from rotorid import templates
 from rotorid.cli.simulating import fly
 from rotorid.recordings import RecordingSet, Run, read_set
 from rotorid.recordings import columns as c
+from rotorid.recordings.check import doubts_of
 from rotorid.recordings.doubts import Doubt
-from rotorid.recordings.physics import near_names, physical_doubts
+from rotorid.recordings.physics import near_names
 
 RPM = 60 / (2 * np.pi)
 
@@ -31,7 +32,7 @@ def changed(recordings: RecordingSet, change) -> RecordingSet:
 
 
 def test_a_sound_flight_raises_no_doubt(flown) -> None:
-    assert physical_doubts(flown) == ()
+    assert doubts_of(flown) == ()
 
 
 def times(names, factor):
@@ -62,12 +63,27 @@ SPEEDS = c.rotor_columns("rotor_speed", 4)
         (exchange(*c.ANGULAR_VELOCITY[:2]), "axes are exchanged"),
         (exchange(SPEEDS[0], SPEEDS[1]), "order of the rotors"),
         (times(c.VELOCITY[1:2], -1), "velocity_y_m_s goes against the derivative of position_y_m"),
+        (
+            times(c.VELOCITY, 100),
+            "100 times the derivative of position_x_m, expected 1: the velocity is in another unit",
+        ),
+        (times(c.POSITION, 1000), "0.001 times the derivative of position_x_m, expected 1: the position is in another"),
+        (times(c.SPECIFIC_FORCE, 1 / 0.3048), "ft/s² would fit"),
         (times(c.QUATERNION[1:], -1), "turns against the attitude"),
     ],
 )
 def test_each_mistake_is_named(flown, change, said) -> None:
-    found = physical_doubts(changed(flown, change))
+    found = doubts_of(changed(flown, change))
     assert any(said in doubt.sentence and doubt.stops for doubt in found), found
+
+
+def test_what_every_run_repeats_is_one_doubt(flown) -> None:
+    table = flown.runs[0].table
+    half = len(table) // 2
+    halves = replace(flown, runs=(Run("a", table.iloc[:half]), Run("b", table.iloc[half:])))
+    found = doubts_of(changed(halves, times(c.ANGULAR_VELOCITY, 180 / np.pi)))
+    assert [doubt.what for doubt in found] == list(c.ANGULAR_VELOCITY)
+    assert all(doubt.sentence.endswith("The same in 1 more.") for doubt in found)
 
 
 def test_a_throttle_in_microseconds_and_a_rest_are_named(flown) -> None:
@@ -76,7 +92,7 @@ def test_a_throttle_in_microseconds_and_a_rest_are_named(flown) -> None:
             table[f"throttle_{i}"] = 1000 + table[f"rotor_speed_{i}_rad_s"] / 2.5
         table.loc[:500, list(SPEEDS)] = 0.0
 
-    found = " ".join(map(str, physical_doubts(changed(flown, pulses))))
+    found = " ".join(map(str, doubts_of(changed(flown, pulses))))
     assert "it is in µs" in found
     assert "all rotors are at rest in 8% of the samples" in found
 
@@ -87,7 +103,7 @@ def test_few_and_rare_samples_are_named(flown) -> None:
 
     thin = changed(flown, rare)
     cut = replace(thin, runs=tuple(Run(r.name, r.table.iloc[:3000]) for r in thin.runs))
-    found = physical_doubts(cut)
+    found = doubts_of(cut)
     assert [(doubt.what, doubt.stops) for doubt in found] == [("time_s", False), (SPEEDS[0], False)]
     assert "Only 12 s are recorded" in found[0].sentence
     assert "rotor speeds come at 2.5" in found[1].sentence

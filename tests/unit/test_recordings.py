@@ -120,7 +120,7 @@ def test_a_wrong_vehicle_is_one_sentence(folder: Path, change: tuple[str, str], 
     ("added", "said"),
     [
         ("rotor_speed_limits_rad_s: [2500, 0]\n", "[low, high] with 0 <= low < high"),
-        ("trust: {mass_kg: -0.1}\n", "trust of mass_kg is -0.1, expected a relative one-sigma of 0 or more"),
+        ("trust: {mass_kg: -0.1}\n", "trust of mass_kg is -0.1, expected a relative one-sigma of 0 to 100"),
     ],
 )
 def test_wrong_optional_keys_are_named(folder: Path, added: str, said: str) -> None:

@@ -222,6 +222,7 @@ def vehicles() -> Iterator[Wrong]:
         ("colour: red", "colour: no such key is known"),
         ("trust: {mass: 0.1}", "trust.mass", "did you mean mass_kg?"),
         ("trust: {mass_kg: -0.1}", "trust of mass_kg is -0.1"),
+        ("trust: {mass_kg: 1e160}", "trust of mass_kg is 1e+160", "0 to 100"),
         ("trust: {mass_kg: .nan}", "trust"),
         ("trust: {mass_kg: a}", "trust.mass_kg", "a number"),
         ("trust: {mass_kg: true}", "trust", "true"),
@@ -537,7 +538,34 @@ def places() -> Iterator[Wrong]:
     )
 
 
+def instruments() -> Iterator[Wrong]:
+    """Benches and stands that hold nothing to compare."""
+
+    def instrument(kind: str, count: int, noise: float) -> Callable[[Path], None]:
+        def spoil(folder: Path) -> None:
+            rest = VEHICLE.split("\n", 2)[2] if kind == "stand" else ""
+            (folder / "vehicle.yaml").write_text(f"name: x\nkind: {kind}\n{rest}tared: true\n")
+            rng = np.random.default_rng(0)
+            columns = {"time_s": np.arange(count) / RATE_HZ}
+            loads = SPEEDS if kind == "stand" else c.REFERENCE_FORCE
+            columns |= {name: np.full(count, 900.0 if kind == "stand" else 2.0) for name in loads}
+            columns |= {name: 2.0 + noise * rng.standard_normal(count) for name in c.FORCE}
+            pd.DataFrame(columns).to_csv(folder / "run.csv", index=False)
+
+        return spoil
+
+    for kind in ("bench", "stand"):
+        yield place(
+            f"{kind} that reads one value", instrument(kind, 200, 0.0), "one value in every run", "force_x_n = 2"
+        )
+        for count in (10, 40, 65):
+            yield place(
+                f"{kind} of {count} rows", instrument(kind, count, 0.1), "run.csv", "too little data",
+                "at least 3.6 s", "its last third",
+            )  # fmt: skip
+
+
 def all_wrong() -> list[Wrong]:
     """Every wrong set, each with a name of its own."""
-    found = [*vehicles(), *runs(), *contents(), *tables(), *splits(), *places()]
+    found = [*vehicles(), *runs(), *contents(), *tables(), *splits(), *places(), *instruments()]
     return [replace(wrong, name=f"{k:03d} {wrong.name}") for k, wrong in enumerate(found, 1)]

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.errors import InputError
+from rotorid.cli.console import INTERRUPTED, one_sentence
 
 
 def check(
@@ -28,9 +28,11 @@ def check(
     results = []
     for number, path in enumerate(folders):
         try:
-            result = check_folder(path)
-        except InputError as error:
-            typer.echo(f"rotorid: {error}", err=True)
+            with one_sentence():
+                result = check_folder(path)
+        except typer.Exit as end:
+            if end.exit_code == INTERRUPTED:
+                raise
             failed = True
             continue
         results.append(result.as_dict())

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import errno
+import os
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import typer
 
 from rotorid.errors import InputError
 
+INTERRUPTED = 130
+TRACEBACK = "ROTORID_TRACEBACK"
+"""Environment variable with which an unexpected error shows its traceback."""
+
 
 @contextmanager
 def one_sentence() -> Iterator[None]:
-    """Bad input ends the command with its one sentence and exit code 1, without a traceback."""
+    """Bad input, and what nobody foresaw, end the command with one sentence and exit code 1, without a traceback."""
     try:
         yield
     except InputError as error:
@@ -29,7 +36,26 @@ def one_sentence() -> Iterator[None]:
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         typer.echo("rotorid: stopped; nothing is left half written", err=True)
-        raise typer.Exit(130) from None
+        raise typer.Exit(INTERRUPTED) from None
+    except typer.Exit:
+        raise
+    except Exception as error:
+        if os.environ.get(TRACEBACK):
+            raise
+        typer.echo(f"rotorid: {unexpected(error)}", err=True)
+        raise typer.Exit(1) from None
+
+
+def unexpected(error: Exception) -> str:
+    """The sentence on an error that nobody foresaw: what it is, where it arose, and what to do."""
+    package = Path(__file__).parents[1]
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(package)]
+    where = f" in {Path(frames[-1].filename).relative_to(package)}, line {frames[-1].lineno}" if frames else ""
+    what = " ".join(str(error).split())
+    return (
+        f"unexpected {type(error).__name__}{f' ({what})' if what else ''}{where}: a fault of rotorid, not of your "
+        f"files; please report it with the set ({TRACEBACK}=1 shows the whole way there)"
+    )
 
 
 def span(seconds: float) -> str:

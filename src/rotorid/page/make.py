@@ -279,6 +279,7 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
             noise = verdict.channels[trace.channel].noise_floor
             period = float(np.median(np.diff(trace.time_s)))
             per = max(int(plots.STRIP_CELL_S / period), len(trace.time_s) // STRIP_CELLS, 1)
+            per = min(per, len(trace.time_s))  # A stretch that is shorter than a cell is one cell.
             count = len(trace.time_s) // per
             for stage in ("before", "after"):
                 size = np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)) / noise

@@ -169,7 +169,11 @@ def heat_strip(
 
 def _span(sizes, run: str) -> tuple[float, float]:
     times = [t for (_, r, _), (t, _) in sizes.items() if r == run and len(t)]
-    return (min(t[0] for t in times), max(t[-1] for t in times)) if times else (0.0, 1.0)
+    if not times:
+        return 0.0, 1.0
+    start, stop = min(t[0] for t in times), max(t[-1] for t in times)
+    # A run of a single cell is as wide as that.
+    return (start, stop) if stop > start else (start - STRIP_CELL_S / 2, stop + STRIP_CELL_S / 2)
 
 
 def against_regime(

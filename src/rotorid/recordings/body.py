@@ -42,7 +42,7 @@ PLACE_ARMS = (0.0, 2.0)
 ROTOR_INERTIA = (0.0, 0.1)
 """Of one rotor, over mass times squared radius: with all the vehicle's mass in its rotors, and more."""
 FACTORS = np.logspace(-13, 13, 521)
-MOST_UNITS = 2
+MOST_UNITS = 3
 PX4_UNSET_ARM_M = sqrt(2.0)
 """Rotors at ±1 m along x and y."""
 
@@ -298,7 +298,7 @@ def remedies(body: Body) -> Iterator[Remedy]:
         least = min(rest.min(), *by_unit.values())
         fitting = [unit for unit, count in by_unit.items() if count == least]
         factors = np.sort([*grid[rest == least], *(units[u] for u in fitting)])
-        middle = float(np.log(factors).mean())
+        middle = float(np.log(factors[-1:] if factors[0] <= FACTORS[0] else factors).mean())
         nearest = sorted(fitting, key=lambda unit: abs(np.log(units[unit]) - middle))[:MOST_UNITS]
         yield Remedy(keys, factors, int(least), tuple(nearest))
 
@@ -349,7 +349,8 @@ def _doubt(body: Body, best: Remedy, raised_by: Sequence[Quantity], others: Sequ
     ends = (best.factors[0], best.factors[-1]) if len(best.factors) else None
     if ends:
         low, high = value * ends[0], value * ends[1]
-        sentence += f"; expected {low:.3g} to {high:.3g}" if high > low else f"; expected about {low:.3g}"
+        least = "at most " if ends[0] <= FACTORS[0] else f"{low:.3g} to " if high > low else "about "
+        sentence += f"; expected {least}{high:.3g}"
     if key == "torque_coefficient_n_m_s2" and ends and _within(body.thrust_coefficient_n_s2, ends):
         sentence += "; the ratio of torque to thrust in m would fit"
     elif best.units:

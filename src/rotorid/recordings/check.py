@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.recordings import columns as c
+from rotorid.recordings.copies import copies
 from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import read_set
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.sufficient import sufficient
+from rotorid.recordings.unread import unread_files
 
 GAP_FACTOR = 3.0
 """A step of the clock longer than this many median steps is a gap."""
@@ -140,7 +142,12 @@ def slow_speeds(recordings: RecordingSet) -> list[str]:
 
 
 def check_set(recordings: RecordingSet) -> SetCheck:
-    """What a set contains and lacks."""
+    """What a set contains, lacks, and what in it is in doubt."""
+    return replace(contents(recordings), doubts=doubts_of(recordings))
+
+
+def contents(recordings: RecordingSet) -> SetCheck:
+    """What a set contains and lacks; what cannot be right is not looked for."""
     vehicle = recordings.vehicle
 
     def has(*names: str) -> bool:
@@ -176,13 +183,12 @@ def check_set(recordings: RecordingSet) -> SetCheck:
         columns=tuple(name for name in columns if c.is_known(name)),
         other_columns=tuple(name for name in columns if not c.is_known(name)),
         lacks=tuple(lacks),
-        doubts=doubts_of(recordings),
     )
 
 
 def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """What cannot be right in a set, its vehicle and its runs together; empty where nothing is in doubt."""
-    found = [*near_names(recordings), *voltages(recordings)]
+    found = [*unread_files(recordings), *near_names(recordings), *copies(recordings), *voltages(recordings)]
     if recordings.vehicle.kind != "bench":
         found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
     if recordings.vehicle.kind == "flight":
@@ -218,8 +224,9 @@ def as_text(check: SetCheck) -> str:
 def check_recordings(recordings: RecordingSet) -> SetCheck:
     """What a set contains and lacks, useless runs named; InputError if nothing in it can be compared."""
     usable = sufficient(recordings)
-    found = check_set(recordings)
-    return replace(found, lacks=(*usable.left_out, *found.lacks))
+    found = contents(recordings)
+    # A run that is left out would raise doubts about values that no verdict takes from it.
+    return replace(found, lacks=(*usable.left_out, *found.lacks), doubts=doubts_of(usable))
 
 
 def check_folder(folder: Path) -> SetCheck:

@@ -8,6 +8,7 @@ too.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -35,6 +36,8 @@ AGREES, CONTRADICTS = 0.5, -0.3
 """Correlations: above, two signals agree; below, one of them is turned round."""
 TOP = 0.99
 """Share of the rotor speeds below their highest that counts: single samples may be faults."""
+SAME_UNIT = (0.2, 5.0)
+"""Of two signals that agree, the ratio of their spreads that noise and smoothing explain."""
 SLOW_S, LATEST_STEPS, LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
 SURE_Z, ALIKE, RIDGE = 6.0, 5.0, 0.02
@@ -42,6 +45,8 @@ SURE_Z, ALIKE, RIDGE = 6.0, 5.0, 0.02
 DEGREE = np.pi / 180
 LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
 LEAST_TIME_S = 20.0
+MOST_S = 7200.0
+"""How much of a run is looked at: a clock that was set on the way would need more memory than there is."""
 AT_REST = 0.2
 """Share of the median rotor speed below which a rotor counts as at rest."""
 
@@ -60,6 +65,7 @@ def physical_doubts(recordings: RecordingSet) -> tuple[Doubt, ...]:
             *_world(run, clock, vehicle),
             *_rotors(run, clock, vehicle),
             *_throttle(run, vehicle),
+            *_held(run, vehicle),
             *_rest(run, vehicle),
         ):
             found.append((run.name, doubt))
@@ -70,8 +76,8 @@ def _once(found: list[tuple[str, Doubt]]) -> list[Doubt]:
     """Doubts by run as one for each thing in doubt: the first run's, with the number of runs that repeat it."""
     alike: dict[tuple[str, str], list[tuple[str, Doubt]]] = {}
     for run, doubt in found:
-        # Numbers differ between runs and stand in brackets.
-        alike.setdefault((doubt.what, doubt.sentence.split("(")[0]), []).append((run, doubt))
+        # Numbers differ between runs.
+        alike.setdefault((doubt.what, re.sub(r"[-\d.]+", "", doubt.sentence)), []).append((run, doubt))
     out = []
     for (run, first), *others in alike.values():
         more = f" The same in {len(others)} more." if others else ""
@@ -84,7 +90,9 @@ def _once(found: list[tuple[str, Doubt]]) -> list[Doubt]:
 
 def _clock(run: Run) -> np.ndarray | None:
     duration = float(run.time_s[-1] - run.time_s[0])
-    return np.arange(run.time_s[0], run.time_s[-1], STEP_S) if duration > 2.0 else None
+    if not duration > 2.0:
+        return None
+    return np.arange(run.time_s[0], run.time_s[0] + min(duration, MOST_S), STEP_S)
 
 
 def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = SMOOTH_S) -> np.ndarray | None:
@@ -330,6 +338,15 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
                         "in body axes, or axes are exchanged",
                         stops=True,
                     )
+                scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
+                if r > AGREES and not SAME_UNIT[0] < scale < SAME_UNIT[1]:
+                    # Units that are used beside metres are smaller: the column with the larger numbers is the one.
+                    yield Doubt(
+                        f"velocity_{axis}_m_s" if scale > 1 else f"position_{axis}_m",
+                        f"velocity_{axis}_m_s is {scale:.3g} times the derivative of position_{axis}_m, expected 1: "
+                        f"{'the velocity' if scale > 1 else 'the position'} is in another unit",
+                        stops=True,
+                    )
     if attitude is None or force is None:
         return
     known = np.isfinite(attitude).all(axis=1) & np.isfinite(force).all(axis=1)
@@ -375,7 +392,7 @@ def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
     too little.
     """
     known = np.isfinite(speeds).all(axis=1) & np.isfinite(gyro).all(axis=1)
-    if known.mean() < 0.8:
+    if known.mean() < 0.8 or not (np.ptp(speeds[known], axis=0) > 0).any():
         return None
     clean = [np.where(known[:, None], x, np.nanmean(x, axis=0)) for x in (speeds**2, gyro)]
     push, turning = _band(clean[0] / clean[0].mean()), np.gradient(_band(clean[1]), STEP_S, axis=0)[:, :2]
@@ -436,6 +453,25 @@ def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         how = "µs (1000 to 2000)" if 800 < high < 2500 else "percent" if 2 < high <= 100 else "another range"
         yield Doubt(
             names[0], f"throttle runs from {low:.4g} to {high:.4g}, expected 0 to 1: it is in {how}", stops=True
+        )
+
+
+def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Rotor speeds that keep one value while the vehicle moves: they were not measured."""
+    kinds = [
+        k for k in ("rotor_speed", "rotor_command", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))
+    ]
+    if not kinds:
+        return
+    names = c.rotor_columns(kinds[0], vehicle.rotor_count)
+    held = [name for name in names if np.nanmin(run.column(name)) == np.nanmax(run.column(name))]
+    if held:
+        value = float(np.nanmax(run.column(held[0])))
+        yield Doubt(
+            held[0],
+            f"{listed(held)} {'keeps' if len(held) == 1 else 'keep'} one value ({value:.4g}) throughout, expected the "
+            "changes that keep a vehicle in the air: not measured, or a sensor that stands still",
+            stops=False,
         )
 
 

@@ -25,6 +25,8 @@ LEAST_STRETCH_SAMPLES = 30
 """A stretch of flight without a hole must last so long, and so many samples of its slowest sensor."""
 LEAST_SINGLE_S = 9.0
 """Of a single run a third is held out, after a gap of two seconds; both parts need two seconds."""
+SINGLE_GAP_S, HELD_OUT_SHARE = 2.0, 1 / 3
+"""Of a single run this share is held out, after a gap."""
 LEAST_READINGS = 10
 """Readings of a stand or a bench that are there in every compared channel at once, in a run."""
 HOLE_PERIODS = 6.0
@@ -80,6 +82,7 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
     left_out = (*recordings.left_out, *(f"Left out: {reason}." for reason in reasons))
     kept = replace(recordings, runs=tuple(usable), left_out=left_out)
     kept = with_alike_runs(kept)
+    check_not_constant(kept)
     if len(kept.runs) == 1:
         check_single(kept)
     check_common(kept)
@@ -388,6 +391,16 @@ def longest_stretch_s(run: Run, groups: list[tuple[str, ...]]) -> tuple[float, f
     return float(max(longest, time_s[-1] - reached, 0.0)), slowest
 
 
+def compared_readings(run: Run, vehicle: Vehicle) -> list[str]:
+    """Columns of a stand or bench whose values are compared, on a bench with the loads that they are compared with."""
+    names = [n for n in c.FORCE + c.MOMENT if run.has(n)]
+    if vehicle.kind == "bench":
+        pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
+        names = [n for n in names if n in pairs and run.has(pairs[n])]
+        names += [pairs[n] for n in names]
+    return names
+
+
 def too_short(run: Run, vehicle: Vehicle) -> str | None:
     """A run without a stretch that is long enough to be compared."""
     if vehicle.kind == "flight":
@@ -399,11 +412,7 @@ def too_short(run: Run, vehicle: Vehicle) -> str | None:
             f"{whereof(run)}: too little data: the longest stretch in which every sensor has readings lasts "
             f"{longest:.3g} s, expected at least {needed:.3g} s"
         )
-    names = [n for n in c.FORCE + c.MOMENT if run.has(n)]
-    if vehicle.kind == "bench":
-        pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
-        names = [n for n in names if n in pairs and run.has(pairs[n])]
-        names += [pairs[n] for n in names]
+    names = compared_readings(run, vehicle)
     count = int(np.isfinite(run.array(tuple(names))).all(axis=1).sum())
     if count >= LEAST_READINGS:
         return None
@@ -434,10 +443,39 @@ LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
 """What is looked at in each run, the cause before its consequences."""
 
 
+def check_not_constant(recordings: RecordingSet) -> None:
+    """InputError where a stand or bench reads one value, and its load is one value, throughout every run."""
+    vehicle, runs = recordings.vehicle, recordings.runs
+    if vehicle.kind == "flight":
+        return
+    read = list(dict.fromkeys(name for run in runs for name in compared_readings(run, vehicle)))
+    values = {name: np.concatenate([run.column(name) for run in runs]) for name in read}
+    if any(np.nanmin(v) < np.nanmax(v) for v in values.values()):
+        return
+    found = listed([f"{name} = {np.nanmax(v):g}" for name, v in values.items()], most=6)
+    raise InputError(
+        f"{recordings.path or recordings.name}: nothing can be compared: every reading holds one value in every run "
+        f"({found}), expected the noise of a sensor and loads that differ"
+    )
+
+
+def check_single_of_instrument(run: Run, names: list[str]) -> None:
+    """InputError where the last third of a single run, less half the gap before it, is next to nothing."""
+    known = run.time_s[np.isfinite(run.array(tuple(names))).all(axis=1)]
+    needed = (SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / HELD_OUT_SHARE
+    lasts = float(known[-1] - known[0])
+    if lasts < needed:
+        raise InputError(
+            f"{whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last third "
+            f"is held out, after a gap; found {lasts:.3g} s"
+        )
+
+
 def check_single(recordings: RecordingSet) -> None:
     """InputError where a single run is too short to hold out a part of it."""
     run, vehicle = recordings.runs[0], recordings.vehicle
     if vehicle.kind != "flight":
+        check_single_of_instrument(run, compared_readings(run, vehicle))
         return
     longest, _ = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
     if longest < LEAST_SINGLE_S:

@@ -71,6 +71,8 @@ Length = Annotated[float, Field(ge=-100, le=100)]
 Place = tuple[Length, Length, Length]
 SMALLEST_COEFFICIENT, LARGEST_COEFFICIENT = 1e-14, 1e2
 LARGEST_SPEED_RAD_S = 1e6
+LARGEST_TRUST = 100.0
+"""Relative one-sigma with which a value says nothing any more."""
 _FLIGHT_NEEDS = ("mass_kg", "inertia_kg_m2", "rotors", "thrust_coefficient_n_s2", "torque_coefficient_n_m_s2")
 
 
@@ -111,8 +113,10 @@ class Vehicle(_Strict):
     @classmethod
     def _trust_is_positive(cls, trust: dict[str, float]) -> dict[str, float]:
         for key, sigma in trust.items():
-            if not sigma >= 0:
-                raise ValueError(f"trust of {key} is {sigma}, expected a relative one-sigma of 0 or more")
+            if not 0 <= sigma <= LARGEST_TRUST:
+                raise ValueError(
+                    f"trust of {key} is {sigma:g}, expected a relative one-sigma of 0 to {LARGEST_TRUST:g}"
+                )
         return trust
 
     @model_validator(mode="after")

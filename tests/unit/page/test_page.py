@@ -16,7 +16,7 @@ from rotorid.mismatch.shares import segments_of
 from rotorid.mismatch.tiles import tiles
 from rotorid.mismatch.verdict import main_channel
 from rotorid.page.data import packed
-from rotorid.page.make import by_share, make_page, pretty
+from rotorid.page.make import by_share, make_page, pretty, strip
 from rotorid.page.signals import fit_percent, measured
 from rotorid.recordings.doubts import Doubt
 from tests.browser import CHROMIUM, Browser
@@ -197,3 +197,16 @@ def test_the_fit_is_a_hundred_where_nothing_is_left_and_nothing_where_the_mean_w
     for before, after in fits.values():
         assert after == pytest.approx(100)
         assert before == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.filterwarnings("error")
+def test_runs_that_are_shorter_than_a_cell_of_the_strip_are_shown():
+    """Before: IndexError on a bench or stand of ten rows a run."""
+    made = analysis(findings=(drag_finding(),))
+    rows = slice(0, 10)
+    short = [
+        replace(t, time_s=t.time_s[rows], before=t.before[rows], after=t.after[rows], refitted=t.refitted[rows])
+        for t in made.traces
+    ]
+    picture, _, _ = strip(replace(made, traces=short), verdict_of(made))
+    assert "svg" in picture
