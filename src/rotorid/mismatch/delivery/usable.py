@@ -16,6 +16,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import NO_BODY
+from rotorid.recordings.body import body_of, unfit
 from rotorid.vehicle.improved import active_forms, speeds_of_commands
 
 MOST_HOVER_SHARE = 0.9
@@ -24,9 +25,6 @@ FLIGHT_S, FLIGHT_SEED = 2.0, 1
 """The trial flight: swings in roll, pitch and yaw under the project's attitude controller."""
 MOST_TILT_RAD = np.pi / 2
 """Tilt in the trial flight from which the vehicle has fallen over; a quarter radian is asked for."""
-GYRATION = (0.05, 1.5)
-"""Radius of gyration over the longest arm: of a point mass at the hub, and of a beam far longer than the arms."""
-AIR_DENSITY_KG_M3 = 1.225
 HIGH_ABOVE_GROUND_M = 1e3
 LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
@@ -48,31 +46,12 @@ def question_of(believed: Vehicle, runs: Sequence[Run]) -> Question:
 
 
 def no_body(vehicle: Vehicle) -> str:
-    """Which value is not that of a body with rotors; empty where all may be."""
-    arm = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max())
-    inertia = vehicle.inertia_kg_m2.matrix()
-    least, middle, largest = np.linalg.eigvalsh(inertia)
+    """Which values are not those of one body with rotors; empty where they may be."""
+    least, middle, largest = np.linalg.eigvalsh(vehicle.inertia_kg_m2.matrix())
     if largest > NO_BODY * (least + middle):
         return f"its principal moments of inertia {least:.3g}, {middle:.3g} and {largest:.3g} kg m2 are of no body"
-    for axis, moment in zip(("roll", "pitch", "yaw"), np.diag(inertia), strict=True):
-        radius = float(np.sqrt(moment / vehicle.mass_kg))
-        if not GYRATION[0] * arm <= radius <= GYRATION[1] * arm:
-            return f"its {axis} inertia has a radius of gyration of {radius:.3g} m with arms of {arm:.3g} m"
-    merit = figure_of_merit(vehicle)
-    if merit is not None and merit > 1.0:
-        return f"its rotors would have a figure of merit of {merit:.2f}; none is above 1"
-    return ""
-
-
-def figure_of_merit(vehicle: Vehicle) -> float | None:
-    """Ideal over real power of the rotors at rest, (C_F^1.5 / C_Q) / √(2 ρ π R²); None where a value is not stated.
-
-    Source: Leishman, Principles of Helicopter Aerodynamics, 2.8, with T = C_F ω² and P = C_Q ω³.
-    """
-    if vehicle.rotor_radius_m is None or vehicle.torque_coefficient_n_m_s2 is None:
-        return None
-    disc = np.sqrt(2.0 * AIR_DENSITY_KG_M3 * np.pi) * vehicle.rotor_radius_m
-    return float(np.max(vehicle.thrust_coefficients_n_s2() ** 1.5 / vehicle.torque_coefficients_n_m_s2() / disc))
+    wrong = unfit(body_of(vehicle, None))
+    return f"it would have {wrong[0].words}" if wrong else ""
 
 
 def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
