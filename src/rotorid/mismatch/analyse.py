@@ -112,7 +112,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     strained = beyond_trust(model, values, model.selection.active)
     claimed = bool(values) or any(f.status in CLAIMED for f in findings)
     findings = together(findings)
-    fly = next_flight(findings, prepared, model.noise)
+    fly = next_flight(findings, recordings, found)
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(found, recordings, split, unseen)
@@ -162,7 +162,6 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         unexplained_description=left.description,
         next_manoeuvre=fly.manoeuvre,
         next_separates=fly.separates,
-        next_sigma=fly.sigma,
         force_source=model.segments[0].force_source,
         notes=(*remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
         instead=instead_of(model, values),
