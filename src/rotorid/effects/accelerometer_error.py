@@ -72,6 +72,7 @@ EFFECT = Effect(
     ),
     excited_by=("accelerometer",),
     confusers=("thrust_tilt", "steady_wind"),
-    separating_manoeuvre="a static six-face calibration, or record position beside the accelerometer",
+    separating_manoeuvre="a static six-face calibration",
+    separating_columns=("position",),
     kind="sensor",
 )

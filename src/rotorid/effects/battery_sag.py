@@ -66,5 +66,6 @@ EFFECT = Effect(
     sign="positive p and k make the rotors slower as the voltage falls or time passes",
     validity=("speed controllers without feedback of the speed; the exponent is constant over the battery's range"),
     confusers=("throttle_curve", "command_saturation"),
-    separating_manoeuvre="record voltage and current, rest the battery and repeat the same hover",
+    separating_manoeuvre="rest the battery and repeat the same hover",
+    separating_columns=("voltage",),
 )

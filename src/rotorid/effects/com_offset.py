@@ -97,7 +97,8 @@ EFFECT = Effect(
     excited_by=("rotor_speed", "angular_velocity", "angular_acceleration"),
     reading_forms=reading_forms,
     confusers=("unequal_rotors", "thrust_tilt"),
-    separating_manoeuvre="excite roll, pitch and yaw by doublets with rotor speeds recorded",
+    separating_manoeuvre="excite roll, pitch and yaw by doublets",
+    separating_columns=("rotor_speed",),
     exact=True,
     lack_on=lambda instrument: (
         NO_ROTORS

@@ -45,4 +45,5 @@ EFFECT = Effect(
     validity="hard limits, the same for all rotors; rate limits of the speed controllers are left out",
     confusers=("throttle_curve", "motor_lag"),
     separating_manoeuvre="repeat the manoeuvre at half the amplitude",
+    separating_columns=("rotor_speed",),
 )

@@ -303,6 +303,9 @@ class Effect:
     confusers: tuple[str, ...] = ()
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
+    """What tells it from its confusers, one clause, without the columns that this takes."""
+    separating_columns: tuple[str, ...] = ()
+    """What to record for this (`rotorid.effects.advice.RECORDABLE`)."""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
     exact: bool = False
     """Whether its equation is geometry or a definition and can have no other form; else what it leaves of a reading

@@ -87,6 +87,7 @@ EFFECT = Effect(
     validity="a constant delay; the part below one sample is a nuisance and never reported",
     confusers=("motor_lag", "clock_skew"),
     separating_manoeuvre="excite collective and attitude up to 8 Hz",
+    separating_columns=("rotor_speed",),
     kind="sensor",
     exact=True,
     shows="after a change of load",

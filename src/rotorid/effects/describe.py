@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 
+from rotorid.effects.advice import advice
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import COLUMNS_OF, Effect, Form, Parameter, SetForm, SpeedForm
 from rotorid.effects.loading import AXES, Instrument, forms_of
@@ -240,7 +241,7 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
         f"  validity: {effect.validity}",
         f"  source: {effect.source}",
         f"  imitated by: {', '.join(effect.confusers) or 'nothing known'}",
-        f"  what to fly: {effect.separating_manoeuvre}",
+        f"  what to fly: {advice(effect)}",
     ]
     return "\n".join(out) + "\n"
 
@@ -269,7 +270,7 @@ def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     out += [
         f"- Sign: {effect.sign}.",
         f"- Validity: {effect.validity}.",
-        f"- Imitated by: {confusers}. What tells them apart: {effect.separating_manoeuvre}.",
+        f"- Imitated by: {confusers}. What tells them apart: {advice(effect)}.",
         f"- Source: {effect.source}.\n",
     ]
     return "\n".join(out)

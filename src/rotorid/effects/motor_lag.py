@@ -91,6 +91,7 @@ EFFECT = Effect(
         "below about 2 Hz it equals a delay"
     ),
     confusers=("delay", "throttle_curve"),
-    separating_manoeuvre="excite collective and attitude up to 8 Hz, or record rotor speeds",
+    separating_manoeuvre="excite collective and attitude up to 8 Hz",
+    separating_columns=("rotor_speed",),
     like_of_reading=("amplifier_filter",),
 )

@@ -129,5 +129,6 @@ EFFECT = Effect(
     validity="static and the same for all rotors; at one voltage, or together with battery_sag",
     confusers=("battery_sag", "thrust_curve", "command_saturation"),
     separating_manoeuvre="step the throttle up and down over its whole range with two battery charges",
+    separating_columns=("rotor_speed",),
     would_change=("thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s"),
 )

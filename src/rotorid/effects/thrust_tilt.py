@@ -159,5 +159,6 @@ EFFECT = Effect(
     validity="angles below about 0.3 rad (loss of lift of second order left out), constant",
     excited_by=("rotor_speed",),
     confusers=("accelerometer_error", "steady_wind", "com_offset"),
-    separating_manoeuvre="record position beside the accelerometer while yawing through 360 degrees",
+    separating_manoeuvre="yaw through 360 degrees in hover",
+    separating_columns=("position",),
 )

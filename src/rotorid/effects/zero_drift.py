@@ -95,7 +95,8 @@ EFFECT = Effect(
     ),
     excited_by=("time",),
     confusers=("creep", "tare_offset", "battery_sag", "wall_interference"),
-    separating_manoeuvre="record the zero before, between and after the loads, with the temperature",
+    separating_manoeuvre="record the zero before, between and after the loads",
+    separating_columns=("temperature",),
     kind="sensor",
     lack_on=lambda instrument: TOO_SHORT,
 )

@@ -171,14 +171,3 @@ def interval(sigma: float, doubt: float) -> tuple[float, float]:
     """95 % interval of a separation: the noise of the flight, and the doubt about the size of what is true."""
     reach = 1.96 * float(np.hypot(1.0, sigma * doubt))
     return max(sigma - reach, 0.0), sigma + reach
-
-
-def speeds_in_hover(found: Fitted) -> tuple[float, float]:
-    """Rotor speed, rad/s, in hover if a throttle curve is at work, and if a thrust curve is.
-
-    With a throttle curve the rotors turn as fast as the believed C_F needs; with a thrust curve as commanded.
-    """
-    vehicle = found.prepared.vehicle
-    weight = vehicle.mass_kg * vehicle.gravity_m_s2
-    commands = np.concatenate([s.command.mean(axis=1) for s in found.prepared.segments if s.command is not None])
-    return float(np.sqrt(weight / vehicle.thrust_coefficients_n_s2().sum())), float(np.median(commands))

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.experiment.between import ChainQuestion, chain_question, speeds_in_hover
+from rotorid.experiment.between import ChainQuestion, chain_question
 from rotorid.mismatch.analyse import findings_of
 from rotorid.mismatch.findings import CLAIMED, Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.next_flight import CURVES, beyond_flying
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.regression import Regression
 from rotorid.mismatch.rows import Term
@@ -20,9 +21,6 @@ from rotorid.mismatch.select import COST_PER_PARAMETER
 from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.within_trust import settled
 from rotorid.recordings import RecordingSet
-
-CURVES = ("throttle_curve", "thrust_curve")
-"""Between throttle and speed, and between speed and thrust: one column where no speed is measured."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +98,8 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
         if not ids or frozenset(ids) in seen:
             continue
         seen.add(frozenset(ids))
-        if found.commanded and set(CURVES) <= set(ids):
-            throttle, thrust = speeds_in_hover(found)
-            what = (
-                "where speeds are known from their commands alone both curves are one; record the rotor speeds, or "
-                f"hold an optical tachometer to a rotor in hover: {throttle:.0f} rad/s if the throttle is curved, "
-                f"{thrust:.0f} rad/s if the thrust is"
-            )
-            unanswerable.append((ids, what))
+        if needed := beyond_flying(found, ids):
+            unanswerable.append((ids, needed))
         elif finding.id in chain:
             if (between := chain_question(found, finding, ids)) is not None:
                 chains.append(between)

@@ -92,14 +92,14 @@ class SessionPlan:
         return sum(s.duration_s for s in self.steps)
 
     @property
-    def sigma(self) -> float:
-        """Smallest separation expected over all questions; 0 without any."""
+    def sigma(self) -> float | None:
+        """Smallest separation expected over all questions; None where nothing is compared."""
         return smallest_separation(self.questions)
 
     @property
     def settles(self) -> bool:
         """Whether every question is expected to be settled."""
-        return bool(self.questions) and self.sigma >= self.limits.target_sigma
+        return self.sigma is not None and self.sigma >= self.limits.target_sigma
 
 
 def known_instrument(recordings: RecordingSet) -> KnownInstrument:

@@ -180,7 +180,7 @@ def text(plan: Plan) -> list[str]:
         out.append("No manoeuvre within the limits separates what is open any further.")
     for _, found in plan.questions:
         out += [outcome(s, plan.limits.target_sigma) for s in found]
-    if plan.questions and not plan.settles:
+    if plan.sigma is not None and not plan.settles:
         out.append(
             f"Not all would be settled: the smallest separation is {plan.sigma:.1f} standard errors of "
             f"{plan.limits.target_sigma:g}. More time, speed, tilt or room in the limits may do it."

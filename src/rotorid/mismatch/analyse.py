@@ -185,7 +185,7 @@ def account(
     refitted_left = residuals_of(seen, plain_fit)
     traces = make_traces(seen, found, refitted_left, delivered)
     between = sensor_traces(seen, refitted_left, delivered)
-    fly = next_flight(findings, prepared, model.noise)
+    fly = next_flight(findings, choice.recordings, found)
     return Analysis(
         recordings=choice.recordings,
         split=choice.split,
@@ -209,7 +209,6 @@ def account(
         unexplained_description=left.description,
         next_manoeuvre=fly.manoeuvre,
         next_separates=fly.separates,
-        next_sigma=fly.sigma,
         force_source=model.segments[0].force_source,
         notes=(*choice.remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
         instead=instead_of(model, values),

@@ -164,7 +164,6 @@ class Analysis:
     unexplained_description: str = ""
     next_manoeuvre: str = ""
     next_separates: tuple[str, ...] = ()
-    next_sigma: float = 0.0
     force_source: str = "accelerometer"
     samples_per_row: int = 1
     """How many samples a row of a stand's or bench's traces is the mean of."""

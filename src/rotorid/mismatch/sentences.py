@@ -331,7 +331,7 @@ def _either(finding: Finding, analysis: Analysis) -> str:
     text += "; this recording cannot tell which" if len(names) > 1 else "; this recording cannot settle it"
     # The next experiment is made for one class; it need not help with another.
     helps = analysis.next_manoeuvre and (not analysis.next_separates or finding.id in analysis.next_separates)
-    return f"{text}, but this would: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
+    return f"{text}, but this may: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
 
 
 def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = (), why: str = "") -> str:

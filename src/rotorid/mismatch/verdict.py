@@ -222,7 +222,10 @@ class Unexplained(Part):
 
 
 class NextExperiment(Part):
-    """What to fly to tell the alternatives apart; empty where nothing is open."""
+    """What to fly to tell the alternatives apart; empty where nothing is open.
+
+    The separation, in standard errors, is None: `rotorid plan` alone computes it, for what can be flown.
+    """
 
     manoeuvre: str
     separates: tuple[str, ...]
@@ -305,7 +308,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         next_experiment=NextExperiment(
             manoeuvre=analysis.next_manoeuvre,
             separates=analysis.next_separates,
-            predicted_separation_sigma=analysis.next_sigma,
+            predicted_separation_sigma=None,
         ),
     )
 

@@ -16,6 +16,7 @@ import numpy as np
 from jinja2 import Environment
 from markupsafe import Markup
 
+from rotorid.effects.advice import advice
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.delivery.parts import form_of
 from rotorid.mismatch.findings import Analysis, Finding
@@ -42,6 +43,7 @@ from rotorid.mismatch.words import (
     sure,
 )
 from rotorid.page.data import page_data
+from rotorid.recordings import RecordingSet
 
 WORDS = {
     "no_mismatch": "no mismatch",
@@ -119,7 +121,7 @@ def make_page(
         ruled_out=[ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
         silent=listed(silent),
         not_testable=[{"name": capital(effect_words(n.id)), "reason": n.reason} for n in verdict.not_testable],
-        next=next_text(verdict),
+        next=next_text(verdict, analysis.recordings),
         ledger=[ledger_row(row) for row in ledger],
         notes=notes(analysis, forward_notes),
     )
@@ -585,12 +587,13 @@ def ruled_out(e: EffectVerdict) -> Markup:
     return Markup("<strong>{}</strong>: {}").format(capital(name), pretty(sentence))
 
 
-def next_text(verdict: Verdict) -> str:
+def next_text(verdict: Verdict, recordings: RecordingSet) -> str:
+    """What to do next, in words; it asks for no column that is recorded, and states no number that nobody computed."""
     plan = verdict.next_experiment
     if not plan.manoeuvre:
         open_questions = [e for e in verdict.effects if e.status in ("ambiguous", "suggested")]
         wanted = [catalogue()[i] for e in open_questions for i in (e.id, *e.alternatives) if i in catalogue()]
-        flown = next((w.separating_manoeuvre for w in wanted if w.separating_manoeuvre), "")
+        flown = next((advice(w, recordings) for w in wanted if w.separating_manoeuvre), "")
         if flown:
             return f"{capital(flown).rstrip('.')}. It bears on {listed([effect_words(e.id) for e in open_questions])}."
         if verdict.unexplained.share > 0.15:
@@ -602,9 +605,11 @@ def next_text(verdict: Verdict) -> str:
         return "Nothing is left to tell apart."
     text = capital(plan.manoeuvre).rstrip(".") + "."
     if plan.separates:
-        text += f" It would tell {listed([effect_words(i) for i in plan.separates])} apart"
-        sigma = plan.predicted_separation_sigma
-        text += f", by about {number(sigma)} standard errors." if sigma else "."
+        what = "flight" if verdict.kind == "flight" else "session"
+        text += f" It is meant to tell {listed([effect_words(i) for i in plan.separates])} apart. "
+        return Markup("{}<code>rotorid plan</code> says which {} within your limits does, if any, and how far.").format(
+            text, what
+        )
     return text
 
 

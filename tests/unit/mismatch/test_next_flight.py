@@ -1,51 +1,77 @@
-"""What to fly next: a predicted separation is zero for a copy and large for another law."""
+"""What to do next: for the first open class, without a column that is recorded and without a number."""
+
+import re
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from rotorid.effects.advice import RECORDABLE, advice
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.next_flight import next_flight, rotations, separation
-from rotorid.mismatch.prepare import prepare
+from rotorid.mismatch.next_flight import NextFlight, next_flight
+from rotorid.recordings import RecordingSet, Run
 from tests.unit.mismatch.flights import quad, recorded
 
 
-@pytest.fixture(scope="module")
-def prepared():
-    return prepare(recorded(1))
+def of(name: str, *alternatives: str, status: str = "ambiguous") -> Finding:
+    return Finding(name, status, alternatives=alternatives)
 
 
-NOISE = np.concatenate([np.full(3, 0.1), np.full(3, 0.005), np.full(6, 0.1)])
+def with_column(recordings: RecordingSet, name: str) -> RecordingSet:
+    """The set with one more column in every run."""
+    runs = (Run(r.name, r.table.assign(**{name: 12.0})) for r in recordings.runs)
+    return replace(recordings, runs=tuple(runs))
 
 
-def drag(status="ambiguous"):
-    form = next(f for f in catalogue()["rotor_drag"].forms(quad()) if f.name == "at the centre of mass")
-    return Finding("rotor_drag", status, form, (5e-5,), alternatives=("frame_drag", "rotor_drag"))
+def commanded() -> SimpleNamespace:
+    """A fitted set whose rotor speeds are known from commands of 900 rad/s alone."""
+    prepared = SimpleNamespace(vehicle=quad(), segments=[SimpleNamespace(command=np.full((10, 4), 900.0))])
+    return SimpleNamespace(commanded=True, prepared=prepared)
 
 
-def test_rotations_turn_forward_to_the_right_by_a_quarter_yaw():
-    turned = rotations(np.array([[0.0, 0.0, np.pi / 2]]))[0]
-    np.testing.assert_allclose(turned @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-12)
-    general = rotations(np.array([[0.3, -0.2, 1.1]]))[0]
-    np.testing.assert_allclose(general @ general.T, np.eye(3), atol=1e-12)
+def test_only_an_open_class_is_worth_a_flight():
+    recordings = recorded(1)
+    assert next_flight([of("rotor_drag", status="established")], recordings) == NextFlight()
+    first, second = of("rotor_drag", "frame_drag", "rotor_drag"), of("com_offset", "com_offset", "unequal_rotors")
+    found = next_flight([of("payload", status="established"), first, second], recordings)
+    assert found.separates == ("frame_drag", "rotor_drag") and "speed sweep" in found.manoeuvre
 
 
-def test_an_effect_cannot_be_told_from_itself_but_from_another_law(prepared):
-    itself = separation(drag(), "rotor_drag", prepared, NOISE)
-    other = separation(drag(), "inertia_products", prepared, NOISE)
-    assert itself < 0.01
-    assert other > 10.0
+def test_a_column_that_is_recorded_is_not_asked_for():
+    bare = recorded(1)
+    sag = [of("battery_sag", "battery_sag", "throttle_curve")]
+    assert "record the battery's voltage" in next_flight(sag, bare).manoeuvre
+    asked = next_flight(sag, with_column(bare, "battery_voltage_v")).manoeuvre
+    assert asked == "rest the battery and repeat the same hover"
+    # A column in some of the runs alone is still worth recording.
+    mixed = replace(bare, runs=(*with_column(bare, "battery_voltage_v").runs, Run("last", bare.runs[0].table)))
+    assert "record the battery's voltage" in next_flight(sag, mixed).manoeuvre
 
 
-def test_separation_grows_as_the_noise_falls(prepared):
-    loud = separation(drag(), "frame_drag", prepared, 2 * NOISE)
-    quiet = separation(drag(), "frame_drag", prepared, NOISE)
-    # Values within their trust take up a little more where the data say more.
-    assert loud < quiet <= 2.01 * loud
+@pytest.mark.parametrize("effect", [e for e in catalogue().values() if e.separating_columns], ids=lambda e: e.id)
+def test_what_to_record_is_known_and_asked_for_where_it_lacks(effect):
+    assert set(effect.separating_columns) <= set(RECORDABLE)
+    for name in effect.separating_columns:
+        words = RECORDABLE[name][0]
+        assert words in advice(effect)
+        full = recorded(1)
+        for column in RECORDABLE[name][1](4):
+            full = with_column(full, column)
+        assert words not in advice(effect, full)
 
 
-def test_only_an_open_question_is_worth_a_flight(prepared):
-    assert next_flight([drag("established")], prepared, NOISE).manoeuvre == ""
-    plan = next_flight([drag()], prepared, NOISE)
-    assert plan.separates == ("frame_drag", "rotor_drag")
-    assert plan.manoeuvre and plan.sigma > 0
+def test_no_manoeuvre_asks_for_a_column_by_itself():
+    columns = "position|rotor speed|temperature|voltage|current"
+    for effect in catalogue().values():
+        assert not re.search(f"record[^,;]*({columns})|({columns})s? recorded", effect.separating_manoeuvre), effect.id
+
+
+def test_what_no_flight_tells_apart_is_said_with_what_it_takes():
+    curves = [of("thrust_curve", "throttle_curve", "thrust_curve")]
+    said = next_flight(curves, recorded(1), commanded()).manoeuvre
+    assert said.startswith("record the rotor speeds, or hold an optical tachometer")
+    assert "1073 rad/s if the throttle is curved, 900 rad/s if the thrust is" in said
+    measured = SimpleNamespace(commanded=False)
+    assert "tachometer" not in next_flight(curves, recorded(1), measured).manoeuvre

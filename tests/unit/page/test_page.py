@@ -16,8 +16,9 @@ from rotorid.mismatch.shares import segments_of
 from rotorid.mismatch.tiles import tiles
 from rotorid.mismatch.verdict import main_channel
 from rotorid.page.data import packed
-from rotorid.page.make import by_share, make_page, pretty, strip
+from rotorid.page.make import by_share, make_page, next_text, pretty, strip
 from rotorid.page.signals import fit_percent, measured
+from rotorid.recordings import Run
 from rotorid.recordings.doubts import Doubt
 from tests.browser import CHROMIUM, Browser
 from tests.unit.mismatch.synthetic import analysis, drag_finding
@@ -210,3 +211,22 @@ def test_runs_that_are_shorter_than_a_cell_of_the_strip_are_shown():
     ]
     picture, _, _ = strip(replace(made, traces=short), verdict_of(made))
     assert "svg" in picture
+
+
+@pytest.mark.parametrize(("kind", "what"), [("flight", "flight"), ("bench", "session")])
+def test_what_to_do_next_names_the_plan_and_no_number(kind: str, what: str) -> None:
+    made = analysis(findings=[CLASS], next_manoeuvre="fly fast", next_separates=("rotor_drag", "frame_drag"))
+    verdict = verdict_of(made).model_copy(update={"kind": kind})
+    said = next_text(verdict, made.recordings)
+    assert said.startswith("Fly fast. It is meant to tell rotor drag and ")
+    assert f"<code>rotorid plan</code> says which {what} within your limits" in said
+    assert not re.search(r"\d", said) and said in make_page(made, verdict)
+
+
+def test_a_suggested_effect_asks_for_no_column_that_is_there() -> None:
+    made = analysis(findings=[drag_finding(id="battery_sag", form=None, values=(), status="suggested")])
+    verdict = verdict_of(made)
+    assert "record the battery's voltage as well" in next_text(verdict, made.recordings)
+    runs = tuple(Run(r.name, r.table.assign(battery_voltage_v=12.0)) for r in made.recordings.runs)
+    said = next_text(verdict, replace(made.recordings, runs=runs))
+    assert said.startswith("Rest the battery and repeat the same hover.") and "record" not in said

@@ -44,6 +44,7 @@ from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
 from rotorid.mismatch.leave_one_out import first_s, on_traces, without_values
+from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Term
@@ -184,7 +185,8 @@ def account(
     the believed values fitted anew.
     """
     setup, model, chain, findings = choice.setup, choice.model, choice.chain, choice.findings
-    next_step, separates, sigma = next_experiment(list(findings), model)
+    # The most significant class first.
+    step = next_flight(sorted(findings, key=lambda f: f.p_value), recordings)
     traces, before, after = make_traces(seen, refitted, fit)
     p_before, p_after, depends = dependence(seen, before, after)
     approximate = approximate_forms(model, choice.leftovers)
@@ -219,9 +221,8 @@ def account(
         unexplained_channels=channels,
         unexplained_depends_on=tuple(depends),
         unexplained_description=description,
-        next_manoeuvre=next_step,
-        next_separates=separates,
-        next_sigma=sigma,
+        next_manoeuvre=step.manoeuvre,
+        next_separates=step.separates,
         force_source="sensor",
         samples_per_row=setup.average,
         instrument=setup.instrument,
@@ -366,21 +367,6 @@ def notes_of(setup: Setup) -> list[str]:
     if setup.steady_points:
         notes.append("The recordings are steady points: nothing that takes time can be seen in them.")
     return notes
-
-
-def next_experiment(findings: list[Finding], model: ReadingModel) -> tuple[str, tuple[str, ...], float]:
-    """What to measure to tell the alternatives of the surest open class apart.
-
-    The separation predicted is how many standard errors the effect itself has in these data: an experiment in which
-    the alternatives act apart would show it about as clearly.
-    """
-    open_ones = sorted((f for f in findings if f.status == "ambiguous"), key=lambda f: f.p_value)
-    if not open_ones:
-        return "", (), 0.0
-    first = open_ones[0]
-    known = [e for e in first.parameters if e.high > e.low]
-    sigma = max((abs(e.value) / ((e.high - e.low) / 3.92) for e in known), default=0.0)
-    return catalogue()[first.id].separating_manoeuvre, first.alternatives, float(sigma)
 
 
 def improved(vehicle: Vehicle, values: dict[str, tuple[float, float]]) -> Vehicle:
