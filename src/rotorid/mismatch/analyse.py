@@ -16,6 +16,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
 from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
+from rotorid.mismatch.decided import Decided, Watch, unwatched
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed
@@ -64,19 +65,20 @@ TIMING_FLOOR = 0.05
 recorded."""
 
 
-def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
+def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0, watch: Watch = unwatched) -> Analysis:
     """The whole analysis of a set of kind `flight`.
 
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
+    `watch` is told what was chosen just before.
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
-    analysis = analysed(recordings, mistakes, remarks, cutoff_hz)
+    analysis = analysed(recordings, mistakes, remarks, cutoff_hz, watch)
     left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
     if analysis is None and left:
         # What is held out lost a sensor throughout: something else must show what the model is worth.
         names = ", ".join(r.name for r in recordings.runs if r not in left)
         remarks = (*remarks, f"Nothing of {names} could be compared; other recordings were held out instead.")
-        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, cutoff_hz)
+        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, cutoff_hz, watch)
     if analysis is None:
         raise InputError(
             f"set {recordings.name}: no run can be held out with every column that the others are fitted by"
@@ -84,7 +86,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     return analysis
 
 
-def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> Analysis | None:
+def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float, watch: Watch) -> Analysis | None:
     """The analysis of a set whose mistakes are undone; None where nothing of the runs held out can be compared."""
     split = split_runs(recordings)
     known, unseen = parts_of(recordings, split)
@@ -103,7 +105,8 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         improved = improved.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
     plain_fit, plain_values = refitted(model)
 
-    findings = [*mistakes, *findings_of(found, prepared, fit)]
+    outside = [*mistakes, *findings_outside(found, prepared)]
+    findings = [*outside, *findings_inside(found, prepared, fit)]
     findings = payload_or_offset(findings, {**moved, **values})
     findings += absorbed_findings(model, values, findings)
     findings, told = with_square_term(findings, told, model)
@@ -115,6 +118,8 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     fly = next_flight(findings, prepared, model.noise)
 
     # The last decision is made: the runs held out are opened.
+    stated = {**contract_values(prepared.vehicle, told), **scale}
+    watch(Decided(found, tuple(outside), tuple(findings), stated))
     seen = on_every_run(found, recordings, split, unseen)
     if len(seen.rows) == len(model.rows):
         return None
@@ -147,7 +152,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
         refitted=changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()}),
         improved=improved,
         findings=tuple(findings),
-        values={**contract_values(prepared.vehicle, told), **scale},
+        values=stated,
         not_testable=not_testable(prepared, found.chain, findings),
         traces=traces,
         between_sensors=between,
@@ -171,15 +176,21 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     return with_noise_held_out(with_values_in_question(weighed(analysis)))
 
 
-def findings_of(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:
-    """A finding for everything that was fitted: winds, the chain from command to speed, forces and moments."""
+def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
+    """A finding for what is fitted outside of the regression of force and moment: winds, gusts, the command chain."""
     model = found.model
     findings = [] if model.wind is None else [wind_finding(model)]
     if model.gusts:
         findings.append(gust_finding(model.gusts))
     if found.chain is not None:
         findings += speed_findings(found.chain[0], prepared, found.measured, found.chain[1])
-    findings += wrench_findings(
+    return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
+
+
+def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:
+    """A finding for every term that the regression of force, moment and sensors selected or dropped."""
+    model = found.model
+    findings = wrench_findings(
         model.contributions,
         model.search.regression,
         model.search,
