@@ -57,3 +57,52 @@ rule collect_evidence:
         "results/logs/collect_evidence.log",
     script:
         "../scripts/collect_evidence.py"
+
+
+rule score_decisions:
+    """Every decision on every set that is kept, in one table."""
+    message:
+        "Decisions: scoring"
+    input:
+        kept=rules.collect_evidence.output.kept,
+    output:
+        table="results/decisions/decisions.csv",
+        words="results/decisions/decisions.md",
+        sets="results/decisions/sets.csv",
+    params:
+        folder=EVIDENCE,
+        engine=hashes_of_evidence()["engine"],
+        code=code_of("score_decisions"),
+    threads: workflow.cores
+    log:
+        "results/logs/score_decisions.log",
+    script:
+        "../scripts/score_decisions.py"
+
+
+rule decisions:
+    """The bench for decisions: tables under results/decisions."""
+    message:
+        "The decisions are in results/decisions: decisions.md first"
+    input:
+        rules.score_decisions.output,
+
+
+rule decisions_so_far:
+    """The same on what is kept already: results/decisions/so_far."""
+    message:
+        "Decisions: scoring what is kept so far"
+    output:
+        table="results/decisions/so_far/decisions.csv",
+        words="results/decisions/so_far/decisions.md",
+        sets="results/decisions/so_far/sets.csv",
+    params:
+        folder=EVIDENCE,
+        engine=hashes_of_evidence()["engine"],
+        kept=len(list(Path(EVIDENCE).glob("*.json"))),
+        code=code_of("score_decisions"),
+    threads: workflow.cores
+    log:
+        "results/logs/decisions_so_far.log",
+    script:
+        "../scripts/score_decisions.py"

@@ -18,7 +18,7 @@ from rotorid.proof.studies import Study
 
 DRAWN_S = {"multibody": 22.0, "continuous": 15.0, "richsim": 30.0, "rotorpy": 30.0, "rig": 4.0, "ground": 4.0}
 """Usual seconds of one core to record and judge a set of each simulator."""
-STUDY_S = 60.0
+STUDY_S = 120.0
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,9 @@ class Item:
 
     @property
     def group(self) -> tuple[str, str, str]:
-        """Sets that share a part of the time."""
-        return self.label.origin, self.label.plant, self.label.laboratory
+        """Sets that share a part of the time: studies are of many laboratories, each of few and long sets."""
+        laboratory = "" if self.label.origin == "study" else self.label.laboratory
+        return self.label.origin, self.label.plant, laboratory
 
 
 def simulator_of(entry: Entry) -> str:
