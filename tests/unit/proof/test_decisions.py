@@ -13,7 +13,7 @@ from rotorid.proof.decisions.label import Label
 from rotorid.proof.decisions.plan import Item, drawn, in_order
 from rotorid.proof.decisions.score import Counts, score_drawn, score_planted, score_real, statements
 from rotorid.proof.decisions.store import Kept, read_all, write
-from rotorid.proof.decisions.table import markdown, table
+from rotorid.proof.decisions.table import markdown, sets, table
 from rotorid.proof.plan import Entry
 from rotorid.proof.plantings.kinds import Ratio, Size, named
 
@@ -202,6 +202,9 @@ def test_every_decision_is_scored_on_everything_that_is_kept(tmp_path):
     assert found.loc[("flight", "selection"), "sets"] == found.loc[("flight", "selection"), "older"] == 3
     assert ("stand", "selection") not in found.index
     assert "1 of 1" in markdown(table(rows))
+    lines = sets(rows).set_index(["name", "decision"])
+    assert lines.loc[("planted/somewhere/geometry/x/large/0", "engine"), "missed_names"] == "com_offset"
+    assert lines.loc[("drawn/clean/000", "selection"), ["wrong", "wrong_names"]].tolist() == [1, "payload"]
 
 
 def test_without_evidence_the_posterior_says_what_the_verdict_says():

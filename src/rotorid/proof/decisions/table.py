@@ -74,7 +74,7 @@ def sets(rows: Iterable[Row]) -> pd.DataFrame:
 def line(row: Row) -> dict[str, Any]:
     """A set's line."""
     said = [" or ".join(sorted(c)) for c in classes(row.said)]
-    words = {name: "; ".join(row.scored.words.get(name, ())) for name in WORDS}
+    words = {f"{name}_names": "; ".join(row.scored.words.get(name, ())) for name in WORDS}
     head = {**asdict(row.label), "decision": row.decision, "older": row.older, "said": "; ".join(said)}
     values = "; ".join(row.said.get("parameters", {}))
     return {**head, "values": values, **words, **asdict(row.scored.counts)}
