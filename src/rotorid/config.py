@@ -226,6 +226,18 @@ class Plantings(Section):
     )
 
 
+class Decisions(Section):
+    """Evidence of many sets, on which decisions are scored."""
+
+    seeds: dict[str, Annotated[int, Field(ge=0)]] = Field(
+        description="Repetitions kept of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
+    )
+    plantings: list[Text] = Field(
+        description="Shell patterns on the names in workflow/plantings.tsv of those kept [names]."
+    )
+    studies: bool = Field(description="Whether the studies of real recordings are kept, too [true, false].")
+
+
 class Rules(Section):
     """Rules of the mismatch stage (`rotorid.mismatch.rules`)."""
 
@@ -277,6 +289,7 @@ class Config(Section):
     black_box: BlackBox = Field(description="The stand's wrench without knowledge of the vehicle.")
     proof: Proof = Field(description="The proof on concealed recordings.")
     plantings: Plantings = Field(description="Plantings in real flights.")
+    decisions: Decisions = Field(description="The bench for decisions.")
     rules: Rules = Field(description="Rules of the mismatch stage.")
     ablation: Ablation = Field(description="What each of these rules is worth.")
     fleet: Fleet = Field(description="Every recording set of a folder, judged together.")

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.experiment.between import ChainQuestion, chain_question
-from rotorid.mismatch.analyse import findings_of
+from rotorid.mismatch.analyse import findings_inside, findings_outside
 from rotorid.mismatch.findings import CLAIMED, Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
@@ -85,7 +85,7 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
     prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     delivered, _ = settled(found.model, found.values, found.model.selection.active)
-    findings = (*mistakes, *findings_of(found, prepared, delivered))
+    findings = (*mistakes, *findings_outside(found, prepared), *findings_inside(found, prepared, delivered))
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:

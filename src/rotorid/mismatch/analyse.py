@@ -17,6 +17,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
 from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
+from rotorid.mismatch.decided import Decided, Watch, unwatched
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.delivery.gate import Offer, Settled, gate
 from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
@@ -71,19 +72,20 @@ TIMING_FLOOR = 0.05
 recorded."""
 
 
-def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
+def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0, watch: Watch = unwatched) -> Analysis:
     """The whole analysis of a set of kind `flight`.
 
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
+    `watch` is told what was chosen just before.
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
-    analysis = analysed(recordings, mistakes, remarks, cutoff_hz)
+    analysis = analysed(recordings, mistakes, remarks, cutoff_hz, watch)
     left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
     if analysis is None and left:
         # What is held out lost a sensor throughout: something else must show what the model is worth.
         names = ", ".join(r.name for r in recordings.runs if r not in left)
         remarks = (*remarks, f"Nothing of {names} could be compared; other recordings were held out instead.")
-        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, cutoff_hz)
+        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, cutoff_hz, watch)
     if analysis is None:
         raise InputError(
             f"set {recordings.name}: no run can be held out with every column that the others are fitted by"
@@ -91,7 +93,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0) -> Analysis:
     return analysis
 
 
-def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> Analysis | None:
+def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float, watch: Watch) -> Analysis | None:
     """The analysis of a set whose mistakes are undone; None where nothing of the runs held out can be compared."""
     split = split_runs(recordings)
     known, unseen = parts_of(recordings, split)
@@ -106,7 +108,8 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
             told, scale = throttle_scale(values, model, full_speed(known.runs, prepared.vehicle))
     fit, moved = settled(model, values, model.selection.active)
 
-    findings = [*mistakes, *findings_of(found, prepared, fit)]
+    outside = [*mistakes, *findings_outside(found, prepared)]
+    findings = [*outside, *findings_inside(found, prepared, fit)]
     findings = payload_or_offset(findings, {**moved, **values})
     findings += absorbed_findings(model, values, findings)
     findings, told = with_square_term(findings, told, model)
@@ -116,6 +119,8 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float) -> A
     choice = Choice(recordings, split, found, told, scale, tuple(findings), tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
+    stated = {**contract_values(prepared.vehicle, told), **scale}
+    watch(Decided(found, tuple(outside), tuple(findings), stated))
     seen = on_every_run(found, recordings, split, unseen)
     if len(seen.rows) == len(model.rows):
         return None
@@ -246,7 +251,8 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
     def told_of(settled: Settled) -> Values:
         given = settled.offer.values
         if settled.offer.active or not choice.told:
-            return {k: v for k, v in choice.told.items() if {"thrust", "torque"} <= set(given) or k in given}
+            both = {"thrust", "torque"} <= set(given)  # which a full speed stands for
+            return {k: v for k, v in choice.told.items() if k in given or (k == "speed" and both)}
         return speed_for_coefficients(given, vehicle) if only_throttle(choice.recordings) else given
 
     def vehicle_of(settled: Settled) -> Vehicle:
@@ -296,15 +302,21 @@ def fell_back_note(key: str, why: str, names: Mapping[str, str] = PARAMETER_NAME
     return f"Refitted, the {parameter_words(names[key])[0]} stays as believed: {why}."
 
 
-def findings_of(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:
-    """A finding for everything that was fitted: winds, the chain from command to speed, forces and moments."""
+def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
+    """A finding for what is fitted outside of the regression of force and moment: winds, gusts, the command chain."""
     model = found.model
     findings = [] if model.wind is None else [wind_finding(model)]
     if model.gusts:
         findings.append(gust_finding(model.gusts))
     if found.chain is not None:
         findings += speed_findings(found.chain[0], prepared, found.measured, found.chain[1])
-    findings += wrench_findings(
+    return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
+
+
+def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:
+    """A finding for every term that the regression of force, moment and sensors selected or dropped."""
+    model = found.model
+    findings = wrench_findings(
         model.contributions,
         model.search.regression,
         model.search,

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from rotorid.mismatch import rules
 from rotorid.mismatch.analyse import analyse
+from rotorid.mismatch.decided import Watch, unwatched
 from rotorid.mismatch.delivery.doubts import with_doubts
 from rotorid.mismatch.delivery.files import (
     CONDITIONS,
@@ -55,14 +56,17 @@ def deliver(
 
 
 @ONE_THREAD
-def analysis_of(recordings: RecordingSet, off: Collection[str] = ()) -> Analysis:
+def analysis_of(recordings: RecordingSet, off: Collection[str] = (), watch: Watch = unwatched) -> Analysis:
     """The analysis for the kind of the set, without the rules named in `off`.
+
+    `watch` is told what the fitted runs of a flight decide, before the report runs are opened.
 
     InputError in one sentence where the set does not suffice, or no rule has such a name.
     """
     usable = sufficient(recordings)
     with rules.asking(off) as asked:
-        analysis = analyse(usable) if usable.vehicle.kind == "flight" else analyse_instrument(usable)
+        flight = usable.vehicle.kind == "flight"
+        analysis = analyse(usable, watch=watch) if flight else analyse_instrument(usable)
     without = tuple(f"Judged without the rule {name}: {rules.RULES[name].decides}" for name in sorted(asked.off))
     analysis = replace(analysis, fired=dict(asked.fired), notes=(*without, *analysis.notes))
     recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with mistakes put right are made anew

@@ -75,14 +75,14 @@ def spread(entries: Sequence[Entry], count: int) -> list[Entry]:
     return [entries[k * len(entries) // count] for k in range(count)]
 
 
-def check_families(entries: Sequence[Entry], seeds: Mapping[str, int]) -> None:
+def check_families(entries: Sequence[Entry], seeds: Mapping[str, int], section: str = "proof") -> None:
     """InputError where `seeds` names a family that is not there: a misspelled one would leave its cases out."""
     families = list(dict.fromkeys(e.family for e in entries))
     for family in seeds:
         if family not in families:
             close = difflib.get_close_matches(family, families, n=1)
             hint = f"did you mean {close[0]}?" if close else f"known are {', '.join(families)}."
-            raise InputError(f"config.yaml: proof.seeds.{family} is no family of concealed cases; {hint}")
+            raise InputError(f"config.yaml: {section}.seeds.{family} is no family of concealed cases; {hint}")
 
 
 def released(entries: Sequence[Entry], date: str) -> list[Entry]:

@@ -86,6 +86,17 @@ def equivalents(answer: Mapping[str, Any]) -> dict[str, frozenset[str]]:
     return out
 
 
+def true_effects(answer: Mapping[str, Any]) -> list[str]:
+    """Ids that are to be found: all that is expected but the wrong values."""
+    return [e for e in answer["expected"] if e not in answer["wrong_parameters"]]
+
+
+def acceptable_names(answer: Mapping[str, Any]) -> frozenset[str]:
+    """Names of which a class must hold one not to be false: true ones, what is the same as those, and what is fair."""
+    outside = (o["acceptable"] for o in answer["outside_catalogue"])
+    return frozenset().union(*equivalents(answer).values(), true_effects(answer), *outside, answer.get("fair", ()))
+
+
 def is_sharp(claim: Claim, effect: str, same: frozenset[str]) -> bool:
     """Whether a claim names a true effect as exactly as the data allow."""
     return effect in claim.members and claim.members <= same
@@ -225,13 +236,12 @@ def score_case(verdict: Mapping[str, Any], answer: Mapping[str, Any], samples_pe
     claims = claims_of(verdict)
     same = equivalents(answer)
     wrong = set(answer["wrong_parameters"])
-    truth = [e for e in answer["expected"] if e not in wrong]
+    truth = true_effects(answer)
     for effect in truth:
         same.setdefault(effect, frozenset({effect}))
     outside = answer["outside_catalogue"]
-    acceptable = set().union(*(o["acceptable"] for o in outside)) if outside else set()
     fair = set(answer.get("fair", ()))
-    near = set().union(*same.values(), acceptable, fair)
+    near = acceptable_names(answer)
     false = [c for c in claims if not c.members & near]
     covered = [e for e in truth if any(e in c.members for c in claims)]
     sharp = [e for e in truth if any(is_sharp(c, e, same[e]) for c in claims)]

@@ -34,6 +34,8 @@ class Study:
     about: str
     held_out: tuple[str, ...] | None = None
     published: tuple[Published, ...] = ()
+    kind: str = "flight"
+    """Kind of the set: `flight`, `stand` or `bench`."""
 
 
 NEUROBEM_FLIGHTS = ("20210218170320seg2", "20210218171908seg2", "20210223104803seg2", "20210223114138seg3")
@@ -97,12 +99,14 @@ STUDIES = (
         "imrc-bench-stock",
         ("battery_sag", "throttle_curve"),
         "Crazyflie on a scale: thrust, throttle and voltage",
+        kind="stand",
     ),
     Study(
         "strawson-t5045c",
         "strawson-t5045c",
         ("battery_sag", "tare_offset", "thrust_curve"),
         "RCbenchmark bench: trained at 11.1 V, tested at 7.4 V",
+        kind="stand",
     ),
 )
 

@@ -18,6 +18,7 @@ from rotorid.mismatch.evidence import evidence, ratio_of, weighed
 from rotorid.mismatch.findings import Trace
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.ledger import ledger, text_of
+from rotorid.mismatch.posterior.evidence import evidence_of
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
@@ -54,6 +55,19 @@ def disturbed(size_m_s2: float) -> RecordingSet:
 @cache
 def analysed(size_m_s2: float):
     return analyse(disturbed(size_m_s2))
+
+
+def test_who_watches_is_told_what_the_fitted_runs_decide_and_nothing_of_the_others():
+    told = []
+    for size in (0.0, 1.5):
+        analyse(disturbed(size), watch=told.append)
+    plain, other = told
+    assert "rotor_drag" in {f.id for f in plain.findings if f.status == "established"}
+    assert "rotor_drag" not in {f.id for f in plain.outside}
+    assert [f.id for f in plain.findings] == [f.id for f in other.findings] and plain.values == other.values
+    a, b = evidence_of(plain.found), evidence_of(other.found)
+    np.testing.assert_array_equal(a.gram, b.gram)
+    assert a.active == b.active and any(key.startswith("rotor_drag/") for key in a.active)
 
 
 def test_what_is_chosen_does_not_depend_on_the_runs_held_out():

@@ -1,0 +1,108 @@
+"""The bench for decisions: `snakemake --cores 2 decisions`.
+
+Evidence of many sets is kept once (hours of one core; it may be stopped, and goes on where it stopped), then decisions are
+scored on all of them in minutes. `snakemake decisions_so_far` scores what is kept already. ROTORID_EVIDENCE names the
+folder of the evidence, cache/evidence without it.
+"""
+
+from rotorid.proof.decisions import plan as bench
+
+EVIDENCE = os.environ.get("ROTORID_EVIDENCE", "") or "cache/evidence"
+try:
+    plan.check_families(CASES, CONFIG.decisions.seeds, "decisions")
+except InputError as error:
+    refuse(error)
+KEPT_PLANTINGS = planted.chosen(
+    planted.read_list(ROOT / "workflow/plantings.tsv"), CONFIG.decisions.plantings
+)
+KEPT_FLIGHTS = list(dict.fromkeys(p.flight for p in KEPT_PLANTINGS))
+KEPT_STUDIES = real.STUDIES if CONFIG.decisions.studies else ()
+KEPT_ITEMS = [
+    *bench.untouched(KEPT_FLIGHTS),
+    *bench.planted(KEPT_PLANTINGS),
+    *bench.studies(KEPT_STUDIES),
+    *bench.drawn(plan.choose(CASES, CONFIG.decisions.seeds, ["*"])),
+]
+# What judges a set is the mismatch stage without its page: another layout of that is no other evidence.
+JUDGING = ["analyse", "instrument/analyse", "verdict"]
+
+
+def hashes_of_evidence():
+    """Hashes of the code that draws, plants and judges the sets."""
+    judging = [CODE.of(f"src/rotorid/mismatch/{name}.py") for name in JUDGING]
+    return {
+        "drawing": bench.joint([CODE.of(path) for path in CONCEALING]),
+        "planting": CODE.of("src/rotorid/proof/plantings/sow.py"),
+        "engine": bench.joint(judging),
+    }
+
+
+rule collect_evidence:
+    """Gram matrices of many sets as the engine's last search sees them, its verdict beside them."""
+    message:
+        f"Decisions: keeping the evidence of {len(KEPT_ITEMS)} sets"
+    input:
+        recordings=sorted(
+            {public_set(planted_flight(name).set) for name in KEPT_FLIGHTS}
+            | {public_set(s.set) for s in KEPT_STUDIES}
+        ),
+    output:
+        kept="results/decisions/kept.json",
+    params:
+        wanted=KEPT_ITEMS,
+        folder=EVIDENCE,
+        public="results/recordings",
+        hashes=hashes_of_evidence(),
+    log:
+        "results/logs/collect_evidence.log",
+    script:
+        "../scripts/collect_evidence.py"
+
+
+rule score_decisions:
+    """Every decision on every set that is kept, in one table."""
+    message:
+        "Decisions: scoring"
+    input:
+        kept=rules.collect_evidence.output.kept,
+    output:
+        table="results/decisions/decisions.csv",
+        words="results/decisions/decisions.md",
+        sets="results/decisions/sets.csv",
+    params:
+        folder=EVIDENCE,
+        engine=hashes_of_evidence()["engine"],
+        code=code_of("score_decisions"),
+    threads: workflow.cores
+    log:
+        "results/logs/score_decisions.log",
+    script:
+        "../scripts/score_decisions.py"
+
+
+rule decisions:
+    """The bench for decisions: tables under results/decisions."""
+    message:
+        "The decisions are in results/decisions: decisions.md first"
+    input:
+        rules.score_decisions.output,
+
+
+rule decisions_so_far:
+    """The same on what is kept already: results/decisions/so_far."""
+    message:
+        "Decisions: scoring what is kept so far"
+    output:
+        table="results/decisions/so_far/decisions.csv",
+        words="results/decisions/so_far/decisions.md",
+        sets="results/decisions/so_far/sets.csv",
+    params:
+        folder=EVIDENCE,
+        engine=hashes_of_evidence()["engine"],
+        kept=len(list(Path(EVIDENCE).glob("*.json"))),
+        code=code_of("score_decisions"),
+    threads: workflow.cores
+    log:
+        "results/logs/decisions_so_far.log",
+    script:
+        "../scripts/score_decisions.py"
