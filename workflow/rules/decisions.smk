@@ -53,6 +53,7 @@ rule collect_evidence:
         folder=EVIDENCE,
         public="results/recordings",
         hashes=hashes_of_evidence(),
+        code=code_of("collect_evidence"),
     log:
         "results/logs/collect_evidence.log",
     script:
