@@ -12,7 +12,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pandas as pd
-import yaml
 
 from rotorid import templates
 from rotorid.errors import InputError
@@ -25,6 +24,7 @@ from rotorid.recordings.files import check_rotors
 from rotorid.recordings.proposed import proposed_in
 from rotorid.recordings.tables import check_table
 from rotorid.result import FILES, OTHERS, Result
+from rotorid.text_files import parse_yaml
 
 Believed = Vehicle | Mapping | str | Path
 """A vehicle, the keys of a `vehicle.yaml`, the path of one, or the name of a template."""
@@ -184,7 +184,7 @@ def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
         mapping=read_mapping(Path(mapping)) if mapping else None,
     )
     believed = believed_vehicle(vehicle) if vehicle is not None else vehicle_of(
-        yaml.safe_load(found.vehicle_text), "the vehicle proposed"
+        parse_yaml(found.vehicle_text, "the vehicle proposed"), "the vehicle proposed"
     )  # fmt: skip
     runs = tuple(Run(run, check_table(table, f"run {run}")) for run, table in sorted(found.runs.items()))
     proposed = proposed_in(found.vehicle_text) if vehicle is None else ()

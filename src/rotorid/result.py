@@ -10,13 +10,13 @@ from html import escape
 from pathlib import Path
 
 import pandas as pd
-import yaml
 
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.tiles import tiles
 from rotorid.mismatch.verdict import Verdict, main_channel
 from rotorid.page.make import pretty
 from rotorid.recordings import Vehicle, vehicle_of
+from rotorid.text_files import parse_yaml
 
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
 """Files that every verdict has."""
@@ -65,7 +65,8 @@ class Result:
     @cached_property
     def improved(self) -> Vehicle:
         """The believed vehicle with values corrected and the established effects; `rotorid.simulate` flies it."""
-        return vehicle_of(yaml.safe_load(self.files["improved_vehicle.yaml"]), "improved_vehicle.yaml")
+        name = "improved_vehicle.yaml"
+        return vehicle_of(parse_yaml(self.files[name], name), name)
 
     @cached_property
     def effects(self) -> pd.DataFrame:

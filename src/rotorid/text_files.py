@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from yaml.composer import Composer
 from yaml.constructor import SafeConstructor
 from yaml.resolver import Resolver
 
+from rotorid.bounds import DEEPEST_YAML, LARGEST_YAML, MOST_YAML_VALUES
 from rotorid.errors import InputError
 from rotorid.wording import printable
 
@@ -20,11 +22,15 @@ try:
 except ImportError:  # pragma: no cover - depends on the platform
     CParser = None
 
-LARGEST_YAML = 1_000_000
-"""Bytes of a YAML file; that of a vehicle has some thousand."""
-DEEPEST = 50
-MOST_NODES = 20_000
-"""Values of a YAML file with all its aliases written out."""
+_KIND = "tag:yaml.org,2002:"
+_DECIMAL = {
+    f"{_KIND}int": re.compile(r"[-+]?(0|[1-9][0-9]*)"),
+    f"{_KIND}float": re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.inf|\.nan", re.IGNORECASE),
+}
+"""How a number is written. YAML also takes octal, hexadecimal, binary and sexagesimal ones, and underscores."""
+_EXPONENT = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+")
+_FOREIGN = {f"{_KIND}{name}" for name in ("binary", "set", "omap", "pairs")}
+"""Kinds of values that no file here holds."""
 
 if CParser is None:  # pragma: no cover - depends on the platform
     _Compiled = yaml.SafeLoader
@@ -99,60 +105,80 @@ def read_yaml(
     path: Path,
     as_written: bool = False,
     most_bytes: int = LARGEST_YAML,
-    most_values: int = MOST_NODES,
+    most_values: int = MOST_YAML_VALUES,
     compiled: bool = False,
 ) -> dict[str, Any]:
-    """A YAML mapping; InputError names the file and line of a fault.
+    """A file's YAML mapping; the rest as `parse_yaml`."""
+    return parse_yaml(read_text(Path(path), most_bytes), str(path), as_written, most_values, compiled)
 
-    `as_written` keeps every value as the text that stands there (`002` is no number). `compiled` reads by libyaml
-    where PyYAML was built with it.
+
+def parse_yaml(
+    text: str,
+    where: str,
+    as_written: bool = False,
+    most_values: int = MOST_YAML_VALUES,
+    compiled: bool = False,
+) -> dict[str, Any]:
+    """The mapping that a YAML text holds; InputError names `where` and the line of a fault.
+
+    A number stands in decimal digits: `0652`, `0x1A`, `1:30` and `1_000`, which YAML takes for other numbers than most
+    people do, are refused. `as_written` keeps every value as the text that stands there (`002` is no number).
+    `compiled` reads by libyaml where PyYAML was built with it.
     """
-    path = Path(path)
-    text = read_text(path, most_bytes)
     loader = None
     try:
         loader = (yaml.BaseLoader if as_written else _Compiled if compiled else yaml.SafeLoader)(text)
         node = loader.get_single_node()
         if node is not None:
-            _check_node(node, path, most_values)
+            _check_node(node, loader, where, most_values)
         content = None if node is None else loader.construct_document(node)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f", line {mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or getattr(error, "reason", None) or "cannot be parsed"
-        raise InputError(f"{path}{line}: not valid YAML ({printable(problem)})") from None
+        raise InputError(f"{where}{line}: not valid YAML ({printable(problem)})") from None
     except InputError:
         raise
     except RecursionError:
-        raise InputError(f"{path}: is nested too deeply, expected at most {DEEPEST} levels") from None
+        raise InputError(f"{where}: is nested too deeply, expected at most {DEEPEST_YAML} levels") from None
     except (ValueError, OverflowError) as error:  # dates and numbers that cannot be
-        raise InputError(f"{path}: not valid YAML ({printable(error)})") from None
+        raise InputError(f"{where}: not valid YAML ({printable(error)})") from None
     finally:
         if loader is not None:
             loader.dispose()
     if not isinstance(content, dict):
         found = {type(None): "nothing", list: "a list", str: "plain text"}.get(type(content), type(content).__name__)
-        raise InputError(f"{path}: expected keys with values, found {found}")
+        raise InputError(f"{where}: expected keys with values, found {found}")
     return content
 
 
-def _check_node(root: yaml.Node, path: Path, most_values: int) -> None:
-    """InputError for a key given twice, for too many levels, and for aliases that hold themselves or grow too large."""
+def with_exponents(value: Any) -> Any:
+    """The value, or what a list or mapping holds, with text such as `1e-6` as numbers: YAML 1.1 wants `1.0e-6`."""
+    if isinstance(value, dict):
+        return {key: with_exponents(v) for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [with_exponents(v) for v in value]
+    return float(value) if isinstance(value, str) and _EXPONENT.fullmatch(value) else value
+
+
+def _check_node(root: yaml.Node, loader: Any, where: str, most_values: int) -> None:
+    """InputError for a key given twice, a value that is no plain one, too many levels, aliases that grow too large."""
     sizes: dict[int, int] = {}
     open_nodes: set[int] = set()
 
     def size_of(node: yaml.Node, depth: int) -> int:
-        line = f"{path}, line {node.start_mark.line + 1}"
+        line = f"{where}, line {node.start_mark.line + 1}"
         if id(node) in open_nodes:
             raise InputError(f"{line}: an alias refers to itself")
-        if depth > DEEPEST:
-            raise InputError(f"{line}: is nested too deeply, expected at most {DEEPEST} levels")
+        if depth > DEEPEST_YAML:
+            raise InputError(f"{line}: is nested too deeply, expected at most {DEEPEST_YAML} levels")
         if id(node) in sizes:
             return sizes[id(node)]
         open_nodes.add(id(node))
         total = 1
+        _check_kind(node, loader, line)
         if isinstance(node, yaml.MappingNode):
-            _check_keys(node, path)
+            _check_keys(node, where)
             total += sum(size_of(key, depth + 1) + size_of(value, depth + 1) for key, value in node.value)
         elif isinstance(node, yaml.SequenceNode):
             total += sum(size_of(value, depth + 1) for value in node.value)
@@ -165,14 +191,28 @@ def _check_node(root: yaml.Node, path: Path, most_values: int) -> None:
     size_of(root, 0)
 
 
-def _check_keys(node: yaml.MappingNode, path: Path) -> None:
+def _check_kind(node: yaml.Node, loader: Any, line: str) -> None:
+    """InputError for a number that does not stand in decimal digits, and for `!!binary` and its like."""
+    if node.tag in _FOREIGN:
+        kind = node.tag.removeprefix(_KIND)
+        raise InputError(f"{line}: found !!{kind}, expected text, a number, true or false, a list or keys with values")
+    decimal = _DECIMAL.get(node.tag)
+    if decimal and isinstance(node, yaml.ScalarNode) and not decimal.fullmatch(node.value):
+        taken = printable(loader.construct_object(node))
+        raise InputError(
+            f"{line}: found {printable(node.value)}, which YAML takes for {taken}; expected a number in decimal digits "
+            "(in quotes where text is meant)"
+        )
+
+
+def _check_keys(node: yaml.MappingNode, where: str) -> None:
     seen: dict[str, int] = {}
     for key, _ in node.value:
         line = key.start_mark.line + 1
         if not isinstance(key, yaml.ScalarNode):
-            raise InputError(f"{path}, line {line}: a list or mapping stands where a key is expected")
+            raise InputError(f"{where}, line {line}: a list or mapping stands where a key is expected")
         if key.value in seen:
             raise InputError(
-                f"{path}, line {line}: key {printable(key.value)} is there twice (first in line {seen[key.value]})"
+                f"{where}, line {line}: key {printable(key.value)} is there twice (first in line {seen[key.value]})"
             )
         seen[key.value] = line

@@ -77,7 +77,7 @@ def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
     wanted = expected(entry)
     clause = f"{key}: found {found(entry)}, expected {wanted}"
     if "number" in wanted and _reads_as_number(entry.get("input")):
-        clause += " (YAML takes a number with an exponent only with a point and a sign: 1.0e-3)"
+        clause += " (without quotes, and where it has an exponent with a point and a sign: 1.0e-3)"
     return clause
 
 
@@ -119,8 +119,15 @@ def expected(entry: Mapping[str, Any]) -> str:
 
 def found(entry: Mapping[str, Any]) -> str:
     """The value that was refused, short and in one line."""
-    text = printable(repr(entry.get("input")))
+    text = printable(_as_in_yaml(entry.get("input")))
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+
+
+def _as_in_yaml(value: Any) -> str:
+    """A value as Python writes it, but true and false, which people write in small letters."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_as_in_yaml(part) for part in value)}]"
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def printable(text: object) -> str:

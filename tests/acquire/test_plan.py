@@ -226,7 +226,7 @@ def test_checks_find_a_port_that_is_not_there_and_a_clock_that_is_behind(tmp_pat
             {"steps": [GROUP | {"setup": {"platfrm": "al"}}]},
             "setup.platfrm: no such key is known; did you mean platform?",
         ),
-        ({"steps": [GROUP | {"setup": {"cell": True}}]}, "setup.cell: found True, expected a whole number"),
+        ({"steps": [GROUP | {"setup": {"cell": True}}]}, "setup.cell: found true, expected a whole number"),
         ({"steps": [GROUP | {"over": {"load_gf": [1], "waight": [2, 3]}}]}, "over.waight: nothing reads it"),
     ],
 )

@@ -209,7 +209,7 @@ TABLE = [
     session("a misspelled key", "instrument:", "instrumnet:", "did you mean instrument?"),
     session("a misspelled key of the setup", "load_gf", "load_fg", "setup.load_fg", "did you mean load_gf?"),
     session("text as the load", "100.0", "a lot", "setup.load_gf: found 'a lot', expected a number"),
-    session("true as the load", "100.0", "true", "setup.load_gf: found True, expected a number"),  # before: 1 gf
+    session("true as the load", "100.0", "true", "setup.load_gf: found true, expected a number"),  # before: 1 gf
     session("no number as the load", "100.0", ".nan", "setup.load_gf: found nan, expected a finite number"),
     session("an infinite load", "100.0", ".inf", "setup.load_gf: found inf, expected a finite number"),
     session("pressure in hPa", "95400.0", "954.0", "setup.air.pressure_pa", "10000 or more"),  # before: density / 100
@@ -274,7 +274,7 @@ TABLE = [
     described("one sign for two things", DESCRIPTION + "decimal: ','\n", "the same sign"),
     *yaml_faults("plan.yaml", _planned, PLAN),
     plan("repeats below one", "do: stream", "do: stream, repeats: 0", "repeats: found 0, expected a number of 1 or"),
-    plan("true as the load", "do: stream", "do: stream, setup: {load_gf: true}", "setup.load_gf: found True"),
+    plan("true as the load", "do: stream", "do: stream, setup: {load_gf: true}", "setup.load_gf: found true"),
     plan("a setting of no use", "do: stream", "do: stream, settings: {sampels: 5}", "did you mean samples?"),
     plan("values that nothing reads", "do: stream", "do: stream, over: {wieght: [1]}", "over.wieght: nothing reads it"),
     plan("a name with an attribute", "name: a", "name: 'a-{repeat.x}'", "is not in `over`"),  # before: AttributeError

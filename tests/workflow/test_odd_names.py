@@ -147,3 +147,15 @@ def test_what_a_killed_job_left_is_not_taken_for_whole(project: Project, tmp_pat
         one, other = after[name], (folder / name).read_bytes()
         place = next((k for k, pair in enumerate(zip(one, other, strict=False)) if pair[0] != pair[1]), len(other))
         assert one == other, (name, place, one[place - 100 : place + 100], other[place - 100 : place + 100])
+
+
+def test_a_number_in_the_configuration_that_yaml_takes_for_another_is_refused(project: Project, tmp_path: Path) -> None:
+    """Before: 010 was a step of 8, and the last of two equal keys held without a word."""
+    for text, said in (
+        ("fleet: {batch: 010}\n", "line 1: found 010, which YAML takes for 8"),
+        ("fleet: {batch: 3}\nfleet: {batch: 4}\n", "line 2: key fleet is there twice (first in line 1)"),
+    ):
+        own = tmp_path / "own.yaml"
+        own.write_text(text)
+        done = project.snakemake("-n", "--configfile", str(own), succeeds=False)
+        assert done.splitlines()[-1].startswith(f"rotorid: {own}, {said}")

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from rotorid import log as logs
 from rotorid.codehash import Code
-from rotorid.config import ConfigError, check
+from rotorid.config import check
+from rotorid.errors import InputError
+from rotorid.text_files import read_yaml
 
 # Jobs run side by side: threads of the linear algebra in each of them cost processor time and save none.
 for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -36,8 +38,10 @@ def say_refusals():
 
 
 try:
+    for configured in workflow.configfiles:
+        read_yaml(Path(configured))  # Snakemake's own reader takes 0652 for 426 and the last of two equal keys
     CONFIG = check(config)
-except ConfigError as error:
+except InputError as error:
     refuse(error)
 
 

@@ -5,19 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeVar
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from rotorid.errors import InputError
+from rotorid.text_files import read_yaml, with_exponents
 
 Range = tuple[float, float]
 T = TypeVar("T", bound=BaseModel)
 
 
 def number(value: object) -> object:
-    """The value as it is; YAML's yes and no are no numbers."""
-    if any(isinstance(v, bool) for v in (value if isinstance(value, list) else [value])):
-        raise ValueError("found yes or no, expected a number")
+    """The value as it is; YAML's yes and no are no numbers, and text is none."""
+    for part in value if isinstance(value, list) else [value]:
+        if isinstance(part, bool):
+            raise ValueError("found yes or no, expected a number")
+        if isinstance(part, str):
+            raise ValueError(f"found {part!r}, expected a number")
     return value
 
 
@@ -126,17 +129,10 @@ def read_limits(path: Path | None, kind: type[T] = Limits) -> T:
     if path is None:
         return kind()
     such = "speed_m_s: 3" if kind is Limits else "duration_s: 600"
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; expected a YAML file with limits such as {such}")
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark else ""
-        raise InputError(f"{path}{where}: this is no YAML; expected lines such as {such}") from None
-    if not isinstance(content, dict):
-        found = "nothing" if content is None else f"a {type(content).__name__}"
-        raise InputError(f"{path}: expected lines such as {such}, found {found}")
+        content = with_exponents(read_yaml(path))
+    except InputError as error:
+        raise InputError(f"{error}; expected lines such as {such}") from None
     try:
         return kind.model_validate(content)
     except ValidationError as error:

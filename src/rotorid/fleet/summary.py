@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import yaml
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.errors import InputError
 from rotorid.fleet.judge import FAILED
+from rotorid.text_files import read_yaml
 
 SHOWN = ("established", "ambiguous", "suggested")
 """Words of effects that a summary counts; what is absorbed or not established shows nothing."""
@@ -163,7 +164,6 @@ def _numbers(verdict: dict[str, Any], found: Sequence[dict[str, Any]]):
 def _vehicle(folder: Path) -> str:
     """Name of a set's vehicle, else the set's own."""
     try:
-        stated = yaml.safe_load((folder / "vehicle.yaml").read_text(encoding="utf-8"))
-        return str(stated["name"])
-    except (OSError, KeyError, TypeError, yaml.YAMLError, UnicodeDecodeError):
+        return str(read_yaml(folder / "vehicle.yaml")["name"])
+    except (InputError, KeyError):
         return folder.name

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
+from rotorid.text_files import read_yaml
 
 
 def read_manifest(path: str | Path) -> dict[str, dict[str, Any]]:
     """Sources of the public recordings by name, from `public_data.yaml`: origin, licence, sets, files."""
-    with open(path, encoding="utf-8") as file:
-        return yaml.load(file, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))["sources"]
+    return read_yaml(Path(path), compiled=True)["sources"]
 
 
 def of_one_motor(name: str) -> bool:

@@ -18,9 +18,11 @@ import yaml
 from rotorid.errors import InputError
 from rotorid.importers.known import ORDERS, PLACES, Known, quad_x
 from rotorid.recordings import columns as c
+from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.templates import names
 from rotorid.templates import read as read_template
+from rotorid.text_files import parse_yaml
 
 WEIGHED, GUESSED_MASS = 0.02, 0.3
 FROM_FLIGHT, GUESSED_COEFFICIENT = 0.1, 0.5
@@ -38,7 +40,7 @@ class Proposal:
 
     @property
     def vehicle(self) -> Vehicle:
-        return Vehicle.model_validate(yaml.safe_load(self.text))
+        return vehicle_of(parse_yaml(self.text, "the vehicle proposed"), "the vehicle proposed")
 
 
 def propose(

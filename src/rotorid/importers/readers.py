@@ -14,11 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
+from rotorid.bounds import LEAST_MEMORY, MEMORY_TIMES_FILE
 from rotorid.errors import InputError
-
-LEAST_BYTES = 1_000_000_000
-TIMES_THE_FILE = 100
-"""Bytes beyond those already taken that a log may fill: a thousand million, or so many times its own size."""
 
 
 @contextmanager
@@ -31,7 +28,7 @@ def limited(path: Path) -> Iterator[None]:
         return
     taken = _taken_bytes()
     size = path.stat().st_size if path.is_file() else sum(p.stat().st_size for p in path.rglob("*") if p.is_file())
-    more = max(LEAST_BYTES, TIMES_THE_FILE * size)
+    more = max(LEAST_MEMORY, MEMORY_TIMES_FILE * size)
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     if taken is None or (soft != resource.RLIM_INFINITY and soft <= taken + more):
         yield

@@ -6,13 +6,11 @@ import csv
 import io
 from pathlib import Path, PurePosixPath
 
+from rotorid.bounds import LARGEST_INDEX
 from rotorid.errors import InputError
 from rotorid.io.session import Session, SessionError, read_session, replace_text
 from rotorid.names import hint, listed
 from rotorid.text_files import read_text
-
-LARGEST = 100_000_000
-"""Bytes of the index; 811 recordings have 0.2 MB."""
 
 COLUMNS = (
     "id group kind instrument platform axis load_gf cell experiment mount_roll_deg mount_pitch_deg throttle "
@@ -57,7 +55,7 @@ def read_index(raw: Path) -> list[dict[str, str]]:
     if not path.exists() and not path.is_symlink():
         raise SessionError(f"{path}: no such file; `rotorid-acquire index` makes it")
     try:
-        lines = read_text(path, LARGEST).splitlines()
+        lines = read_text(path, LARGEST_INDEX).splitlines()
     except InputError as error:
         raise SessionError(str(error)) from None
     found = lines[0].split("\t") if lines else []

@@ -7,8 +7,9 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from rotorid.bounds import LARGEST_YAML, MOST_YAML_VALUES
 from rotorid.errors import InputError
-from rotorid.text_files import LARGEST_YAML, MOST_NODES, read_yaml
+from rotorid.text_files import read_yaml
 from rotorid.wording import explain
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -29,7 +30,7 @@ def read_model(
     model: type[Model],
     error: type[InputError],
     most_bytes: int = LARGEST_YAML,
-    most_values: int = MOST_NODES,
+    most_values: int = MOST_YAML_VALUES,
     compiled: bool = False,
 ) -> Model:
     """The model that a file fills. Raises `error` with one sentence that names file and key.

@@ -20,6 +20,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
+from rotorid.bounds import LARGEST_RAW_LOG, MOST_TRIED_BYTES
 from rotorid.errors import InputError
 from rotorid.text_files import read_bytes
 
@@ -29,12 +30,8 @@ CHUNK_TAIL = struct.Struct("<H")
 MAX_CHUNK = 0xFFFF
 RECEIVED, SENT, NOTE = ord("R"), ord("T"), ord("N")
 _TAG = re.compile(b"[RTN]")
-LARGEST = 256_000_000
-"""Bytes of an unpacked log; ten hours of the bench at 100 Hz have 110 MB."""
 LONGEST_PAUSE_NS = 30 * 86_400 * 10**9
 """Between two chunks of one log."""
-MOST_TRIED = 300_000_000
-"""Bytes whose checksum is computed in vain behind damaged places before the rest is given up, about a second."""
 
 
 class NotALog(InputError):
@@ -100,14 +97,14 @@ def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
 def read_raw(path: str | Path) -> RawLog:
     """Read a log, whole, cut or damaged, plain or gzipped. Raises NotALog where there is none."""
     try:
-        data = read_bytes(Path(path), LARGEST)
+        data = read_bytes(Path(path), LARGEST_RAW_LOG)
     except InputError as error:
         raise NotALog(str(error)) from None
     truncated = False
     if data[:2] == b"\x1f\x8b":
         data, truncated = _unpacked(data)
-        if len(data) > LARGEST:
-            raise NotALog(f"{path}: unpacks to more than {LARGEST / 1e6:g} MB, expected at most that")
+        if len(data) > LARGEST_RAW_LOG:
+            raise NotALog(f"{path}: unpacks to more than {LARGEST_RAW_LOG / 1e6:g} MB, expected at most that")
     if not MAGIC.startswith(data[: len(MAGIC)]):
         raise NotALog(f"{path}: does not begin with {MAGIC!r}, so it is no raw log of rotorid-acquire")
     digest = sha256(data).hexdigest()
@@ -126,13 +123,13 @@ def read_raw(path: str | Path) -> RawLog:
 def _unpacked(data: bytes) -> tuple[bytes, bool]:
     """What a gzip stream holds up to its end or to where it is damaged, and whether that is less than all.
 
-    Ends soon behind `LARGEST` bytes.
+    Ends soon behind `LARGEST_RAW_LOG` bytes.
     """
     unpacker, out = zlib.decompressobj(wbits=31), bytearray()
     try:
         for start in range(0, len(data), 512):  # in small pieces: an error costs no more than one of them
             out += unpacker.decompress(data[start : start + 512])
-            if len(out) > LARGEST or not MAGIC.startswith(out[: len(MAGIC)]):
+            if len(out) > LARGEST_RAW_LOG or not MAGIC.startswith(out[: len(MAGIC)]):
                 break
     except zlib.error:
         return bytes(out), True
@@ -142,7 +139,7 @@ def _unpacked(data: bytes) -> tuple[bytes, bool]:
 def _walk(data: bytes, position: int) -> Iterator[tuple[Chunk, int, int]]:
     """Intact chunks, each with where it begins and ends; what lies between two of them is damaged."""
     earliest, latest, tried, following = 0, 2**64, 0, position
-    while (place := _TAG.search(data, position)) is not None and tried < MOST_TRIED:
+    while (place := _TAG.search(data, position)) is not None and tried < MOST_TRIED_BYTES:
         position = place.start()
         if position + CHUNK_HEAD.size + CHUNK_TAIL.size > len(data):
             return

@@ -11,10 +11,9 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, field_validator
 
+from rotorid.bounds import LARGEST_METADATA, MOST_METADATA_VALUES
 from rotorid.errors import InputError
 from rotorid.io.models import KnownKeys, Number, Whole, read_model
-
-LARGEST_METADATA, MOST_VALUES = 10_000_000, 200_000
 
 
 class Ended(StrEnum):
@@ -209,4 +208,4 @@ def read_session(path: str | Path) -> Session:
     path = Path(path)
     if not path.exists() and not path.is_symlink():
         raise SessionError(f"{path}: no such file; every log has its metadata beside it")
-    return read_model(path, Session, SessionError, LARGEST_METADATA, MOST_VALUES, compiled=True)
+    return read_model(path, Session, SessionError, LARGEST_METADATA, MOST_METADATA_VALUES, compiled=True)

@@ -17,6 +17,7 @@ from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
+from rotorid.bounds import LARGEST_CHECKPOINT
 from rotorid.errors import InputError
 from rotorid.networks.compiled import batch_epochs
 from rotorid.networks.network import Network, gradients
@@ -24,8 +25,6 @@ from rotorid.text_files import check_file
 from rotorid.wording import printable
 
 LOGGER = logging.getLogger("rotorid.networks")
-LARGEST_CHECKPOINT = 100_000_000
-"""Bytes of a checkpoint's arrays."""
 Method = Literal["batch", "stochastic", "mini-batch"]
 
 

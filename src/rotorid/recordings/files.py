@@ -23,25 +23,11 @@ from rotorid.recordings.tables import (
     write_table,
 )
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.text_files import check_file, read_yaml
+from rotorid.text_files import check_file, read_yaml, with_exponents
 from rotorid.wording import explain, printable
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
-
-
-def _numbers(value):
-    """YAML 1.1 reads `1e-6` (without a point) as text; turn such text into a number."""
-    if isinstance(value, dict):
-        return {key: _numbers(v) for key, v in value.items()}
-    if isinstance(value, list):
-        return [_numbers(v) for v in value]
-    if isinstance(value, str):
-        try:
-            return float(value)
-        except ValueError:
-            return value
-    return value
 
 
 def read_vehicle(path: Path) -> Vehicle:
@@ -56,7 +42,7 @@ def read_vehicle(path: Path) -> Vehicle:
 
 def vehicle_of(content: dict, where: str) -> Vehicle:
     """The vehicle that the keys of a `vehicle.yaml` state; InputError names the key that is wrong."""
-    content = {k: v if k in ("name", "kind") else _numbers(v) for k, v in content.items()}
+    content = {k: v if k in ("name", "kind") else with_exponents(_plain(v)) for k, v in content.items()}
     if isinstance(content.get("name"), (int, float)) and not isinstance(content["name"], bool):
         content["name"] = str(content["name"])
     try:

@@ -12,29 +12,23 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+Number = Annotated[float, Field(strict=True)]
+"""A number: no text, no `true`."""
+
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _truth_is_no_number(cls, content: Any) -> Any:
-        for key, value in content.items() if isinstance(content, dict) else ():
-            entries = value if isinstance(value, (list, tuple)) else [value]
-            if key != "tared" and key in cls.model_fields and any(isinstance(entry, bool) for entry in entries):
-                raise ValueError(f"{key}: found true or false, expected a number or text")
-        return content
 
 
 class Inertia(_Strict):
     """Entries of the inertia matrix J about the centre of mass, kg m2 (J_xz = -∫ x z dm)."""
 
-    xx: float = Field(ge=1e-12, le=1e6)
-    yy: float = Field(ge=1e-12, le=1e6)
-    zz: float = Field(ge=1e-12, le=1e6)
-    xy: float = Field(0.0, ge=-1e6, le=1e6)
-    xz: float = Field(0.0, ge=-1e6, le=1e6)
-    yz: float = Field(0.0, ge=-1e6, le=1e6)
+    xx: Number = Field(ge=1e-12, le=1e6)
+    yy: Number = Field(ge=1e-12, le=1e6)
+    zz: Number = Field(ge=1e-12, le=1e6)
+    xy: Number = Field(0.0, ge=-1e6, le=1e6)
+    xz: Number = Field(0.0, ge=-1e6, le=1e6)
+    yz: Number = Field(0.0, ge=-1e6, le=1e6)
 
     def matrix(self) -> np.ndarray:
         """Inertia matrix, shape (3, 3), kg m2, body axes."""
@@ -44,9 +38,9 @@ class Inertia(_Strict):
 class Rotor(_Strict):
     """Where a rotor sits (body axes, m) and how it spins seen from above."""
 
-    x_m: float = Field(ge=-100, le=100)
-    y_m: float = Field(ge=-100, le=100)
-    z_m: float = Field(0.0, ge=-100, le=100)
+    x_m: Number = Field(ge=-100, le=100)
+    y_m: Number = Field(ge=-100, le=100)
+    z_m: Number = Field(0.0, ge=-100, le=100)
     spin: Literal["ccw", "cw"]
 
     @property
@@ -58,16 +52,16 @@ class Rotor(_Strict):
 class Noise(_Strict):
     """One-sigma sensor noise as the user believes it; a hint that the tool checks."""
 
-    specific_force_m_s2: float | None = Field(None, ge=0)
-    angular_velocity_rad_s: float | None = Field(None, ge=0)
-    rotor_speed_relative: float | None = Field(None, ge=0)
-    velocity_m_s: float | None = Field(None, ge=0)
-    position_m: float | None = Field(None, ge=0)
-    force_n: float | None = Field(None, ge=0)
-    moment_n_m: float | None = Field(None, ge=0)
+    specific_force_m_s2: Number | None = Field(None, ge=0)
+    angular_velocity_rad_s: Number | None = Field(None, ge=0)
+    rotor_speed_relative: Number | None = Field(None, ge=0)
+    velocity_m_s: Number | None = Field(None, ge=0)
+    position_m: Number | None = Field(None, ge=0)
+    force_n: Number | None = Field(None, ge=0)
+    moment_n_m: Number | None = Field(None, ge=0)
 
 
-Length = Annotated[float, Field(ge=-100, le=100)]
+Length = Annotated[Number, Field(ge=-100, le=100)]
 Place = tuple[Length, Length, Length]
 SMALLEST_COEFFICIENT, LARGEST_COEFFICIENT = 1e-14, 1e2
 LARGEST_SPEED_RAD_S = 1e6
@@ -81,33 +75,26 @@ class Vehicle(_Strict):
 
     name: str
     kind: Literal["flight", "stand", "bench"]
-    mass_kg: float | None = Field(None, ge=1e-6, le=1e5)
+    mass_kg: Number | None = Field(None, ge=1e-6, le=1e5)
     inertia_kg_m2: Inertia | None = None
     rotors: tuple[Rotor, ...] = ()
-    thrust_coefficient_n_s2: float | tuple[float, ...] | None = None
-    torque_coefficient_n_m_s2: float | tuple[float, ...] | None = None
-    gravity_m_s2: float = Field(9.81, ge=0.01, le=1000)
-    rotor_radius_m: float | None = Field(None, ge=1e-4, le=100)
-    rotor_inertia_kg_m2: float | None = Field(None, ge=0, le=1e6)
-    ground_z_m: float | None = Field(None, ge=-1e7, le=1e7)
+    thrust_coefficient_n_s2: Number | tuple[Number, ...] | None = None
+    torque_coefficient_n_m_s2: Number | tuple[Number, ...] | None = None
+    gravity_m_s2: Number = Field(9.81, ge=0.01, le=1000)
+    rotor_radius_m: Number | None = Field(None, ge=1e-4, le=100)
+    rotor_inertia_kg_m2: Number | None = Field(None, ge=0, le=1e6)
+    ground_z_m: Number | None = Field(None, ge=-1e7, le=1e7)
     accelerometer_position_m: Place = (0.0, 0.0, 0.0)
     sensor_position_m: Place = (0.0, 0.0, 0.0)
     sensor_mount: Literal["level", "tilting"] = "level"
-    tared: bool | None = None
-    rotor_speed_limits_rad_s: tuple[float, float] | None = None
+    tared: Annotated[bool, Field(strict=True)] | None = None
+    rotor_speed_limits_rad_s: tuple[Number, Number] | None = None
     noise: Noise = Noise()
-    trust: dict[str, float] = Field(default_factory=dict)
-    reading_gain: tuple[float, float, float] | None = None
+    trust: dict[str, Number] = Field(default_factory=dict)
+    reading_gain: tuple[Number, Number, Number] | None = None
     """Factors of a bench's force readings by axis (`improved_vehicle.yaml` only)."""
     effects: tuple[dict[str, Any], ...] = ()
     """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""
-
-    @field_validator("trust", mode="before")
-    @classmethod
-    def _trust_is_a_number(cls, trust: Any) -> Any:
-        if isinstance(trust, dict) and any(isinstance(sigma, bool) for sigma in trust.values()):
-            raise ValueError("found true or false, expected a relative one-sigma")
-        return trust
 
     @field_validator("trust")
     @classmethod

@@ -6,10 +6,10 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 
-import yaml
-
 from rotorid.errors import InputError
+from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.text_files import parse_yaml
 
 
 @cache
@@ -29,4 +29,4 @@ def text(name: str) -> str:
 
 def read(name: str) -> Vehicle:
     """A template vehicle; InputError as `text`."""
-    return Vehicle.model_validate(yaml.safe_load(text(name)))
+    return vehicle_of(parse_yaml(text(name), f"{name}.yaml"), f"{name}.yaml")

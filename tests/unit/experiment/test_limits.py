@@ -49,8 +49,12 @@ def test_a_file_is_read_and_what_it_leaves_out_is_as_usual(tmp_path: Path) -> No
         ("position_bandwidth_rad_s: 8\n", "does not hold"),
         ("home_deg: [120, 7]\n", "latitude and longitude"),
         ("3: 4\n", "limit"),
-        ("speed_m_s: 3\nspeed_m_s\n", "no YAML"),
-        ("speed_m_s: [1\n", "no YAML"),
+        ("speed_m_s: 3\nspeed_m_s\n", "not valid YAML"),
+        ("speed_m_s: [1\n", "not valid YAML"),
+        ("speed_m_s: 03\n", "line 1: found 03, which YAML takes for 3"),
+        ("speed_m_s: 1:30\n", "takes for 90"),
+        ("speed_m_s: '3'\n", "found '3', expected a number"),
+        ("speed_m_s: 3\nspeed_m_s: 4\n", "is there twice"),
     ],
 )
 def test_a_wrong_limit_ends_in_one_sentence(tmp_path: Path, text: str, said: str) -> None:
@@ -71,5 +75,5 @@ def test_a_wrong_limit_of_a_session_ends_in_one_sentence(tmp_path: Path, text: s
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="file is missing"):
         read_limits(tmp_path / "room.yaml")

@@ -13,6 +13,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict
 
 from rotorid.acquire.geometry import INTERCEPT, SLOPE
+from rotorid.text_files import read_yaml
 
 
 class _Truth(BaseModel):
@@ -247,4 +248,4 @@ def write_truth(truth: Truth, path: Path, seed: int | None = None) -> None:
 
 def read_truth(path: Path) -> Truth:
     """A truth of one's own for the emulators; what is left out keeps its ideal value."""
-    return Truth.model_validate(yaml.safe_load(path.read_text(encoding="utf-8"))["truth"])
+    return Truth.model_validate(read_yaml(path)["truth"])

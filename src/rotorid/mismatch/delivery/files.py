@@ -17,6 +17,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.delivery.parts import delivered, form_of
 from rotorid.mismatch.findings import Analysis, Blow, Finding
+from rotorid.text_files import read_yaml
 from rotorid.writing import rounded
 
 CONDITIONS, INSTRUMENTS = "conditions.yaml", "instruments.yaml"
@@ -170,9 +171,7 @@ def read_instruments(path: Path) -> Instruments:
 
 def _read(path: Path, kind):
     try:
-        return kind.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
+        return kind.model_validate(read_yaml(path))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
