@@ -68,6 +68,7 @@ def add_calibration_log(project: Project, rows: list[dict[str, str]]) -> None:
         shutil.copy(source, folder / source.name.replace(first["id"], "new"))
     metadata = folder / "new.yaml"
     content = yaml.safe_load(metadata.read_text())
+    del content["metadata_sha256"]  # as from an earlier recorder
     metadata.write_text(yaml.safe_dump(content | {"id": "new", "log": "new.rlog.gz"}))
     row = first | {"id": "new", "file": "mine/new.rlog.gz", "metadata": "mine/new.yaml"}
     rewrite_index(project.root / "raw" / "sessions.tsv", [*rows, row])

@@ -81,6 +81,7 @@ def record_again(raw: Path, rows: list[dict[str, str]], folder: Path, name: str 
             continue
         own = f"{name}-{row['kind']}-{row['instrument']}"
         content = yaml.safe_load((raw / row["metadata"]).read_text())
+        del content["metadata_sha256"]  # as from an earlier recorder
         log = under_another_name(raw / row["file"], own)
         content |= {
             "id": own,

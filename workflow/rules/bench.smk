@@ -181,6 +181,7 @@ rule chapter_bench:
             labels={"figure": "tensile"},
         ),
         coefficients="results/report/bench/coefficients.csv",
+        flagged="results/report/bench/flagged.csv",
         metrology="results/report/bench/metrology.csv",
         platforms="results/report/bench/platforms.csv",
         compared="results/report/bench/compared.csv",

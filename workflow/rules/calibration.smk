@@ -42,6 +42,7 @@ rule chapter_loadcell:
             labels={"figure": "printed"},
         ),
         coefficients="results/report/loadcell/coefficients.csv",
+        flagged="results/report/loadcell/flagged.csv",
     params:
         code=code_of_chapter("loadcell"),
     log:

@@ -1,29 +1,38 @@
 """Calibrate the cells from the campaign's raw logs.
 
 - Reading of each recording, line of each cell with intervals, linearity, repeatability, drift, creep.
+- Readings that do not match their loads, flagged and named; the lines with and without them.
 """
 
 import json
+import logging
 from pathlib import Path
 
 import pandas as pd
 
 from rotorid import log
-from rotorid.bench import recalibrate
+from rotorid.bench import calibration_flags, outliers, recalibrate
 from rotorid.io.tables import read_sessions
+
+LOGGER = logging.getLogger("rotorid.calibration")
 
 
 def main(prepared: str, samples: str, recordings: str, readings: str, coefficients: str) -> None:
     """Write the readings (CSV) and each cell's calibration (JSON)."""
     sessions = read_sessions(recordings)
-    table = recalibrate.readings(pd.read_parquet(prepared), sessions)
+    table = calibration_flags.flag(recalibrate.readings(pd.read_parquet(prepared), sessions))
     idle = recalibrate.idle_slopes(pd.read_parquet(samples), sessions)
     cells = [
         recalibrate.as_dict(int(cell), recalibrate.calibrate_cell(part, idle[int(cell)]))
+        | calibration_flags.as_dict(part)
         for cell, part in table.groupby("cell")
     ]
+    warnings = calibration_flags.warnings(cells, table)
+    for sentence in warnings:
+        LOGGER.warning("%s", sentence)
     table.to_csv(readings, index=False)
-    Path(coefficients).write_text(json.dumps({"cells": cells}, indent=1) + "\n", encoding="utf-8")
+    result = {"flag_level": outliers.LEVEL, "readings": len(table), "warnings": warnings, "cells": cells}
+    Path(coefficients).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 - A least-squares line for each cell (thesis eqs 2.10 to 2.13) with 95 % intervals.
 - Beside it the coefficients that the thesis prints, and the difference.
 - The printed weights of the combinations checked against the sum of their elements.
+- Readings that do not match their loads, flagged and named; the lines with and without them.
 - How far the two balances disagree, and what all cells say of the one weight that only one balance weighed.
 """
 
@@ -13,7 +14,7 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid import log
-from rotorid.bench import loadcell
+from rotorid.bench import calibration_flags, loadcell, outliers
 
 TUBE = "Carbon Fiber Tube"
 LOGGER = logging.getLogger("rotorid.calibration")
@@ -25,6 +26,7 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
     with_tube = pd.read_csv(readings)["elements"].str.contains(TUBE, regex=False).to_numpy(float)
     tube = loadcell.shared_weight_error(known_gf, cells, with_tube)
     table = pd.read_csv(printed).set_index("coefficient")
+    flagged = calibration_flags.flag(loadcell.as_readings(known_gf, cells))
     fitted = []
     for cell, reading in cells.items():
         line = loadcell.fit_line(reading, known_gf)
@@ -43,7 +45,11 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
                 "residual_rms_gf": line.residual_rms,
                 "residuals_gf": line.residuals,
             }
+            | calibration_flags.as_dict(flagged[flagged["cell"] == cell])
         )
+    warnings = calibration_flags.warnings(fitted, flagged)
+    for sentence in warnings:
+        LOGGER.warning("%s", sentence)
     result = {
         "combinations": len(known_gf),
         "largest_weight_gf": float(max(known_gf)),
@@ -69,6 +75,9 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
             for cell in fitted
             for name, key in (("a0", "a0_printed_gf"), ("a1", "a1_printed_gf_per_10uv"))
         ),
+        "flag_level": outliers.LEVEL,
+        "readings": len(flagged),
+        "warnings": warnings,
         "cells": fitted,
     }
     Path(out).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

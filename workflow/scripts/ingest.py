@@ -8,6 +8,7 @@ import logging
 from collections.abc import Sequence
 
 from rotorid import log
+from rotorid.io.metadata_checksum import without_checksum
 from rotorid.io.tables import read_tables
 
 LOGGER = logging.getLogger("rotorid.ingest")
@@ -20,6 +21,9 @@ def main(logs: Sequence[str], samples: str, recordings: str) -> None:
         LOGGER.warning("%s did not come to its end and is left out of what follows", row.id)
     for row in sessions[sessions["faults"] != ""].itertuples():
         LOGGER.warning("%s: %s; %d samples missing", row.id, row.faults, row.missing)
+    bare = sessions.loc[~sessions["metadata_checksum"], "id"]
+    if len(bare):
+        LOGGER.warning("%s", without_checksum(len(bare), bare.iloc[0]))
     LOGGER.info("%d recordings, %d samples, %d missing", len(sessions), len(table), sessions["missing"].sum())
     table.to_parquet(samples, index=False)
     sessions.to_csv(recordings, index=False)

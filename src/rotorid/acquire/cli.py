@@ -21,6 +21,7 @@ from rotorid.acquire.options import Shared, with_shared
 from rotorid.acquire.programmes import HOLD_S, RAMP_S, programme_of
 from rotorid.acquire.record import recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
+from rotorid.errors import InputError
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.session import SessionError, Setup
 from rotorid.io.wire import INSTRUMENTS, quadrotor
@@ -323,7 +324,9 @@ def check(
     metadata then say how far it goes."""
     from rotorid.acquire.repair import repair
     from rotorid.io.logs import LogError, read_log
+    from rotorid.io.metadata_checksum import without_checksum
     from rotorid.io.rawlog import NotALog
+    from rotorid.io.session import session_path
 
     try:
         if _check_lines(log, csv):
@@ -347,6 +350,8 @@ def check(
         typer.echo("its metadata were never finished; completed now from the log")
     if parsed.session is not None:
         typer.echo(f"ended: {parsed.session.ended} – {parsed.session.message}")
+        if parsed.session.metadata_sha256 is None and not repaired:
+            typer.echo(without_checksum(1, session_path(log)))
     if csv is not None:
         table.to_csv(csv, index=False)
         typer.echo(f"table: {csv}")
@@ -355,15 +360,40 @@ def check(
 
 
 @app.command()
+def checksum(
+    place: Annotated[Path, typer.Argument(help="a log, its metadata, or a folder of recordings")],
+    renew: Annotated[bool, typer.Option("--renew", help="also where one is there and no longer fits")] = False,
+) -> None:
+    """Add the checksum to metadata that have none. After a meant edit of a recording's metadata, --renew it."""
+    from rotorid.acquire import checksum
+
+    paths, written = [], 0
+    try:
+        paths = checksum.metadata_of(place)
+        if renew and len(paths) > 1:
+            _fail(f"{place}: --renew is for one recording at a time, found {len(paths)}")
+        for path in paths:
+            written += checksum.renew(path) if renew else checksum.add(path)
+    except (InputError, OSError) as error:
+        _fail(f"{error}" + (f" ({written} of {len(paths)} written before that)" if written else ""))
+    typer.echo(f"{place}: {written} checksums written, {len(paths) - written} fitted already")
+
+
+@app.command()
 def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = Path("raw")) -> None:
     """Write `sessions.tsv` from the metadata of all recordings below a folder."""
-    from rotorid.io.index import write_index
+    from rotorid.io.index import metadata_files, write_index
+    from rotorid.io.metadata_checksum import without_checksum
+    from rotorid.io.session import read_session
 
     try:
         rows = write_index(raw)
+        bare = [path for path in metadata_files(raw) if read_session(path).metadata_sha256 is None]
     except (SessionError, OSError) as error:
         _fail(str(error))
     typer.echo(f"{raw / 'sessions.tsv'}: {len(rows)} recordings")
+    if bare:
+        typer.echo(without_checksum(len(bare), bare[0]))
 
 
 @app.command()
@@ -619,9 +649,13 @@ def _of(columns: list[str], wanted: list[str] | None) -> list[str]:
 def _check_lines(log: Path, csv: Path | None) -> bool:
     """Say what is in a log of plain lines; False where it is one of frames."""
     from rotorid.io.lines import read_line_log
+    from rotorid.io.metadata_checksum import without_checksum
     from rotorid.io.session import read_session, session_path
 
-    if not session_path(log).exists() or "description" not in read_session(session_path(log)).procedure:
+    if not session_path(log).exists():
+        return False
+    session = read_session(session_path(log))
+    if "description" not in session.procedure:
         return False
     found = read_line_log(log)
     typer.echo(f"{log}: {len(found.table)} lines read, {found.unreadable} could not be", nl=False)
@@ -630,6 +664,8 @@ def _check_lines(log: Path, csv: Path | None) -> bool:
         typer.echo(f"cut off at byte {found.cut_at}; everything before that is there")
     for fault in found.faults:
         typer.echo(f"NOT AS RECORDED: {fault}")
+    if session.metadata_sha256 is None:
+        typer.echo(without_checksum(1, session_path(log)))
     if csv is not None:
         found.table.to_csv(csv, index=False)
         typer.echo(f"table: {csv}")

@@ -94,6 +94,17 @@ def read_calibration_table(path: str | Path) -> tuple[np.ndarray, dict[int, np.n
     return table["weight_gf"].to_numpy(float), readings
 
 
+def as_readings(weights_gf: np.ndarray, readings: dict[int, np.ndarray]) -> pd.DataFrame:
+    """The table that `read_calibration_table` reads, one row a reading: `id` (its line), `cell`, `weight_gf` and
+    `reading_10uv` (1e-5 V)."""
+    names = [f"line {number}" for number in range(2, len(weights_gf) + 2)]
+    parts = [
+        pd.DataFrame({"id": names, "cell": cell, "weight_gf": weights_gf, "reading_10uv": reading})
+        for cell, reading in readings.items()
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
 def check_weights(weights_path: str | Path, table_path: str | Path) -> float:
     """Largest difference (gf) between a combination's printed weight and the sum of its elements."""
     weights = pd.read_csv(weights_path).set_index("element")["average_gf"]

@@ -33,13 +33,10 @@ def write_index(raw: Path) -> list[dict[str, str]]:
     """Find all recordings below `raw`, in the order of their time, and write the index.
 
     What lies in `raw/local`, where the recorders write by default, is left out: first tries are no part of a campaign.
-    Such a folder has an index of its own, by `write_index(raw / "local")`. Files that are no session metadata (tables,
-    vehicle files) are passed over. Raises SessionError for a session file that is damaged.
+    Such a folder has an index of its own, by `write_index(raw / "local")`. Files that are no session metadata (vehicle
+    files) are passed over. Raises SessionError for a session file that is damaged.
     """
-    rows = []
-    for path in sorted(raw.rglob("*.yaml")):
-        if path.relative_to(raw).parts[0] != LOCAL and _is_session(path):
-            rows.append(index_row(read_session(path), path, raw))
+    rows = [index_row(read_session(path), path, raw) for path in metadata_files(raw)]
     rows.sort(key=lambda row: (row["started"], row["id"]))
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, COLUMNS, delimiter="\t", lineterminator="\n")
@@ -47,6 +44,13 @@ def write_index(raw: Path) -> list[dict[str, str]]:
     writer.writerows(rows)
     replace_text(raw / "sessions.tsv", text.getvalue())
     return rows
+
+
+def metadata_files(raw: Path) -> list[Path]:
+    """Metadata of the recordings below `raw`, those in `raw/local` left out."""
+    return [
+        path for path in sorted(raw.rglob("*.yaml")) if path.relative_to(raw).parts[0] != LOCAL and _is_session(path)
+    ]
 
 
 def read_index(raw: Path) -> list[dict[str, str]]:
@@ -85,5 +89,8 @@ def read_index(raw: Path) -> list[dict[str, str]]:
 def _is_session(path: Path) -> bool:
     if not path.is_file():
         return False
+    # By its log, too: with a damaged first line it is still a recording, and must not be passed over.
+    if any(path.with_suffix(suffix).exists() for suffix in (".rlog", ".rlog.gz")):
+        return True
     with open(path, encoding="utf-8", errors="replace") as file:
         return file.readline(100).strip() == "format: rotorid-session-1"

@@ -13,7 +13,9 @@ from pydantic import Field, field_validator
 
 from rotorid.bounds import LARGEST_METADATA, MOST_METADATA_VALUES
 from rotorid.errors import InputError
+from rotorid.io import metadata_checksum
 from rotorid.io.models import KnownKeys, Number, Whole, read_model
+from rotorid.text_files import read_bytes
 
 
 class Ended(StrEnum):
@@ -153,6 +155,7 @@ class Session(KnownKeys):
     message: str = "the recorder never got to the end: it was killed or the computer stopped"
     log: str  # file name beside this file
     log_sha256: str | None = None  # of the unpacked log
+    metadata_sha256: str | None = None  # as read; None: the file has no checksum, a change of it goes unnoticed
 
     @field_validator("started")
     @classmethod
@@ -182,19 +185,23 @@ def session_path(log: str | Path) -> Path:
 
 
 def write_session(session: Session, path: str | Path) -> None:
-    """Write atomically: a reader sees the old file or the new one, never half of either."""
-    text = yaml.safe_dump(
-        session.model_dump(mode="json", exclude_none=True), sort_keys=False, allow_unicode=True, width=110
-    )
-    replace_text(Path(path), text)
+    """Write atomically, with a checksum: a reader sees the old file or the new one, never half of either."""
+    content = session.model_dump(mode="json", exclude_none=True, exclude={"metadata_sha256"})
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
+    replace_bytes(Path(path), metadata_checksum.with_checksum(text.encode()))
 
 
 def replace_text(path: Path, text: str) -> None:
     """Put a whole new text in the place of a file, or leave it as it is. Raises OSError."""
+    replace_bytes(path, text.encode())
+
+
+def replace_bytes(path: Path, data: bytes) -> None:
+    """Put a whole new content in the place of a file, or leave it as it is. Raises OSError."""
     temporary = path.with_name(path.name + ".tmp")
     try:
-        with open(temporary, "w", encoding="utf-8") as file:
-            file.write(text)
+        with open(temporary, "wb") as file:
+            file.write(data)
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
@@ -204,8 +211,13 @@ def replace_text(path: Path, text: str) -> None:
 
 
 def read_session(path: str | Path) -> Session:
-    """Read and validate. Raises SessionError naming the file and the first key that is wrong."""
+    """Read and validate. Raises SessionError naming the file and the first key that is wrong, or that the file was
+    changed after recording; `metadata_sha256` of the session is None where nothing can say that it was not."""
     path = Path(path)
     if not path.exists() and not path.is_symlink():
         raise SessionError(f"{path}: no such file; every log has its metadata beside it")
+    try:
+        metadata_checksum.check(read_bytes(path, LARGEST_METADATA), path)
+    except InputError as error:
+        raise SessionError(str(error)) from None
     return read_model(path, Session, SessionError, LARGEST_METADATA, MOST_METADATA_VALUES, compiled=True)

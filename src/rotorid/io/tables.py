@@ -78,6 +78,7 @@ def _row(log: Log) -> dict:
         "resets": log.resets,
         "complete": log.complete,
         "faults": "; ".join(log.faults),
+        "metadata_checksum": session.metadata_sha256 is not None,
         # a cut log has lost its end, whatever its metadata say
         "finished": session.ended == Ended.FINISHED and log.cut_at is None,
         **{f"mark_{name}": place for name, place in session.marks.items()},

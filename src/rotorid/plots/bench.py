@@ -69,12 +69,14 @@ def calibration(campaign: Sequence[Mapping], thesis: Sequence[Mapping]) -> Figur
 
 
 def calibration_residuals(readings: pd.DataFrame, cells: Sequence[Mapping]) -> Figure:
-    """What each cell's line leaves of every campaign recording, against the weight."""
+    """What each cell's line leaves of every campaign recording, against the weight; crosses where `flag` has a text."""
     fig, axes = style.figure(3.2, 2, 3, sharex=True, sharey=True)
     for axis, cell in zip(axes.flat, cells, strict=True):
         part = readings[readings["cell"] == cell["cell"]]
         left = part["weight_gf"] - (cell["a0_gf"] + cell["a1_gf_per_10uv"] * part["reading_10uv"])
         axis.plot(part["weight_gf"], left, "o", color=style.BLUE, markersize=3)
+        wrong = part["flag"].notna()
+        axis.plot(part["weight_gf"][wrong], left[wrong], "x", color=style.RED, markersize=8)
         axis.axhline(0, color=style.BLACK, linewidth=0.7)
         axis.set_title(f"cell {cell['cell']}")
     for axis in axes[-1]:

@@ -17,6 +17,7 @@ def lines_and_residuals(
     weights_gf: Sequence[float],
     readings: Mapping[str, Sequence[float]],
     lines: Mapping[str, tuple[float, float]],
+    flagged_gf: Mapping[str, Sequence[float]],
 ) -> Figure:
     """Calibration lines of all cells, and below them what the lines leave over.
 
@@ -28,6 +29,8 @@ def lines_and_residuals(
         Reading of each cell [1e-5 V], shape (n,) each.
     lines
         Intercept [gf] and slope [gf per 1e-5 V] of each cell.
+    flagged_gf
+        Weights [gf] of each cell whose readings do not match them; drawn as crosses.
     """
     weights = np.asarray(weights_gf, float)
     fig, (above, below) = style.figure(4.6, rows=2, gridspec_kw={"height_ratios": [1.6, 1]})
@@ -37,7 +40,10 @@ def lines_and_residuals(
         ends = np.array([0.0, reading.max() * 1.04])
         above.plot(ends, a0 + a1 * ends, color=colour, linewidth=0.8)
         above.plot(reading, weights, "o", color=colour, label=f"cell {cell}")
-        below.plot(weights, weights - (a0 + a1 * reading), "o-", color=colour, linewidth=0.7)
+        residual = weights - (a0 + a1 * reading)
+        below.plot(weights, residual, "o-", color=colour, linewidth=0.7)
+        wrong = np.isin(weights, flagged_gf[cell])
+        below.plot(weights[wrong], residual[wrong], "x", color=style.RED, markersize=8)
     above.set(xlabel=r"reading ($10^{-5}$ V)", ylabel="weight (gf)", xlim=(0, None), ylim=(0, None))
     above.legend(ncols=2, loc="upper left")
     below.axhline(0, color=style.BLACK, linewidth=0.7)

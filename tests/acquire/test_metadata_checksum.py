@@ -1,0 +1,122 @@
+"""Metadata of raw logs carry a checksum: a changed bit is noticed, an edit can be meant, older files still read."""
+
+from __future__ import annotations
+
+import logging
+import random
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rotorid.acquire.cli import app
+from rotorid.io.index import write_index
+from rotorid.io.logs import read_log
+from rotorid.io.session import SessionError, read_session
+from tests.acquire.fault_table import seen
+from workflow.scripts import ingest
+
+CAMPAIGN = Path(__file__).parents[2] / "raw" / "campaign" / "static"
+NAME = "static-al-z-w1-r01"
+
+
+@pytest.fixture
+def log(tmp_path) -> Path:
+    """A log of the campaign, its metadata with a checksum beside it, in a folder of its own."""
+    for suffix in (".yaml", ".rlog.gz"):
+        shutil.copy(CAMPAIGN / (NAME + suffix), tmp_path)
+    return tmp_path / f"{NAME}.rlog.gz"
+
+
+def metadata(log: Path) -> Path:
+    return log.with_name(f"{NAME}.yaml")
+
+
+def without_line(path: Path) -> bytes:
+    """What an earlier recorder wrote: the same without its last line."""
+    path.write_bytes(path.read_bytes()[: path.read_bytes().rindex(b"metadata_sha256")])
+    return path.read_bytes()
+
+
+def command(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, list(words))
+    return done.exit_code, done.output
+
+
+@seen("a bit of a log's metadata flipped", "36 of 200 changed a load, a mark or a name and nothing was said")
+def test_every_flipped_bit_is_noticed(log):
+    path, rng = metadata(log), random.Random(42)
+    good = path.read_bytes()
+    last_line = 8 * good.rindex(b"metadata_sha256")
+    anywhere = [rng.randrange(8 * len(good)) for _ in range(200)]
+    for bit in anywhere + rng.sample(range(last_line, 8 * len(good)), 50):
+        changed = bytearray(good)
+        changed[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(changed)
+        with pytest.raises(SessionError, match=rf"{NAME}\.yaml"):
+            read_session(path)
+    path.write_bytes(good)
+    assert read_session(path).setup.load_gf == 35.715
+
+
+@seen("a load of 35.7 gf in the metadata become 135.7", "read as 135.7")
+def test_a_changed_load_is_one_sentence_and_an_edit_can_be_meant(log):
+    path, bytes_of_log = metadata(log), log.read_bytes()
+    edited = path.read_bytes().replace(b"load_gf: 35.715", b"load_gf: 135.715")
+    path.write_bytes(edited)
+    with pytest.raises(SessionError, match="were changed after recording") as refused:
+        read_log(log)
+    assert f"rotorid-acquire checksum --renew {path}" in str(refused.value) and "\n" not in str(refused.value)
+    assert command("check", str(log))[0] == 1
+    code, text = command("checksum", str(log))
+    assert code == 1 and "were changed after recording" in text and path.read_bytes() == edited
+    assert command("checksum", "--renew", str(log)) == (0, f"{log}: 1 checksums written, 0 fitted already\n")
+    assert read_session(path).setup.load_gf == 135.715
+    before, after = edited.splitlines(), path.read_bytes().splitlines()
+    assert before[:-1] == after[:-1] and before[-1] != after[-1] and log.read_bytes() == bytes_of_log
+
+
+def test_lines_behind_the_checksum_are_noticed_and_kept(log):
+    path = metadata(log)
+    path.write_bytes(path.read_bytes() + b"group: mine")
+    with pytest.raises(SessionError, match="were changed after recording"):
+        read_session(path)
+    code, text = command("checksum", "--renew", str(path))
+    assert code == 1 and "group" in text and "twice" in text  # no metadata: left as it was
+    assert path.read_bytes().endswith(b"group: mine")
+
+
+@seen("metadata of an earlier recorder, without a checksum", "none had one")
+def test_metadata_without_a_checksum_are_read_and_that_is_said_once(log, caplog):
+    path = metadata(log)
+    bare = without_line(path)
+    assert read_log(log).session.metadata_sha256 is None
+    for words in (("check", str(log)), ("index", str(log.parent))):
+        code, text = command(*words)
+        assert code == 0 and text.count("no checksum") == 1
+    with caplog.at_level(logging.WARNING, "rotorid.ingest"):
+        ingest.main([str(log)], str(log.parent / "s.parquet"), str(log.parent / "r.csv"))
+    assert [NAME in record.message for record in caplog.records if "no checksum" in record.message] == [True]
+    code, text = command("checksum", str(log.parent))
+    assert code == 0 and path.read_bytes().startswith(bare)
+    assert path.read_bytes() == (CAMPAIGN / path.name).read_bytes()
+    assert "no checksum" not in command("check", str(log))[1]
+
+
+def test_what_holds_no_metadata_is_said(tmp_path):
+    (tmp_path / "some.yaml").write_text("mass_kg: 1\n")
+    assert command("checksum", str(tmp_path))[0] == 1
+    assert "holds no metadata" in command("checksum", str(tmp_path))[1]
+    for words in ([], ["--renew"]):
+        code, text = command("checksum", *words, str(tmp_path / "none.rlog"))
+        assert code == 1 and "none.yaml: no such file" in text
+
+
+@seen("the first line of a recording's metadata damaged", "the index passed the recording over")
+def test_no_recording_falls_out_of_the_index(log):
+    path = metadata(log)
+    for spoilt in (b"formau: ", b"Format: "):
+        path.write_bytes(path.read_bytes().replace(path.read_bytes()[:8], spoilt, 1))
+        with pytest.raises(SessionError, match="were changed after recording"):
+            write_index(log.parent)
