@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import stat
 from pathlib import Path
@@ -134,6 +135,15 @@ def read_yaml(
         found = {type(None): "nothing", list: "a list", str: "plain text"}.get(type(content), type(content).__name__)
         raise InputError(f"{path}: expected keys with values, found {found}")
     return content
+
+
+def as_yaml(value: str | float) -> str:
+    """A value as YAML in one line that is read back as it is.
+
+    Text stands in quotes: without them `0652`, `1:30` and `yes` would be read as something else.
+    """
+    style = '"' if isinstance(value, str) else None
+    return yaml.safe_dump(value, allow_unicode=True, default_style=style, width=math.inf).splitlines()[0]
 
 
 def _check_node(root: yaml.Node, path: Path, most_values: int) -> None:
