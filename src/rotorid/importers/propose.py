@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import yaml
 
 from rotorid.errors import InputError
 from rotorid.importers.known import ORDERS, PLACES, Known, quad_x
