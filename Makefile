@@ -64,7 +64,8 @@ test-slow: $(READY) ## the tests on whole recordings and whole builds that `make
 
 environment: $(READY) ## make the environment alone
 
-# uv, itself from the lock, installs the rest in seconds; where it cannot, pip does it in a minute.
+# uv, itself from the lock, installs the rest in seconds; where it cannot, or is not to be had, pip does it in a minute
+# without it. Both take packages from where the user told either of them.
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "rotorid needs Python 3.11 or newer, and $(PYTHON) is not; say which to use: make PYTHON=python3.12 ..."; \
@@ -75,10 +76,12 @@ $(READY): requirements.lock pyproject.toml
 	@echo "Environment: making .venv and installing the locked packages"
 	@$(PYTHON) -m venv --clear .venv
 	@sed -n '/^uv==/,/# via/p' requirements.lock > .venv/uv.lock
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r .venv/uv.lock \
+	@sed '/^uv==/,/# via/d' requirements.lock > .venv/without-uv.lock
+	@indexes=$$($(BIN)/python .ci/package_index.py) && eval "$$indexes" || exit 1; \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r .venv/uv.lock \
 		&& $(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock \
 		|| { echo "Environment: uv did not work here; installing with pip, about a minute"; \
-		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock; }
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r .venv/without-uv.lock; }
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 

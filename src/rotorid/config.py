@@ -10,16 +10,25 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping
+from datetime import date
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from rotorid.control.readings import READING_S
 from rotorid.errors import InputError
 from rotorid.mismatch.rules import RULES
 from rotorid.wording import explained
 
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
+
+LONGEST_WINDOW = 301
+"""Samples; the shortest recordings of a steady load have as many."""
+LARGEST_RATE, MOST_EPOCHS, MOST_NODES = 10.0, 10_000_000, 1000
+"""Bounds of a network's training; beyond them it does not converge, or not on one computer."""
+SLOWEST_REAL_FLIGHT_HZ = 400.0
+"""Lowest rate of the real flights that the grey box reads."""
 
 
 class ConfigError(InputError):
@@ -46,6 +55,31 @@ Limits = Annotated[tuple[float, float], AfterValidator(_rising)]
 Counts = Annotated[tuple[int, int], AfterValidator(_rising)]
 
 
+def _odd(window: int) -> int:
+    if window % 2 == 0:
+        raise ValueError(f"found {window}, expected an odd number: as many samples before the middle one as after it")
+    return window
+
+
+def _day(text: str) -> str:
+    try:
+        known = text == "" or date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        known = False
+    if not known:
+        raise ValueError(f"found {text!r}, expected a day of the calendar, as 2026-11-30, or an empty text")
+    return text
+
+
+def _part_of_a_reading(step_s: float) -> float:
+    every = round(READING_S / step_s)
+    if every < 1 or abs(every * step_s / READING_S - 1) > 1e-6:
+        raise ValueError(
+            f"found {step_s:g}, expected a step of which a whole number makes up {READING_S:g} s, a reading"
+        )
+    return step_s
+
+
 class Report(Section):
     """What the report is called and which chapters it has, in their order."""
 
@@ -70,9 +104,11 @@ class FilterSettings(Section):
 
     low_pass_hz: float = Field(gt=0, lt=25, description="Cutoff of the thesis's first-order low-pass [Hz].")
     zero_phase_hz: float = Field(gt=0, lt=25, description="Cutoff of the zero-phase low-pass [Hz].")
-    spike_window: int = Field(ge=3, description="Samples around one that its median is taken of [1].")
+    spike_window: Annotated[int, AfterValidator(_odd)] = Field(
+        ge=3, le=LONGEST_WINDOW, description="Samples around one that its median is taken of [1]."
+    )
     spike_threshold: float = Field(gt=0, description="Robust standard deviations beyond which a sample is a spike [1].")
-    steady_window: int = Field(ge=2, description="Samples that have to be steady [1].")
+    steady_window: int = Field(ge=2, le=LONGEST_WINDOW, description="Samples that have to be steady [1].")
     steady_tolerance: float = Field(
         gt=0, description="Span of the low-passed signal that counts as steady [V of cells, N of the reference sensor]."
     )
@@ -121,8 +157,8 @@ class Residuals(Section):
     """Rigid-body residuals of the NeuroBEM flights."""
 
     cutoff_hz: float = Field(gt=0, lt=190, description="Low-pass of both sides of the residual [Hz].")
-    airspeed_bin_m_s: float = Field(gt=0, description="Width of a bin of airspeed [m/s].")
-    block_s: float = Field(gt=0, description="Length of the blocks that the bootstrap draws [s].")
+    airspeed_bin_m_s: float = Field(ge=0.01, le=100, description="Width of a bin of airspeed [m/s].")
+    block_s: float = Field(ge=0.1, le=60, description="Length of the blocks that the bootstrap draws [s].")
     seed: int = Field(ge=0, description="Seed of the bootstrap [1].")
 
 
@@ -130,14 +166,16 @@ class Simulation(Section):
     """The simulated vehicle's readings and disturbances."""
 
     seed: int = Field(ge=0, description="Seed of disturbance and noise [1].")
-    duration_s: float = Field(gt=0, description="Length of the attitude-control simulation [s].")
-    step_s: float = Field(gt=0, le=0.01, description="Step of the integrator and the controller [s].")
-    moment_n_m: float = Field(ge=0, description="One-sigma moment on the airframe about each axis [N m].")
-    force_n: float = Field(ge=0, description="One-sigma force on the airframe along each axis [N].")
-    correlation_s: float = Field(ge=0, description="Correlation time of moment and force [s].")
-    rate_noise_rad_s: float = Field(ge=0, description="One-sigma noise of a body rate's reading [rad/s].")
+    duration_s: float = Field(
+        gt=1, le=3600, description="Length of the attitude-control simulation, whose errors count from 1 s on [s]."
+    )
+    step_s: float = Field(ge=1e-5, le=0.01, description="Step of the integrator and the controller [s].")
+    moment_n_m: float = Field(ge=0, le=1, description="One-sigma moment on the airframe about each axis [N m].")
+    force_n: float = Field(ge=0, le=10, description="One-sigma force on the airframe along each axis [N].")
+    correlation_s: float = Field(ge=0, le=3600, description="Correlation time of moment and force [s].")
+    rate_noise_rad_s: float = Field(gt=0, le=10, description="One-sigma noise of a body rate's reading [rad/s].")
     acceleration_noise_rad_s2: float = Field(
-        ge=0, description="One-sigma noise of an angular acceleration's reading [rad/s2]."
+        ge=0, le=1000, description="One-sigma noise of an angular acceleration's reading [rad/s2]."
     )
     speed_noise_relative: float = Field(
         ge=0, lt=0.2, description="One-sigma noise of a rotor-speed reading, as a share of it [1]."
@@ -148,12 +186,12 @@ class GreyBox(Section):
     """Parameters of the equations of motion from data."""
 
     seed: int = Field(ge=0, description="Seed of weights, search and draws [1].")
-    rotor_rate: float = Field(gt=0, description="Learning rate of the rotor networks [1].")
-    rotor_epochs: int = Field(ge=1, description="Epochs of the rotor networks [1].")
-    rotor_hidden: int = Field(ge=1, description="Hidden nodes of the rotor networks [1].")
-    inertia_rate: float = Field(gt=0, description="Learning rate of the inertia network [1].")
-    inertia_epochs: int = Field(ge=1, description="Epochs of the inertia network [1].")
-    inertia_every: int = Field(ge=1, description="Every how many samples the inertia network is shown [1].")
+    rotor_rate: float = Field(gt=0, le=LARGEST_RATE, description="Learning rate of the rotor networks [1].")
+    rotor_epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the rotor networks [1].")
+    rotor_hidden: int = Field(ge=1, le=MOST_NODES, description="Hidden nodes of the rotor networks [1].")
+    inertia_rate: float = Field(gt=0, le=LARGEST_RATE, description="Learning rate of the inertia network [1].")
+    inertia_epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the inertia network [1].")
+    inertia_every: int = Field(ge=1, le=100, description="Every how many samples the inertia network is shown [1].")
     speed_limits_rad_s: Limits = Field(
         strict=False, description="Lowest and highest rotor speed that the motors can hold [rad/s]."
     )
@@ -164,23 +202,56 @@ class GreyBox(Section):
     design_harmonics: Counts = Field(
         strict=False, description="Lowest and highest harmonic of the excitation's period [1]."
     )
-    design_period_s: float = Field(gt=0, description="Period of the excitation [s].")
-    design_candidates: int = Field(ge=4, description="Excitations tried by the search [1].")
-    flight_s: float = Field(gt=0, description="Length of the identification flight [s].")
-    flight_step_s: float = Field(gt=0, description="Time for which that flight's motor commands are held [s].")
-    motor_time_s: float = Field(ge=0, description="Time constant of the motors on that flight [s].")
-    draws: int = Field(ge=1, description="Identification flights, each with its own disturbance and noise [1].")
+    design_period_s: float = Field(gt=0, le=3600, description="Period of the excitation [s].")
+    design_candidates: int = Field(ge=4, le=1_000_000, description="Excitations tried by the search [1].")
+    flight_s: float = Field(gt=0, le=3600, description="Length of the identification flight [s].")
+    flight_step_s: Annotated[float, AfterValidator(_part_of_a_reading)] = Field(
+        ge=1e-5, description="Time for which that flight's motor commands are held; whole ones make up a reading [s]."
+    )
+    motor_time_s: float = Field(ge=0, le=1, description="Time constant of the motors on that flight [s].")
+    draws: int = Field(
+        ge=1, le=1000, description="Identification flights, each with its own disturbance and noise [1]."
+    )
     band_hz: Limits = Field(strict=False, description="Band in which real flights tell their inertia [Hz].")
-    block_s: float = Field(gt=0, description="Blocks of flight that the bootstrap draws [s].")
+    block_s: float = Field(ge=0.1, le=60, description="Blocks of flight that the bootstrap draws [s].")
+
+    @model_validator(mode="after")
+    def _can_be_flown(self) -> GreyBox:
+        (low, high), (slowest, fastest) = self.speed_limits_rad_s, self.design_limits_rad_s
+        if not low <= slowest < fastest <= high:
+            raise ValueError(
+                f"design_limits_rad_s is {[slowest, fastest]}, expected to lie within speed_limits_rad_s, {[low, high]}"
+            )
+        first, last = self.design_harmonics
+        # The three axes share the harmonics, and the harmonic 0 is no oscillation.
+        if first < 1 or last - first < 2:
+            raise ValueError(
+                f"design_harmonics is {[first, last]}, expected [low, high] with low of 1 or more and three harmonics"
+            )
+        if last / self.design_period_s >= 0.5 / READING_S:
+            raise ValueError(
+                f"design_harmonics reaches {last / self.design_period_s:g} Hz with a design_period_s of "
+                f"{self.design_period_s:g} s, expected less than {0.5 / READING_S:g} Hz, half the rate of the readings"
+            )
+        if self.flight_s < self.design_period_s:
+            raise ValueError(
+                f"flight_s is {self.flight_s:g}, expected at least design_period_s, {self.design_period_s:g}"
+            )
+        if not 0 < self.band_hz[0] < self.band_hz[1] < SLOWEST_REAL_FLIGHT_HZ / 2:
+            raise ValueError(
+                f"band_hz is {list(self.band_hz)}, expected to lie within 0 and "
+                f"{SLOWEST_REAL_FLIGHT_HZ / 2:g} Hz, both not in it"
+            )
+        return self
 
 
 class BlackBox(Section):
     """The stand's wrench without knowledge of the vehicle."""
 
     seed: int = Field(ge=0, description="Seed of weights, folds and held-out samples [1].")
-    epochs: int = Field(ge=1, description="Epochs of the network [1].")
-    rate: float = Field(gt=0, description="Learning rate of the network [1].")
-    hidden: tuple[Annotated[int, Field(ge=1)], ...] = Field(
+    epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the network [1].")
+    rate: float = Field(gt=0, le=LARGEST_RATE, description="Learning rate of the network [1].")
+    hidden: tuple[Annotated[int, Field(ge=1, le=MOST_NODES)], ...] = Field(
         min_length=1, strict=False, description="Nodes of each hidden layer [1]."
     )
     held_out_samples: int = Field(ge=1, description="Samples held out at random, as the thesis does [1].")
@@ -194,7 +265,7 @@ class Proof(Section):
     seeds: dict[str, Annotated[int, Field(ge=0)]] = Field(
         description="Repetitions taken of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
     )
-    release: Annotated[str, Field(pattern=r"^(\d{4}-\d\d-\d\d)?$")] = Field(
+    release: Annotated[str, AfterValidator(_day)] = Field(
         description="Date of a release proof: cases are drawn from it that nobody has looked at; empty for none [date]."
     )
     released: dict[str, Annotated[int, Field(ge=0)]] = Field(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import stat
@@ -159,6 +160,15 @@ def with_exponents(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [with_exponents(v) for v in value]
     return float(value) if isinstance(value, str) and _EXPONENT.fullmatch(value) else value
+
+
+def as_yaml(value: str | float) -> str:
+    """A value as YAML in one line that is read back as it is.
+
+    Text stands in quotes: without them `0652`, `1:30` and `yes` would be read as something else.
+    """
+    style = '"' if isinstance(value, str) else None
+    return yaml.safe_dump(value, allow_unicode=True, default_style=style, width=math.inf).splitlines()[0]
 
 
 def _check_node(root: yaml.Node, loader: Any, where: str, most_values: int) -> None:

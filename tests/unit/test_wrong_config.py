@@ -5,9 +5,11 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
+from rotorid.blackbox.compare import folds
 from rotorid.config import ConfigError, check
 from rotorid.errors import InputError
 from rotorid.proof import plan
@@ -71,10 +73,56 @@ WRONG = [
     ("proof.batch", 0, "1 or more"),
     ("proof.peers", "yes", "true or false"),
     ("proof.peers", 1, "true or false"),
+    ("filter.bench.spike_window", 4, "an odd number"),
+    ("filter.jr3.spike_window", 303, "at most 301"),
+    ("filter.bench.steady_window", 10**9, "at most 301"),
+    ("residuals.airspeed_bin_m_s", 1e-9, "0.01 or more"),
+    ("residuals.block_s", 1e-9, "0.1 or more"),
+    ("residuals.block_s", 1e9, "at most 60"),
+    ("simulation.duration_s", 1.0, "greater than 1"),
+    ("simulation.duration_s", 1e9, "at most 3600"),
+    ("simulation.step_s", 1e-12, "1e-05 or more"),
+    ("simulation.moment_n_m", 1e9, "at most 1"),
+    ("simulation.force_n", 1e9, "at most 10"),
+    ("simulation.correlation_s", 1e9, "at most 3600"),
+    ("simulation.rate_noise_rad_s", 0.0, "greater than 0"),
+    ("grey_box.rotor_rate", 100.0, "at most 10"),
+    ("grey_box.inertia_rate", 100.0, "at most 10"),
+    ("grey_box.rotor_epochs", 10**12, "at most 1e+07"),
+    ("grey_box.inertia_epochs", 10**12, "at most 1e+07"),
+    ("grey_box.rotor_hidden", -4, "1 or more"),
+    ("grey_box.rotor_hidden", 10**6, "at most 1000"),
+    ("grey_box.inertia_every", 10**6, "at most 100"),
+    ("grey_box.design_period_s", 1e6, "at most 3600"),
+    ("grey_box.design_candidates", 10**9, "at most 1e+06"),
+    ("grey_box.flight_s", 1e6, "at most 3600"),
+    ("grey_box.flight_step_s", 10.0, "a step of which a whole number makes up 0.004 s"),
+    ("grey_box.flight_step_s", 0.003, "a step of which a whole number makes up 0.004 s"),
+    ("grey_box.motor_time_s", 30.0, "at most 1"),
+    ("grey_box.draws", 10**6, "at most 1000"),
+    ("grey_box.block_s", 0.001, "0.1 or more"),
+    ("black_box.rate", 1e3, "at most 10"),
+    ("black_box.epochs", 10**12, "at most 1e+07"),
+    ("black_box.hidden", [20, 10**6], "at most 1000"),
+    ("proof.release", "2026-02-30", "a day of the calendar"),
+    ("proof.release", "20261130", "a day of the calendar"),
+    ("proof.release", "tomorrow", "a day of the calendar"),
     ("report.title", 5, "expected text"),
     ("report.chapters", [], "at least one entry"),
     ("report.chapters", ["../../etc"], "small letters"),
     ("report.chapters", ["A b"], "small letters"),
+]
+
+
+TOGETHER = [
+    ("design_limits_rad_s", [250.0, 1550.0], "to lie within speed_limits_rad_s, [300.0, 1900.0]"),
+    ("design_limits_rad_s", [550.0, 2000.0], "to lie within speed_limits_rad_s, [300.0, 1900.0]"),
+    ("design_harmonics", [0, 80], "low of 1 or more and three harmonics"),
+    ("design_harmonics", [10, 11], "low of 1 or more and three harmonics"),
+    ("design_harmonics", [10, 5000], "less than 125 Hz, half the rate of the readings"),
+    ("flight_s", 5.0, "flight_s is 5, expected at least design_period_s, 10"),
+    ("band_hz", [0.0, 15.0], "within 0 and 200 Hz, both not in it"),
+    ("band_hz", [5.0, 200.0], "within 0 and 200 Hz, both not in it"),
 ]
 
 
@@ -101,6 +149,15 @@ def test_a_wrong_value_is_named(key: str, value: Any, said: str) -> None:
     assert len(text.splitlines()) == 1
 
 
+@pytest.mark.parametrize(("key", "value", "said"), TOGETHER)
+def test_values_that_do_not_go_together_are_named(key: str, value: Any, said: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        check(with_value(f"grey_box.{key}", value))
+    text = str(error.value)
+    assert text.startswith("config.yaml: grey_box: ") and key in text and said in text
+    assert len(text.splitlines()) == 1
+
+
 @pytest.mark.parametrize("section", [k for k, v in SOUND.items() if isinstance(v, dict)])
 def test_a_misspelled_key_of_each_section_gets_the_right_one(section: str) -> None:
     changed = copy.deepcopy(SOUND)
@@ -118,6 +175,8 @@ def test_an_unknown_family_of_the_proof_is_named() -> None:
         InputError, match=r"proof\.seeds\.singel is no family of concealed cases; did you mean single\?"
     ):
         plan.check_families(cases, {"singel": 1})
+    with pytest.raises(InputError, match=r"proof\.released\.singel is no family"):
+        plan.check_families(cases, {"singel": 1}, "proof.released")
 
 
 def test_the_library_reads_yaml_in_one_place() -> None:
@@ -128,3 +187,15 @@ def test_the_library_reads_yaml_in_one_place() -> None:
         if re.search(r"yaml\.(safe_load|load|full_load|unsafe_load)\b", path.read_text(encoding="utf-8"))
     ]
     assert others == []
+
+
+def test_a_pattern_that_fits_no_case_is_named() -> None:
+    cases = [entry.case for entry in plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")]
+    plan.check_patterns(cases, SOUND["ablation"]["cases"], "ablation.cases")
+    with pytest.raises(InputError, match=r"proof\.cases has 'singel/\*', expected a pattern that fits a name, as "):
+        plan.check_patterns(cases, ["*", "singel/*"], "proof.cases")
+
+
+def test_more_folds_than_experiments_are_refused() -> None:
+    with pytest.raises(InputError, match=r"black_box\.folds is 4, expected at most the 3 experiments"):
+        folds(np.array([1, 1, 2, 3]), 4, np.random.default_rng(0))

@@ -9,7 +9,7 @@ from rotorid.proof.decisions import plan as bench
 
 EVIDENCE = os.environ.get("ROTORID_EVIDENCE", "") or "cache/evidence"
 try:
-    plan.check_families(CASES, CONFIG.decisions.seeds, "decisions")
+    plan.check_families(CASES, CONFIG.decisions.seeds, "decisions.seeds")
 except InputError as error:
     refuse(error)
 KEPT_PLANTINGS = planted.chosen(

@@ -7,7 +7,12 @@ Something exact is put into a real flight; the verdict is scored against the one
 from rotorid.proof.plantings import plan as planted
 from rotorid.proof.plantings.flights import flight as planted_flight
 
-PLANTINGS = planted.chosen(planted.read_list(ROOT / "workflow/plantings.tsv"), CONFIG.plantings.cases)
+LISTED = planted.read_list(ROOT / "workflow/plantings.tsv")
+try:
+    plan.check_patterns([planting.name for planting in LISTED], CONFIG.plantings.cases, "plantings.cases")
+except InputError as error:
+    refuse(error)
+PLANTINGS = planted.chosen(LISTED, CONFIG.plantings.cases)
 PLANTED = planted.batches(PLANTINGS, CONFIG.plantings.batch)
 PLANTED_FLIGHTS = list(dict.fromkeys(p.flight for p in PLANTINGS))
 PLANTED_MEMORY = "cache/plantings"

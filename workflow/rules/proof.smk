@@ -9,12 +9,19 @@ from rotorid.errors import InputError
 from rotorid.proof import plan, studies as real
 
 CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
+ANEW = plan.released(CASES, CONFIG.proof.release)
+NAMES_OF_CASES = [entry.case for entry in CASES + ANEW]
 try:
     plan.check_families(CASES, CONFIG.proof.seeds)
+    plan.check_families(
+        [entry for entry in CASES if plan.DEVELOPMENT in entry.case], CONFIG.proof.released, "proof.released"
+    )
+    plan.check_patterns(NAMES_OF_CASES, CONFIG.proof.cases, "proof.cases")
+    plan.check_patterns(NAMES_OF_CASES, CONFIG.ablation.cases, "ablation.cases")
 except InputError as error:
     refuse(error)
 CHOSEN = plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases)
-RELEASED = plan.choose(plan.released(CASES, CONFIG.proof.release), CONFIG.proof.released, CONFIG.proof.cases)
+RELEASED = plan.choose(ANEW, CONFIG.proof.released, CONFIG.proof.cases)
 BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)
 # Concealed sets whose delivered vehicle is put to the test: as many, evenly over the whole list.
 DELIVERED = plan.batches(plan.spread(CASES, CONFIG.proof.delivered), CONFIG.proof.batch)

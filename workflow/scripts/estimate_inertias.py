@@ -15,8 +15,8 @@ import pandas as pd
 from rotorid import log
 from rotorid.control.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
 from rotorid.control.pid import AttitudePid
+from rotorid.control.readings import READING_S
 from rotorid.control.references import training_reference, validation_reference
-from rotorid.errors import InputError
 from rotorid.estimate.consistency import check_consistency
 from rotorid.estimate.inertial import WEIGHT_NAMES, weights_of_inertias
 from rotorid.estimate.output_error import cut_windows, fit_output_error, tied, untied
@@ -24,8 +24,6 @@ from rotorid.recordings import read_vehicle
 from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, Motors, Start, simulate
 
-SAMPLE_S = 0.004
-"""Time between readings."""
 AXES = ("xx", "yy", "zz")
 
 
@@ -38,8 +36,8 @@ def promises(vehicle, flights: dict[str, tuple[np.ndarray, np.ndarray]], reading
     """Standard errors of the six weights for each manoeuvre, scaled to ten seconds of readings."""
     rows = []
     for name, (rates, moments) in flights.items():
-        errors = promised_errors(rates, moments, truth, readings, SAMPLE_S, WINDOW_S)
-        errors = errors * np.sqrt(len(rates) * SAMPLE_S / 10.0)
+        errors = promised_errors(rates, moments, truth, readings, READING_S, WINDOW_S)
+        errors = errors * np.sqrt(len(rates) * READING_S / 10.0)
         rows += [
             {"manoeuvre": name, "weight": weight, "standard_error": error}
             for weight, error in zip(WEIGHT_NAMES, errors, strict=True)
@@ -83,7 +81,7 @@ def main(
     vehicle, rng = read_vehicle(Path(vehicle_file)), np.random.default_rng(seed)
     truth = np.diag(vehicle.inertia_kg_m2.matrix())
     wanted = Wanted(tuple(design_limits_rad_s), np.radians(tilt_deg), tuple(harmonics), period_s)
-    readings = Readings.at_hover(vehicle, rate_noise, speed_noise_relative, 1 / SAMPLE_S)
+    readings = Readings.at_hover(vehicle, rate_noise, speed_noise_relative, 1 / READING_S)
     multisine, _ = design(vehicle, wanted, readings, candidates, rng)
     push = Disturbance(force_n, moment_n_m, correlation_s)
     lag, hold = Motors(motor_time_s), ExcitedHold(vehicle, multisine, tuple(limits_rad_s))
@@ -91,13 +89,11 @@ def main(
     trace = simulate(vehicle, hold, duration_s, step_s, start, lag, disturbance=push, rng=rng)
     # Commands are held over a step, and between two readings the speeds bend by what no reading shows: with steps
     # as long as the readings' the inertias would come out up to 0.05 % large, a quarter of that with half as long.
-    every = round(SAMPLE_S / step_s)
-    if every < 1 or abs(every * step_s / SAMPLE_S - 1) > 1e-6:
-        raise InputError(f"grey_box.flight_step_s is {step_s}, but whole steps must make up {SAMPLE_S} s")
+    every = round(READING_S / step_s)
     rates, speeds = trace.angular_velocity[0, ::every], trace.rotor_speed[0, ::every]
     flights = {}
     for reference in (training_reference(), validation_reference()):
-        flown = simulate(vehicle, AttitudePid(vehicle, reference), 10.0, SAMPLE_S, motors=Motors(0.0))
+        flown = simulate(vehicle, AttitudePid(vehicle, reference), 10.0, READING_S, motors=Motors(0.0))
         flights[f"thesis, {reference.name}"] = flown.angular_velocity[0], moments_of(vehicle, flown.rotor_speed[0])
     flights["designed multisine"] = rates, moments_of(vehicle, speeds)
     promises(vehicle, flights, readings, truth).to_csv(identifiability, index=False, float_format="%.6g")
@@ -107,7 +103,7 @@ def main(
         noise = np.random.default_rng([seed, draw])
         read_speeds = trace.rotor_speed[draw, ::every] * (1 + speed_noise_relative * noise.normal(size=speeds.shape))
         read_rates = trace.angular_velocity[draw, ::every] + rate_noise * noise.normal(size=rates.shape)
-        windows = cut_windows(read_rates, moments_of(vehicle, read_speeds), SAMPLE_S, WINDOW_S)
+        windows = cut_windows(read_rates, moments_of(vehicle, read_speeds), READING_S, WINDOW_S)
         guess = np.log(truth * np.array([1.2, 0.85, 1.1]))
         fit = fit_output_error(windows, tied, guess, moment_noise_n_m=readings.moments_n_m)
         free = fit_output_error(
@@ -150,7 +146,7 @@ def main(
         "all_within_0_2_percent": bool(max(table[f"{a}_error_percent"].abs().max() for a in AXES) < 0.2),
     }
     Path(fits).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    shown = slice(0, int(min(period_s, 5.0) / SAMPLE_S))
+    shown = slice(0, int(min(period_s, 5.0) / READING_S))
     moments = moments_of(vehicle, speeds)
     stretch = {"time_s": trace.time_s[::every][shown]}
     for k, axis in enumerate("xyz"):

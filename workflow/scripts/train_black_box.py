@@ -12,6 +12,7 @@ import pandas as pd
 from rotorid import log
 from rotorid.blackbox.experiments import OUTPUTS
 from rotorid.blackbox.models import fit_thesis_network
+from rotorid.errors import InputError
 
 
 def main(
@@ -28,6 +29,8 @@ def main(
 ) -> None:
     """Write the error by epoch, the held-out samples with their predictions, and their scores (CSV)."""
     table = pd.read_csv(experiments)
+    if held_out >= len(table):
+        raise InputError(f"black_box.held_out_samples is {held_out}, expected fewer than the {len(table)} samples")
     chosen = np.random.default_rng(seed).choice(len(table), held_out, replace=False)
     mask = np.zeros(len(table), bool)
     mask[chosen] = True

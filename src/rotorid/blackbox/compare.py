@@ -10,6 +10,7 @@ import pandas as pd
 
 from rotorid.blackbox.experiments import INPUTS, OUTPUTS
 from rotorid.blackbox.models import Predict, Scale
+from rotorid.errors import InputError
 
 INPUT_NAMES = {f"force_{i}_n": f"the force of motor {i} (N)" for i in (1, 2, 3, 4)} | {
     "roll_rad": "roll (rad)",
@@ -20,8 +21,13 @@ Fit = Callable[[pd.DataFrame], Predict]
 
 
 def folds(experiments: np.ndarray, count: int, rng: np.random.Generator) -> list[np.ndarray]:
-    """Masks (n,) of the held-out samples of each fold; whole experiments go together."""
+    """Masks (n,) of the held-out samples of each fold; whole experiments go together.
+
+    InputError where a fold would have no experiment.
+    """
     numbers = rng.permutation(np.unique(experiments))
+    if count > len(numbers):
+        raise InputError(f"black_box.folds is {count}, expected at most the {len(numbers)} experiments")
     return [np.isin(experiments, part) for part in np.array_split(numbers, count)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ import typer
 from rotorid.cli.console import one_sentence
 from rotorid.cli.importing import MassKg
 from rotorid.errors import InputError
+from rotorid.wording import printable
 
 
 def init(
@@ -32,7 +34,10 @@ def init(
 
     `rotorid init flights --example`, a set to try things on
     """
+
     from rotorid import templates
+    from rotorid.recordings.files import vehicle_of
+    from rotorid.text_files import as_yaml, parse_yaml
 
     with one_sentence():
         if listing:
@@ -57,14 +62,27 @@ def init(
             mass_kg = mass_kg or typer.prompt("Mass as flown, kg", default=templates.read(like).mass_kg, type=float)
         text = templates.text(like)
         if mass_kg is not None:
-            if not mass_kg > 0:
-                raise InputError(f"--mass-kg is {mass_kg:g}, expected more than 0")
-            text = re.sub(r"(?m)^mass_kg:.*$", f"mass_kg: {mass_kg:g}   # as you stated it", text)
+            if not 0 < mass_kg < math.inf:
+                raise InputError(f"--mass-kg is {mass_kg:g}, expected a finite number of more than 0")
+            text = re.sub(r"(?m)^mass_kg:.*$", lambda _: f"mass_kg: {as_yaml(mass_kg)}   # as you stated it", text)
         if name is not None:
-            text = re.sub(r"(?m)^name:.*$", lambda _: f'name: "{name}"', text)
+            check_name(name)
+            text = re.sub(r"(?m)^name:.*$", lambda _: f"name: {as_yaml(name)}", text)
+        # What is written must be read again: a mass beyond the contract's bounds is refused here, not by `check`.
+        vehicle_of(parse_yaml(text, str(path)), str(path))
         folder.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
         typer.echo(
             f"{path}: written from template {like}. Put runs (CSV or Parquet, columns as in the recording contract) "
             f"beside it, then `rotorid check {folder}`"
         )
+
+
+def check_name(name: str) -> None:
+    """InputError where a vehicle cannot be called so: a blank name, or one that is no Unicode text."""
+    if not name.strip():
+        raise InputError(f"--name is {name!r}, expected text")
+    try:
+        name.encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"--name is '{printable(name)}', expected UTF-8 text") from None

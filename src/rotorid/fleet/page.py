@@ -8,9 +8,12 @@ import pandas as pd
 from jinja2 import Environment
 from markupsafe import Markup
 
+from rotorid.page.make import policy_for
+
 TEMPLATE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Fleet: {{ name }}</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{{ policy }}">
 <style>
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
 table { border-collapse: collapse; width: 100%; margin: .5rem 0 2rem; }
@@ -70,6 +73,7 @@ def make_page(
         Environment(autoescape=True, trim_blocks=True)
         .from_string(TEMPLATE)
         .render(
+            policy=policy_for(),
             name=name,
             total=len(sets),
             vehicles=sets["vehicle"].nunique(),

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-import yaml
 
 from rotorid.errors import InputError
 from rotorid.importers.known import ORDERS, PLACES, Known, quad_x
@@ -22,7 +21,7 @@ from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.templates import names
 from rotorid.templates import read as read_template
-from rotorid.text_files import parse_yaml
+from rotorid.text_files import as_yaml, parse_yaml
 
 WEIGHED, GUESSED_MASS = 0.02, 0.3
 FROM_FLIGHT, GUESSED_COEFFICIENT = 0.1, 0.5
@@ -79,7 +78,7 @@ def propose(
     lines = [
         f"# Proposed from {name}. Lines marked PROPOSED are guesses: replace them by what you know, and then",
         "# lower their `trust` (the relative one-sigma belief) at the bottom.",
-        f"name: {_quoted(name)}",
+        f"name: {as_yaml(name)}",
         "kind: flight",
         f"mass_kg: {mass:.6g}   # {mass_note}",
         f"inertia_kg_m2: {{xx: {inertia[0]:.4e}, yy: {inertia[1]:.4e}, zz: {inertia[2]:.4e}}}   "
@@ -122,10 +121,6 @@ def closer_template(lift_n_s2_kg: float, template: Vehicle, template_name: str) 
     others = {n: v for n in names() if n != template_name and corners(v := read_template(n)) == corners(template)}
     best = min(others, key=lambda n: off(others[n]), default=None)
     return best if best and off(template) > 0.2 and off(others[best]) < 0.1 else None
-
-
-def _quoted(text: str) -> str:
-    return yaml.safe_dump(text, allow_unicode=True, default_style='"').strip()
 
 
 def _mass(mass_kg, template: Vehicle, template_name: str, remarks: list[str]) -> tuple[float, float, str]:

@@ -75,14 +75,26 @@ def spread(entries: Sequence[Entry], count: int) -> list[Entry]:
     return [entries[k * len(entries) // count] for k in range(count)]
 
 
-def check_families(entries: Sequence[Entry], seeds: Mapping[str, int], section: str = "proof") -> None:
-    """InputError where `seeds` names a family that is not there: a misspelled one would leave its cases out."""
+def check_families(entries: Sequence[Entry], seeds: Mapping[str, int], key: str = "proof.seeds") -> None:
+    """InputError where `seeds` names a family that is not there: a misspelled one would leave its cases out.
+
+    `key` is where the configuration holds `seeds`.
+    """
     families = list(dict.fromkeys(e.family for e in entries))
     for family in seeds:
         if family not in families:
             close = difflib.get_close_matches(family, families, n=1)
             hint = f"did you mean {close[0]}?" if close else f"known are {', '.join(families)}."
-            raise InputError(f"config.yaml: {section}.seeds.{family} is no family of concealed cases; {hint}")
+            raise InputError(f"config.yaml: {key}.{family} is no family of concealed cases; {hint}")
+
+
+def check_patterns(names: Sequence[str], patterns: Sequence[str], key: str) -> None:
+    """InputError where a pattern of the configuration's `key` fits none of the names."""
+    for pattern in patterns:
+        if not any(fnmatch(name, pattern) for name in names):
+            raise InputError(
+                f"config.yaml: {key} has {pattern!r}, expected a pattern that fits a name, as {names[0]!r}"
+            )
 
 
 def released(entries: Sequence[Entry], date: str) -> list[Entry]:

@@ -2,10 +2,13 @@
 
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from rotorid import templates
@@ -39,6 +42,86 @@ def test_every_template_is_a_vehicle_and_init_writes_it(tmp_path: Path, name: st
     assert (vehicle.mass_kg, vehicle.name) == (0.9, "mine")
     again = run("init", tmp_path / "set", "--like", name)
     assert again.exit_code == 1 and "is there already" in again.output
+
+
+NAMES = [
+    'a "b" c',
+    "a: b",
+    "a\\b",
+    "line\nline",
+    "tab\t",
+    "é 四 🚁",
+    "0652",
+    "1:30",
+    "yes",
+    "null",
+    "~",
+    "# no",
+    "- a",
+    "'x'",
+]
+NAMES += [
+    "{a: 1}",
+    "[a]",
+    "&a",
+    "*a",
+    "!x",
+    "%y",
+    "a #b",
+    " a ",
+    "\\1",
+    "\\g<0>",
+    "\u2028\ufeff\x7f\x85",
+    "x" * 5000,
+    "a " * 999,
+]
+
+
+def name_as_read(folder: Path, name: str) -> str:
+    """The name that `check` will see after `rotorid init --name`."""
+    done = run("init", folder, "--like", "thesis", f"--name={name}")
+    assert done.exit_code == 0, done.output
+    return read_vehicle(folder / "vehicle.yaml").name
+
+
+@pytest.mark.parametrize("name", NAMES, ids=lambda name: ascii(name)[:20])
+def test_init_writes_any_name_so_that_it_is_read_back(tmp_path: Path, name: str) -> None:
+    assert name_as_read(tmp_path, name) == name
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.text(min_size=1).filter(str.strip))
+def test_init_writes_every_text_so_that_it_is_read_back(name: str) -> None:
+    with TemporaryDirectory() as folder:
+        try:
+            name.encode()
+        except UnicodeEncodeError:
+            done = run("init", folder, "--like", "thesis", f"--name={name}")
+            assert done.exit_code == 1 and "expected UTF-8 text" in done.output
+        else:
+            assert name_as_read(Path(folder), name) == name
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--name=", "--name is '', expected text"),
+        ("--name= ", "--name is ' ', expected text"),
+        ("--name=\udcff", "--name is '\\udcff', expected UTF-8 text"),
+        ("--mass-kg=inf", "--mass-kg is inf, expected a finite number of more than 0"),
+        ("--mass-kg=1e-9", "mass_kg: found 1e-09, expected a number of 1e-06 or more"),
+    ],
+)
+def test_init_refuses_in_one_sentence_and_writes_nothing(tmp_path: Path, option: str, said: str) -> None:
+    done = run("init", tmp_path / "set", "--like", "thesis", option)
+    assert done.exit_code == 1 and said in done.output and len(done.output.splitlines()) == 1
+    assert not (tmp_path / "set").exists()
+
+
+@pytest.mark.parametrize("mass_kg", [2e-5, 0.71234567, 3e4])
+def test_init_writes_a_mass_in_full(tmp_path: Path, mass_kg: float) -> None:
+    assert run("init", tmp_path, "--like", "thesis", "--mass-kg", mass_kg).exit_code == 0
+    assert read_vehicle(tmp_path / "vehicle.yaml").mass_kg == mass_kg
 
 
 def test_the_thesis_template_is_the_file_of_the_project() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -105,6 +107,15 @@ def test_the_page_shows_everything_and_the_same_twice(fleet, tmp_path: Path) -> 
     assert "6 sets of 3 vehicles" in pages[0] and "<b>4</b> need a person" in pages[0]
     assert "&lt;swift_20261102&gt;" in pages[0] and "<svg" in pages[0]
     assert 'href="there/report.html"' in pages[0]
+
+
+def test_no_script_runs_on_the_page_and_it_fetches_nothing(fleet, tmp_path: Path) -> None:
+    sets, effects, parameters = collect(*fleet)
+    draw_fleet(by_effect(effects, sets), parameters, sets, tmp_path / "f.svg")
+    page = make_page("sets", sets, by_effect(effects, sets), by_vehicle(effects, sets), {}, tmp_path / "f.svg")
+    head = page[: page.index("<style>")]
+    policy = html.unescape(re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', head)[1])
+    assert "default-src 'none'; script-src 'none'; " in policy
 
 
 def test_a_fleet_without_any_verdict(tmp_path: Path) -> None:

@@ -89,7 +89,9 @@ def test_nothing_found_is_empty():
     assert empty(conditions_of(made)) and empty(instruments_of(made))
 
 
-@pytest.mark.parametrize(("text", "said"), [("set: a\nwinds: []\n", "winds"), ("{", "not valid YAML"), ("[]", "found a list")])
+@pytest.mark.parametrize(
+    ("text", "said"), [("set: a\nwinds: []\n", "winds"), ("{", "not valid YAML"), ("[]", "found a list")]
+)
 def test_a_file_that_does_not_fit_is_refused_in_one_sentence(tmp_path, text, said):
     path = tmp_path / "conditions.yaml"
     path.write_text(text)
