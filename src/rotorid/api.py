@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,9 +21,9 @@ from rotorid.names import hint
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, vehicle_of
 from rotorid.recordings.belief import check_belief
 from rotorid.recordings.check import SetCheck, check_recordings
-from rotorid.recordings.files import check_rotors
+from rotorid.recordings.files import check_rotors, usable_runs
 from rotorid.recordings.proposed import proposed_in
-from rotorid.recordings.tables import check_table
+from rotorid.recordings.tables import check_table, numbers
 from rotorid.result import FILES, OTHERS, Result
 from rotorid.text_files import parse_yaml
 
@@ -160,16 +161,13 @@ def _of_tables(tables: Mapping[str, pd.DataFrame], name: str, vehicle: Believed 
         )
     if not tables:
         raise InputError("data holds no table")
-    runs = []
-    for run, table in sorted(tables.items()):
-        try:
-            numbers = table.astype(float)
-        except (TypeError, ValueError):
-            bad = next(n for n in table.columns if not pd.api.types.is_numeric_dtype(table[n]))
-            raise InputError(f"run {run}, column {bad}: expected numbers, found {table[bad].iloc[0]!r}") from None
-        numbers.columns = [str(n) for n in numbers.columns]
-        runs.append(Run(str(run), check_table(numbers, f"run {run}")))
-    return RecordingSet(name, believed_vehicle(vehicle), tuple(runs))
+    runs, left_out = usable_runs((partial(_of_table, run, table) for run, table in sorted(tables.items())), name)
+    return RecordingSet(name, believed_vehicle(vehicle), runs, left_out=left_out)
+
+
+def _of_table(name: str, table: pd.DataFrame) -> Run:
+    named = table.set_axis([str(n) for n in table.columns], axis=1)
+    return Run(str(name), check_table(numbers(named, f"run {name}"), f"run {name}"))
 
 
 def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
@@ -186,7 +184,7 @@ def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
     believed = believed_vehicle(vehicle) if vehicle is not None else vehicle_of(
         parse_yaml(found.vehicle_text, "the vehicle proposed"), "the vehicle proposed"
     )  # fmt: skip
-    runs = tuple(Run(run, check_table(table, f"run {run}")) for run, table in sorted(found.runs.items()))
+    runs = tuple(Run(run, table) for run, table in sorted(found.runs.items()))
     proposed = proposed_in(found.vehicle_text) if vehicle is None else ()
     return RecordingSet(name, believed, runs, proposed=proposed)
 

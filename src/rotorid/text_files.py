@@ -76,19 +76,23 @@ def read_bytes(path: Path, most: int) -> bytes:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
-def check_text(data: bytes, path: Path) -> None:
-    """InputError where bytes are no UTF-8 text, with the line and what they look like instead."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+def check_text(data: bytes, path: Path, first_line: int = 1) -> None:
+    """InputError where bytes are no UTF-8 text, with the line and what they look like instead.
+
+    `first_line` is the number of the line that the bytes begin with, where they are a part of the file.
+    """
+    if first_line == 1 and data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError(f"{path}: is UTF-16 text, expected UTF-8")
     zero = data.find(b"\0")
     if zero >= 0:
-        line = data.count(b"\n", 0, zero) + 1
-        kind = "UTF-16 text" if data[:2000].count(b"\0") > 0.3 * len(data[:2000]) else "binary data"
+        line = data.count(b"\n", 0, zero) + first_line
+        share = data[:2000].count(b"\0") / len(data[:2000])
+        kind = "UTF-16 text" if 0.3 < share < 0.8 else "binary data"
         raise InputError(f"{path}, line {line}: has a zero byte in it ({kind}?), expected UTF-8 text")
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
+        line = data.count(b"\n", 0, error.start) + first_line
         raise InputError(
             f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8 text (Latin-1, or not text at all?), "
             "expected UTF-8"

@@ -89,7 +89,7 @@ def test_check_says_what_is_lacking(flown: RecordingSet) -> None:
     [
         (lambda t: t.drop(columns="time_s"), "thesis", "run run: column time_s is missing"),
         (lambda t: t.rename(columns={"time_s": "t"}), "thesis", "is t meant?"),
-        (lambda t: t.assign(note="fast"), "thesis", "column note: expected numbers, found 'fast'"),
+        (lambda t: t.assign(note="fast"), "thesis", "line 2, column note: expected a number, found 'fast'"),
         (lambda t: t.assign(rotor_speed_9_rad_s=1.0), "thesis", "lists 4 rotors only"),
         (lambda t: t.iloc[::-1], "thesis", "must increase strictly"),
         (lambda t: t, None, "a table needs a vehicle"),

@@ -167,11 +167,11 @@ def test_a_byte_order_mark_and_blanks_after_commas_are_no_fault(folder: Path) ->
 
 
 def test_a_parquet_with_one_column_twice_is_told(tmp_path: Path) -> None:
-    from rotorid.recordings.files import check_table
+    from rotorid.recordings.tables import numbers
 
     table = pd.DataFrame([[0.0, 1.0, 2.0], [1.0, 1.0, 2.0]], columns=["time_s", "x", "x"])
     with pytest.raises(InputError, match="r.parquet: column x is there twice"):
-        check_table(table, "r.parquet")
+        numbers(table, "r.parquet")
 
 
 def test_files_that_are_no_tables_are_told(folder: Path) -> None:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as parquet_file
 
 from rotorid.recordings import columns as c
 
@@ -312,7 +314,7 @@ def runs() -> Iterator[Wrong]:
     yield file("run.csv", "{}\n", "JSON", "time_s is missing")
     yield file("run.csv", "<html><body>404</body></html>\n", "HTML", "time_s is missing")
     yield file("run.csv", "\n".join(LINES[1:]) + "\n", "without a heading", "line 1", "found numbers")
-    yield file("run.csv", "x" * 3_000_000, "one endless line", "first line has 3 MB")
+    yield file("run.csv", "x" * 3_000_000, "one endless line", "line 1: is longer than 1 MB")
     yield file("run.csv", RUN[:-40], "cut off", f"line {len(LINES)}", "cut off")
 
     def cell(line: int, column: int, text: str) -> Callable[[list[str]], None]:
@@ -433,10 +435,9 @@ def contents() -> Iterator[Wrong]:
     yield data(clock(lambda t: t * 1e9), "in nanoseconds", "nanoseconds?")
     yield data(clock(lambda t: t * 20), "at 1 Hz", "step of 1 s")
     yield data(clock(lambda t: t + 1e6 * (t > 5)), "with a jump of 1e6 s", "line 103", "jumps by 1e+06 s")
+    yield data(clock(lambda t: t + 3600 * (t > 5)), "with a clock set to summer time", "line 103", "jumps by 3600.05 s")
     yield data(clock(lambda t: t + 1.7e9 * (t > 5)), "with the clock set", "line 103", "jumps by 1.7e+09 s")
-    yield data(
-        clock(lambda t: np.where(t > 9.9, 1e300, t)), "that ends at 1e300", "line 201, column time_s", "found 1e+300"
-    )
+    yield data(clock(lambda t: np.where(t > 9.9, 1e300, t)), "that ends at 1e300", "line 201", "jumps by 1e+300 s")
     yield data(
         lambda t: t.assign(**{n: t[n].where(t.index % 40 < 20) for n in SPEEDS}), "with holes", "longest stretch"
     )
@@ -503,6 +504,7 @@ def tables() -> Iterator[Wrong]:
     yield zipped(gzip.compress(b"\0" * 150_000_000), "bomb of zero bytes", "run.csv.gz")
     rows = LINES[0].encode() + b"\n" + b"0," * (WIDTH - 1) + b"0\n"
     yield zipped(gzip.compress(rows * 900_000), "bomb of lines", "unpacks to more than 100 MB")
+    yield zipped(packed + bytes(3_000_000), "with zero bytes behind it", "more than 1 MB of zero bytes")
     yield zipped(gzip.compress(b""), "of nothing", "is empty")
     yield zipped(gzip.compress(RUN.replace(",", ";").encode()), "semicolons", "semicolons")
     yield zipped(gzip.compress(gzip.compress(RUN.encode())), "twice", "run.csv.gz")
@@ -589,7 +591,76 @@ def instruments() -> Iterator[Wrong]:
             )  # fmt: skip
 
 
+def large() -> Iterator[Wrong]:
+    """Sets that are small on the disk, or quickly made, and larger than any recording."""
+
+    def instead(name: str, make: Callable[[Path], object]) -> Callable[[Path], None]:
+        def spoil(folder: Path) -> None:
+            (folder / "run.csv").unlink()
+            make(folder / name)
+
+        return spoil
+
+    def case(what: str, name: str, make: Callable[[Path], object], *said: str) -> Wrong:
+        return Wrong(f"large {what}", instead(name, make), (name, *said))
+
+    def sparse(content: bytes, size: int) -> Callable[[Path], None]:
+        def make(path: Path) -> None:
+            path.write_bytes(content)
+            os.truncate(path, size)
+
+        return make
+
+    def columns(count: int, **others: pa.Array) -> Callable[[Path], None]:
+        return lambda path: parquet_file.write_table(pa.table({"time_s": np.arange(count) / 100.0, **others}), path)
+
+    def zeros(path: Path) -> None:
+        names = ["time_s", *(f"x{k}" for k in range(24))]
+        part = pa.table(dict.fromkeys(names, pa.array(np.zeros(1_000_000))))
+        options = {"compression": "zstd", "use_dictionary": False}
+        with parquet_file.ParquetWriter(path, part.schema, **options) as writer:
+            for _ in range(25):
+                writer.write_table(part)
+
+    def plain_text(path: Path) -> None:
+        text = pa.array(["x" * 1_000_000] * 200)
+        options = {"compression": "zstd", "use_dictionary": False}
+        parquet_file.write_table(pa.table({"time_s": np.arange(200) / 20.0, "note": text}), path, **options)
+
+    words = pa.DictionaryArray.from_arrays(pa.array(np.zeros(5000, "i4")), pa.array(["x" * 1_000_000]))
+    lists = pa.concat_arrays([pa.array([[0.0] * 100_000] * 50)] * 100)
+    end, samples = gzip.compress(b"", mtime=0), "has more than 5000000 samples"
+    packed = gzip.compress(RUN.encode(), mtime=0)
+    yield case("parquet of 5 GB of zeros", "run.parquet", zeros, samples)
+    yield case("parquet of 5 GB of text", "run.parquet", columns(5000, note=words), "column note", "found 'xxx")
+    yield case("parquet of 200 MB of text", "run.parquet", plain_text, "unpacks to more than 100 MB")
+    yield case("parquet of 4 GB of lists", "run.parquet", columns(5000, x=lists), "column x", "found list")
+    yield case("parquet of 10 million rows", "run.parquet", columns(10_000_000), samples)
+    yield case("CSV of 10 million rows", "run.csv", lambda p: p.write_bytes(b"time_s,x\n" + b"0,0\n" * 10**7), samples)
+    yield case(
+        "gzip of 300 000 parts", "run.csv.gz", lambda p: p.write_bytes(packed + end * 300_000), "20000 gzipped parts"
+    )
+    yield case("sparse file of 3 GB", "run.csv", sparse(b"", 3 * 10**9), "has 3000 MB, expected at most 2500 MB")
+    yield case("sparse file of 2 GB", "run.csv", sparse(RUN.encode(), 2 * 10**9), f"line {len(LINES) + 1}", "zero byte")
+    yield case("sparse gzip of 2 GB", "run.csv.gz", sparse(packed, 2 * 10**9), "more than 1 MB of zero bytes")
+    yield case("sparse parquet of 3 GB", "run.parquet", sparse(b"PAR1", 3 * 10**9), "cannot be read as a table")
+    yield place("large sparse vehicle of 3 GB", sparse_vehicle, "vehicle.yaml", "expected at most 1 MB")
+    yield place("large for its 3000 runs", many_runs, "has 3001 runs, expected at most 1000")
+
+
+def sparse_vehicle(folder: Path) -> None:
+    """A vehicle.yaml of 3 GB that takes no room."""
+    os.truncate(folder / "vehicle.yaml", 3 * 10**9)
+
+
+def many_runs(folder: Path) -> None:
+    """Three thousand runs more, all the same file."""
+    for number in range(3000):
+        os.link(folder / "run.csv", folder / f"run{number:04}.csv")
+
+
 def all_wrong() -> list[Wrong]:
     """Every wrong set, each with a name of its own."""
-    found = [*vehicles(), *runs(), *contents(), *tables(), *splits(), *places(), *instruments()]
+    groups = (vehicles, runs, contents, tables, splits, places, instruments, large)
+    found = [wrong for group in groups for wrong in group()]
     return [replace(wrong, name=f"{k:03d} {wrong.name}") for k, wrong in enumerate(found, 1)]

@@ -125,11 +125,12 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
         raise InputError(f"{target / 'series.parquet'}: {NO_PARQUET}")
     with progress(None, quiet) as step:
         step(f"reading {folder.name}")
-        # The effects bring a compiler along, whose start takes seconds.
-        from rotorid.mismatch.deliver import analysis_of, write_files
         from rotorid.recordings import read_set
 
         recordings = read_set(folder)
+        # The effects bring a compiler along, whose start takes seconds.
+        from rotorid.mismatch.deliver import analysis_of, write_files
+
     samples = sum(len(run.table) for run in recordings.runs)
     expected = FIXED_S + PER_SAMPLE_S * min(samples, MOST_SAMPLES) if recordings.vehicle.kind == "flight" else None
     files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]

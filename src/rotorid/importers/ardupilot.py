@@ -72,7 +72,8 @@ def parameters(log: Log) -> dict[str, float]:
     table = log.get("PARM")
     if table is None or not {"Name", "Value"} <= set(table):
         return {}
-    return dict(zip(table["Name"], pd.to_numeric(table["Value"], errors="coerce"), strict=True))
+    stated = zip(table["Name"], table["Value"], strict=True)
+    return {name: float(value) for name, value in stated if isinstance(value, int | float) and np.isfinite(value)}
 
 
 def order_of(values: Mapping[str, float]) -> tuple[str, list[Fault]]:

@@ -83,7 +83,8 @@ def _flights(log, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[
         raise InputError(f"{path}: not a blackbox log that can be read ({printable(error)[:150]})") from None
     if len(rows) < 2:
         raise InputError(f"{path}: holds {len(rows)} samples")
-    raw = pd.DataFrame(rows, columns=log.field_names[: len(rows[0])]).apply(pd.to_numeric, errors="coerce")
+    # Flags are words or nothing; every sensor is decoded to numbers.
+    raw = pd.DataFrame(rows, columns=log.field_names[: len(rows[0])]).select_dtypes("number")
     return convert(raw, headers, name, path)
 
 

@@ -14,6 +14,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
+from rotorid.recordings.tables import place, read_csv
 
 GRAM_FORCE_N = 9.80665e-3
 RPM = 2 * np.pi / 60
@@ -23,19 +24,15 @@ SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
 
 def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
     """One bench run in contract columns (kind stand, thrust along -z), and its faults."""
-    try:
-        raw = pd.read_csv(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: file is missing") from None
+    raw = read_csv(Path(path))
     thrust = next((name for name in ("thrust[g]", "weight[g]") if name in raw), None)
     missing = [name for name in ("pwm", "vbat[V]", *SPEEDS) if name not in raw]
     if thrust is None or missing:
         raise InputError(f"{path}, line 1: expected the column {missing[0] if missing else 'thrust[g]'}")
     for name in ("pwm", "vbat[V]", *SPEEDS, thrust):
-        bad = pd.to_numeric(raw[name], errors="coerce").isna()
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            raise InputError(f"{path}, line {row + 2}, column {name}: expected a number, found {raw[name].iloc[row]!r}")
+        if raw[name].isna().any():
+            row = int(np.flatnonzero(raw[name].isna())[0])
+            raise InputError(f"{path}, {place(path, row)}, column {name}: is empty, expected a number")
     columns = {c.TIME: np.arange(len(raw), dtype=float)}
     throttle = raw["pwm"].to_numpy(float) / FULL_SCALE
     columns |= {name: throttle for name in c.rotor_columns("throttle", 4)}

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from rotorid.bounds import LARGEST_FILE
 from rotorid.errors import InputError
 from rotorid.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
 from rotorid.importers.clean import true_stretches
@@ -87,6 +88,8 @@ def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
     """Every flight in a log; InputError in one sentence where the file holds none."""
     path = Path(path)
     kind = format_of(path)
+    if kind != "ros" and (size := path.stat().st_size) > LARGEST_FILE:  # a bag's pictures are not read
+        raise InputError(f"{path}: has {size / 1e6:.0f} MB, expected at most {LARGEST_FILE / 1e6:.0f} MB")
     try:
         with limited(path), silent():
             return _read(path, kind, mapping)

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
-from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
@@ -34,9 +33,9 @@ from rotorid.importers.clean import drop_repeated_times, report_gaps
 from rotorid.importers.frames import continuous
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
-from rotorid.recordings.tables import LARGEST_FILE, NO_PARQUET, parquet_is_here, unpacked
-from rotorid.text_files import check_text, read_bytes, read_yaml
-from rotorid.wording import explain, printable
+from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
+from rotorid.text_files import read_yaml
+from rotorid.wording import explain
 
 G = 9.80665
 UNITS: dict[str, dict[str, float]] = {
@@ -132,21 +131,9 @@ def _near(name: str, names) -> str:
 
 
 def read_columns(path: Path) -> pd.DataFrame:
-    """A CSV or Parquet file as a table of numbers, as it stands; InputError where it is none."""
+    """The cells of a CSV or Parquet file, numbers or text; InputError where it is no table."""
     path = Path(path)
-    try:
-        if path.name.endswith(".parquet"):
-            if not parquet_is_here():
-                raise InputError(f"{path}: {NO_PARQUET}")
-            return pd.read_parquet(path)
-        data = unpacked(path) if path.name.endswith(".gz") else read_bytes(path, LARGEST_FILE)
-        check_text(data, path)
-        table = pd.read_csv(BytesIO(data), skipinitialspace=True, encoding="utf-8-sig", sep=None, engine="python")
-    except (InputError, MemoryError):
-        raise
-    except Exception as error:
-        raise InputError(f"{path}: cannot be read as a table ({printable(error)[:150]})") from None
-    table.columns = [str(n).strip() for n in table.columns]
+    table = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path, foreign=True)
     if len(table.columns) < 2 or len(table) < 2:
         raise InputError(
             f"{path}: expected a table of numbers with a heading, found {len(table.columns)} columns and "
@@ -163,8 +150,7 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
     raw = read_columns(path)
     if mapping is None:
         if c.TIME in raw.columns and sum(c.is_known(n) for n in raw.columns) > 1:
-            table, faults = drop_repeated_times(raw.apply(pd.to_numeric, errors="coerce"))
-            return table, faults + report_gaps(table), "the contract's: the columns have its names"
+            return *_clocked(numbers(raw, path), path), "the contract's: the columns have its names"
         raise InputError(
             f"{path}: the columns ({', '.join(raw.columns[:6])}, …) are not named as the recording contract has them; "
             f"`rotorid import {path.name} --write-mapping mapping.yaml` proposes what each one is"
@@ -210,7 +196,17 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     for name in mapping.keep:
         out[name] = _numbers(raw, (name,), "keep", where)[:, 0]
     out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
-    table, faults = drop_repeated_times(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}))
+    return _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
+
+
+def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[Fault]]:
+    """The rows that move the clock on, and what is wrong with the others; InputError where the clock was set."""
+    known = table[c.TIME].notna().to_numpy()
+    if known.all() and (jumped := clock_jump(table[c.TIME].to_numpy(float), str(where))):
+        raise InputError(jumped)
+    table, faults = drop_repeated_times(table)
+    if len(table) < 2:
+        raise InputError(f"{where}: {c.TIME} moves on in {len(table)} of {len(known)} rows, expected at least two")
     return table, faults + report_gaps(table)
 
 
@@ -218,15 +214,7 @@ def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> np.ndarray
     for name in columns:
         if name not in raw.columns:
             raise InputError(f"{where}: {channel} wants column {name!r}, which is not there{_near(name, raw.columns)}")
-    values = raw[list(columns)].apply(pd.to_numeric, errors="coerce")
-    for name in columns:
-        bad = values[name].isna() & raw[name].notna()
-        if bad.any():
-            row = int(np.flatnonzero(bad)[0])
-            raise InputError(
-                f"{where}, line {row + 2}, column {name}: expected a number, found {raw[name].iloc[row]!r}"
-            )
-    return values.to_numpy(float)
+    return numbers(raw[list(dict.fromkeys(columns))], where)[list(columns)].to_numpy(float)
 
 
 def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -271,10 +259,13 @@ SCALARS: dict[str, tuple[str, ...]] = {
 
 
 def guess(table: pd.DataFrame) -> tuple[Mapping, list[str]]:
-    """A mapping proposed from names and values, and a sentence for each choice that a person must look at."""
-    names = [str(n) for n in table.columns]
+    """A mapping proposed from names and values, and a sentence for each choice that a person must look at.
+
+    A column with a cell that is no number takes no part; the sentence names the cell.
+    """
+    table, doubts = _of_numbers(table)
+    names = list(table.columns)
     channels: dict[str, Channel] = {}
-    doubts: list[str] = []
     taken: set[str] = set()
 
     def add(channel: str, columns: list[str], **more) -> None:
@@ -285,7 +276,7 @@ def guess(table: pd.DataFrame) -> tuple[Mapping, list[str]]:
         for pattern in patterns:
             found = next((n for n in names if n not in taken and re.fullmatch(pattern, n.lower())), None)
             if found:
-                values = pd.to_numeric(table[found], errors="coerce").to_numpy(float)
+                values = table[found].to_numpy(float)
                 add(channel, [found], unit=_scalar_unit(channel, found, values))
                 break
     quaternion = _family(names, taken, (r"q(uat(ernion)?)?",), ("w", "x", "y", "z"))
@@ -297,25 +288,36 @@ def guess(table: pd.DataFrame) -> tuple[Mapping, list[str]]:
         add("attitude", counted, form="wxyz")
         doubts.append("attitude: numbered quaternion taken as scalar first; write form: xyzw if it is last")
     elif all(euler):
-        degrees = any(np.nanmax(np.abs(pd.to_numeric(table[n], errors="coerce"))) > 7 for n in euler)
+        degrees = any(np.nanmax(np.abs(table[n])) > 7 for n in euler)
         add("attitude", euler, form="euler", unit="deg" if degrees else "rad")
     for channel in ("angular_velocity", "specific_force", "velocity", "position"):
         # Bare x, y, z are a position; whatever ends in 1, 2, 3 is not.
         stems = {axes: tuple(p for p in PATTERNS[channel] if p or axes[0] == "x") for axes in AXES3}
         found = next((f for axes in AXES3 if (f := _family(names, taken, stems[axes], axes))), None)
         if found:
-            values = table[found].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+            values = table[found].to_numpy(float)
             add(channel, found, unit=_vector_unit(channel, found, values, doubts))
     for channel in ("rotor_command", "rotor_speed", "throttle"):
         found = _rotors(names, taken, PATTERNS[channel])
         if found:
-            values = table[found].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+            values = table[found].to_numpy(float)
             add(channel, found, **_rotor_unit(channel, values, doubts))
     if "time" not in channels:
         doubts.insert(0, "time: no column recognised, and without one nothing can be imported; add it under channels")
     body, world = _frames(table, channels, doubts)
-    rest = [n for n in names if n not in taken and pd.api.types.is_numeric_dtype(table[n])]
+    rest = [n for n in names if n not in taken]
     return Mapping(body=body, world=world, channels=channels, keep=tuple(rest)), doubts
+
+
+def _of_numbers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+    """The columns that hold numbers alone, and a sentence for each other one."""
+    kept, doubts = {}, []
+    for name in table.columns:
+        try:
+            kept[name] = numbers(table[[name]], "left out")[name]
+        except InputError as error:
+            doubts.append(str(error))
+    return pd.DataFrame(kept), doubts
 
 
 def _plain(name: str) -> str:
@@ -408,7 +410,7 @@ def _frames(table: pd.DataFrame, channels: dict[str, Channel], doubts: list[str]
     if "specific_force" not in channels:
         doubts.append("body and world axes: without an accelerometer nothing tells them; taken as FRD and NED")
         return "frd", "ned"
-    z = pd.to_numeric(table[channels["specific_force"].columns[2]], errors="coerce").median()
+    z = table[channels["specific_force"].columns[2]].median()
     body = "frd" if z < 0 else "flu"
     world = "ned" if body == "frd" else "enu"
     sign = "negative" if z < 0 else "positive"

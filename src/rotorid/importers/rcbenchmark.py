@@ -68,8 +68,12 @@ def read_table(text: str, where: str) -> pd.DataFrame:
             raise InputError(f"{where}, line 1: no column whose heading starts with {start!r}")
     columns: dict[str, list[float]] = {name: [] for name in places}
     for line, row in enumerate(rows[1:], start=2):
+        if len(row) != len(rows[0]):
+            last = line == len(rows) and len(row) < len(rows[0])
+            why = " (the file is cut off: delete its last line)" if last else ""
+            raise InputError(f"{where}, line {line}: has {len(row)} cells, the heading has {len(rows[0])}{why}")
         for name, place in places.items():
-            cell = row[place].strip() if place < len(row) else ""
+            cell = row[place].strip()
             try:
                 columns[name].append(float(cell) if cell else np.nan)
             except ValueError:

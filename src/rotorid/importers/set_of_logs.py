@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping as Names
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from rotorid import templates
+from rotorid.bounds import MOST_RUNS
 from rotorid.errors import InputError
 from rotorid.importers.logfile import TEMPLATES, read_log
 from rotorid.importers.mapping import Mapping
 from rotorid.importers.obtain import sha256
 from rotorid.importers.propose import propose
 from rotorid.importers.report import Fault, ImportReport
-from rotorid.recordings import read_vehicle
-from rotorid.recordings.tables import parquet_is_here, write_table
+from rotorid.recordings import Run, read_vehicle
+from rotorid.recordings.files import usable_runs
+from rotorid.recordings.tables import check_table, parquet_is_here, write_table
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,8 @@ def set_of_logs(
         A log cannot be read or holds no flight; the logs do not belong together; nothing tells what vehicle it is;
         `there` exists and would change.
     """
+    if len(logs) > MOST_RUNS:
+        raise InputError(f"{len(logs)} logs were given, expected at most {MOST_RUNS}; make several sets of them")
     found = [read_log(path, mapping) for path in logs]
     kinds = {f.kind for f in found}
     if len(kinds) > 1:
@@ -110,6 +115,8 @@ def set_of_logs(
             if run in runs:
                 raise InputError(f"{path}: another log has a run called {run}, too; rename one of the files")
             runs[run] = table
+    usable, left_out = usable_runs((partial(_checked, run, table) for run, table in runs.items()), logs[0].name)
+    runs = {run.name: run.table for run in usable}
     remarks: tuple[str, ...] = ()
     kept = False
     if vehicle_file is not None:
@@ -135,9 +142,13 @@ def set_of_logs(
         name,
         runs,
         text,
-        remarks,
+        (*remarks, *left_out),
         tuple(dict.fromkeys(f for i in found for f in i.faults)),
         found[0].axes,
         {path.name: sha256(path) for path in logs},
         kept,
     )
+
+
+def _checked(name: str, table: pd.DataFrame) -> Run:
+    return Run(name, check_table(table, f"run {name}"))

@@ -104,7 +104,7 @@ def table(rows: list[Row]) -> pd.DataFrame:
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
     """Shares over the sets that were open, with 95 % intervals (Wilson), and how many they are of."""
     sigmas = ["predicted_sigma", "predicted_low", "predicted_high", "measured_sigma", "standard_sigma"]
-    rows = rows.assign(**{name: pd.to_numeric(rows[name], errors="coerce") for name in sigmas})
+    rows = rows.assign(**{name: rows[name].replace("", np.nan).astype(float) for name in sigmas})
     asked = rows[rows["open"].fillna("") != ""]
     planned = asked[asked["outcome"] != "no plan"]
     both = asked.dropna(subset=["predicted_sigma", "measured_sigma"])

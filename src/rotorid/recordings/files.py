@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import yaml
 from pydantic import ValidationError
 
+from rotorid.bounds import MOST_CELLS, MOST_RUNS
 from rotorid.errors import InputError
 from rotorid.names import hint
 from rotorid.recordings import columns as c
@@ -15,7 +18,7 @@ from rotorid.recordings.belief import check_belief
 from rotorid.recordings.proposed import proposed_in
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import (
-    TooFewSamples,
+    UnusableRun,
     check_table,
     parquet_is_here,
     read_csv,
@@ -23,7 +26,7 @@ from rotorid.recordings.tables import (
     write_table,
 )
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.text_files import check_file, read_yaml, with_exponents
+from rotorid.text_files import check_file, read_text, read_yaml, with_exponents
 from rotorid.wording import explain, printable
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
@@ -109,6 +112,8 @@ def run_paths(folder: Path) -> list[Path]:
             paths.append(path)
         elif run_name(Path(path.name.lower())):
             raise InputError(f"{path}: expected its ending in small letters ({', '.join(RUN_SUFFIXES)})")
+    if len(paths) > MOST_RUNS:
+        raise InputError(f"{folder}: has {len(paths)} runs, expected at most {MOST_RUNS}; make several sets of them")
     if not paths:
         raise InputError(f"{folder}: no run found, expected files ending in {', '.join(RUN_SUFFIXES)}")
     paths.sort(key=lambda p: run_name(p))
@@ -154,6 +159,29 @@ def check_rotors(run: Run, vehicle: Vehicle) -> None:
         raise InputError(f"{run.path or run.name}, column {column}: {VEHICLE} lists {vehicle.rotor_count} rotors only")
 
 
+def usable_runs(readers: Iterable[Callable[[], Run]], where: object) -> tuple[tuple[Run, ...], tuple[str, ...]]:
+    """The runs that can be used, and one sentence for each that cannot.
+
+    Raises
+    ------
+    InputError
+        A run is no table, none can be used, or together they are larger than any recording; `where` names the set.
+    """
+    runs: list[Run] = []
+    left_out: list[UnusableRun] = []
+    for read in readers:
+        try:
+            runs.append(read())
+        except UnusableRun as error:
+            left_out.append(error)
+        cells = sum(run.table.size for run in runs)
+        if cells > MOST_CELLS:
+            raise InputError(f"{where}: {len(runs)} of its runs have {cells} cells, expected at most {MOST_CELLS}")
+    if not runs:
+        raise left_out[-1]
+    return tuple(runs), tuple(f"Left out: {error}." for error in left_out)
+
+
 def read_set(folder: Path) -> RecordingSet:
     """Read a recording set; InputError in one sentence if anything in it does not fit the contract."""
     folder = Path(folder)
@@ -164,14 +192,7 @@ def read_set(folder: Path) -> RecordingSet:
     vehicle = read_vehicle(folder / VEHICLE)
     check_belief(vehicle, str(folder / VEHICLE))
     paths = run_paths(folder)
-    runs, left_out = [], []
-    for path in paths:
-        try:
-            runs.append(read_run(path))
-        except TooFewSamples as error:
-            left_out.append(f"Left out: {error}.")
-            if len(left_out) == len(paths):
-                raise
+    runs, left_out = usable_runs((partial(read_run, path) for path in paths), folder)
     for run in runs:
         check_rotors(run, vehicle)
     held_out = None
@@ -180,8 +201,8 @@ def read_set(folder: Path) -> RecordingSet:
         held_out = read_split(split, [run_name(p) for p in paths])
     elif near := _misnamed(split):
         raise InputError(f"{folder / near}: expected the name {SPLIT}")
-    proposed = proposed_in((folder / VEHICLE).read_text(encoding="utf-8"))
-    return RecordingSet(folder.name, vehicle, tuple(runs), held_out, str(folder), tuple(left_out), proposed)
+    proposed = proposed_in(read_text(folder / VEHICLE))
+    return RecordingSet(folder.name, vehicle, runs, held_out, str(folder), left_out, proposed)
 
 
 def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:

@@ -15,7 +15,7 @@ from rotorid.errors import InputError
 from rotorid.names import listed, nearest, plain
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.tables import place
+from rotorid.recordings.tables import clock_jump, place
 from rotorid.recordings.vehicle import Vehicle
 
 LEAST_FLIGHT_HZ = 2.0
@@ -31,8 +31,6 @@ LEAST_READINGS = 10
 """Readings of a stand or a bench that are there in every compared channel at once, in a run."""
 HOLE_PERIODS = 6.0
 """Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
-MOST_GRID, MOST_HOLES = 500_000, 20
-"""A run is resampled to an even grid: larger ones may be so many times as long as the samples that are there."""
 LEAST_VALUES = 4
 """Complete readings from which a sensor counts as recorded."""
 LARGEST = {
@@ -257,14 +255,9 @@ def no_attitude(run: Run, vehicle: Vehicle) -> str | None:
 
 def uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
     """A clock that jumps so far, or counts in such a unit, that no even grid can hold the run."""
-    steps = np.diff(run.time_s)
-    median, span = float(np.median(steps)), float(run.time_s[-1] - run.time_s[0])
-    jump = int(np.argmax(steps))
-    if span / median > max(MOST_GRID, MOST_HOLES * len(steps)):
-        return (
-            f"{whereof(run)}, {place(run.path, jump + 1)}: {c.TIME} jumps by {steps[jump]:.6g} s where its usual step "
-            f"is {median:.3g} s, expected one clock throughout (parts that are so far apart are runs of their own)"
-        )
+    if jumped := clock_jump(run.time_s, whereof(run)):
+        return jumped
+    median = float(np.median(np.diff(run.time_s)))
     if vehicle.kind == "flight" and median * LEAST_FLIGHT_HZ > 1:
         unit = next((u for factor, u in ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
                      if 1e-4 < median / factor < 0.2), None)  # fmt: skip

@@ -1,0 +1,238 @@
+"""The text of a CSV file, plain or gzipped, looked through in blocks: it never stands in the memory as a whole.
+
+What is no table (other text, another encoding, a line with a cell too many, a file cut off, a bomb) is refused with its
+line before anything is made of it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import zlib
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from rotorid.bounds import LARGEST_FILE, LEAST_UNPACKED, MOST_CELLS, MOST_GZIP_MEMBERS, MOST_ROWS, MOST_UNPACKED
+from rotorid.errors import InputError
+from rotorid.text_files import check_file, check_text
+from rotorid.wording import printable
+
+BLOCK = 1 << 20
+PACKED_BLOCK = 1 << 16
+"""Bytes taken from a gzipped file at once: what is left of them is copied for each of its parts."""
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+DECIMAL_COMMAS = 1.5
+"""A line with so many times the cells of its heading has commas in its numbers."""
+
+
+class _Content(io.RawIOBase):
+    """Blocks of bytes as a file that can be read."""
+
+    def __init__(self, parts: Iterator[bytes]) -> None:
+        super().__init__()
+        self._parts, self._rest = parts, b""
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer) -> int:
+        self._rest = self._rest or next(self._parts, b"")
+        count = min(len(buffer), len(self._rest))
+        buffer[:count], self._rest = self._rest[:count], self._rest[count:]
+        return count
+
+
+def opened(path: Path) -> io.BufferedReader:
+    """The file's unpacked content, to be read once `look_through` has found it sound."""
+    return io.BufferedReader(_Content(blocks(path)), BLOCK)
+
+
+def look_through(path: Path, foreign: bool = False) -> tuple[list[str], str]:
+    """Names of the columns and the sign between them.
+
+    `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
+    blanks as well, and one without a name is called by its number (`column_3`).
+
+    Raises
+    ------
+    InputError
+        The file is no table, has a line with more or fewer cells than its heading, or is too large.
+    """
+    heading, separator, quoted, line = [], ",", False, 1
+    for line, text in _whole_lines(path):
+        check_text(text, path, line)
+        check_size(line - 2, len(heading), path)
+        if not heading and text.strip():
+            heading, separator = _heading(text, path, foreign)
+        quoted = quoted or b'"' in text
+        if heading and not quoted:
+            _check_cells(text, line, len(heading), separator, path)
+    if not heading:
+        raise InputError(f"{path}: is empty, expected a line of column names and samples below")
+    if quoted:
+        _check_quoted(path, len(heading), separator)
+    return heading, separator
+
+
+def check_size(rows: int, columns: int, where: object) -> None:
+    """InputError where a table is larger than any recording."""
+    for found, most, what in ((rows, MOST_ROWS, "samples"), (rows * columns, MOST_CELLS, "cells")):
+        if found > most:
+            raise InputError(f"{where}: has more than {most} {what}, expected at most that; cut it into several runs")
+
+
+def blocks(path: Path) -> Iterator[bytes]:
+    """The file's content, unpacked, block by block; InputError where it is too large or no whole gzip file."""
+    size = check_file(path)
+    if size > LARGEST_FILE:
+        raise InputError(f"{path}: has {size / 1e6:.0f} MB, expected at most {LARGEST_FILE / 1e6:.0f} MB")
+    try:
+        with open(path, "rb") as file:
+            if path.name.endswith(".gz"):
+                yield from _unpacked(iter(partial(file.read, PACKED_BLOCK), b""), size, path)
+            else:
+                yield from iter(partial(file.read, BLOCK), b"")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _unpacked(packed_blocks: Iterator[bytes], size: int, path: Path) -> Iterator[bytes]:
+    """Content of gzipped parts, one behind the other, with zero bytes between them or behind."""
+    if not size:
+        raise InputError(f"{path}: is empty, expected a gzipped table")
+    most = min(LARGEST_FILE, max(LEAST_UNPACKED, MOST_UNPACKED * size))
+    unpacker, total, members, padding = zlib.decompressobj(wbits=31), 0, 1, 0
+    try:
+        for packed in packed_blocks:
+            full = False
+            while packed or full:
+                if unpacker.eof:
+                    padding += len(packed) - len(packed := packed.lstrip(b"\0"))
+                    if padding > BLOCK:
+                        raise InputError(f"{path}: has more than {BLOCK / 1e6:.0f} MB of zero bytes behind its content")
+                    if not packed:
+                        break
+                    unpacker, members = zlib.decompressobj(wbits=31), members + 1
+                    if members > MOST_GZIP_MEMBERS:
+                        raise InputError(f"{path}: has more than {MOST_GZIP_MEMBERS} gzipped parts, expected one")
+                part = unpacker.decompress(packed, BLOCK)
+                total += len(part)
+                if total > most:
+                    raise InputError(f"{path}: unpacks to more than {most / 1e6:.0f} MB, far more than a log does")
+                if part:
+                    yield part
+                full = len(part) == BLOCK
+                packed = unpacker.unused_data if unpacker.eof else unpacker.unconsumed_tail
+    except zlib.error as error:
+        raise InputError(f"{path}: is no whole gzip file ({error})") from None
+    if not unpacker.eof:
+        raise InputError(f"{path}: its gzip stream is cut off")
+
+
+def _whole_lines(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Parts of the text that end where a line ends, each with the number of its first line, counted from 1."""
+    line, rest, end_of_line = 1, b"", b""
+    for number, block in enumerate(blocks(path)):
+        text = rest + (block.removeprefix(BYTE_ORDER_MARK) if number == 0 else block)
+        end_of_line = end_of_line or next((sign for sign in (b"\n", b"\r") if sign in text), b"")
+        stop = text.rfind(end_of_line) + 1 if end_of_line else 0
+        if stop:
+            yield line, text[:stop]
+            line += text.count(end_of_line, 0, stop)
+        rest = text[stop:]
+        if len(rest) > BLOCK:
+            if (zero := rest.find(b"\0")) >= 0:
+                check_text(rest[: zero + 2000], path, line)
+            expected = "column names" if line == 1 else "a row of numbers"
+            raise InputError(f"{path}, line {line}: is longer than {BLOCK / 1e6:.0f} MB, expected {expected}")
+    if rest:
+        yield line, rest
+
+
+def _heading(text: bytes, path: Path, foreign: bool) -> tuple[list[str], str]:
+    """Names of the columns, from the first line that is not blank, and the sign between them."""
+    first = text.lstrip(b"\r\n").splitlines()[0].decode("utf-8")
+    widths = {sign: len(_names(first, sign)) for sign in SEPARATORS}
+    separator = max(widths, key=widths.get)
+    if not foreign:
+        if separator != "," and widths[","] == 1:
+            raise InputError(
+                f"{path}, line 1: columns are separated by {SEPARATORS[separator]}, expected commas (and decimal "
+                "points)"
+            )
+        separator = ","
+    elif widths[separator] == 1:
+        separator = " "
+    names = _names(first, separator)
+    if foreign:
+        names = [name or f"column_{number}" for number, name in enumerate(names, 1)]
+    check_heading(names, path)
+    return names, separator
+
+
+def _names(line: str, separator: str) -> list[str]:
+    return [name.strip() for name in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+def check_heading(names: list[str], path: Path) -> None:
+    """InputError where a column has no name or one that is there twice, or where the names are numbers."""
+    seen: set[str] = set()
+    for number, name in enumerate(names, 1):
+        if not name:
+            raise InputError(f"{path}, line 1: column {number} has no name")
+        if not name.isprintable():
+            raise InputError(
+                f"{path}, line 1: the name of column {number} holds a control character ({printable(name)})"
+            )
+        if name in seen:
+            raise InputError(f"{path}, line 1: column {name} is there twice")
+        seen.add(name)
+    if all(_is_number(name) for name in names):
+        raise InputError(f"{path}, line 1: expected the names of the columns, found numbers")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _check_cells(text: bytes, first_line: int, count: int, separator: str, path: Path) -> None:
+    """InputError where a line has not as many cells as the heading."""
+    array = np.frombuffer(text, np.uint8)
+    ends = np.flatnonzero(array == ord("\n" if b"\n" in text else "\r"))
+    starts = np.concatenate([[0], ends + 1])
+    ends = np.concatenate([ends, [len(array)]])
+    signs = np.flatnonzero(array == ord(separator))
+    cells = np.searchsorted(signs, ends) - np.searchsorted(signs, starts) + 1
+    for k in np.flatnonzero(cells != count):
+        if text[starts[k] : ends[k]].strip():
+            last = ends[k] == len(text)
+            raise InputError(_wrong_cells(path, first_line + int(k), int(cells[k]), count, last))
+
+
+def _check_quoted(path: Path, count: int, separator: str) -> None:
+    """The same where some cells stand in quotes."""
+    with io.TextIOWrapper(opened(path), "utf-8-sig", newline="") as text:
+        reader = csv.reader(text, delimiter=separator, skipinitialspace=True)
+        try:
+            for row in reader:
+                if row and len(row) != count:
+                    raise InputError(_wrong_cells(path, reader.line_num, len(row), count, last=False))
+        except csv.Error as error:
+            raise InputError(f"{path}, line {reader.line_num}: cannot be read as a table ({error})") from None
+
+
+def _wrong_cells(path: Path, line: int, found: int, count: int, last: bool) -> str:
+    why = ""
+    if last and found < count:
+        why = " (the file is cut off: delete its last line)"
+    elif found > DECIMAL_COMMAS * count:
+        why = " (are decimals written with commas? expected points)"
+    return f"{path}, line {line}: has {found} cell{'s' * (found != 1)}, the heading has {count}{why}"
