@@ -6,6 +6,7 @@ import glob
 import math
 import os
 import platform
+import shutil
 import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -57,15 +58,49 @@ def all_or_none(*paths: Path, optional: Collection[Path] = ()) -> Iterator[tuple
             part.unlink(missing_ok=True)
 
 
+@contextmanager
+def staging(path: Path) -> Iterator[Path]:
+    """An empty folder next to `path`, to write files in that are to take their names later; gone when the block ends.
+
+    What a process that was killed left there is swept away by the next that writes the same path.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _sweep(path)
+    part = path.with_name(f".{path.name}.{_HOST}-{os.getpid()}.part")
+    part.mkdir()
+    try:
+        yield part
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def take_name(part: Path, folder: Path) -> None:
+    """Give a staged folder its name in one step, once all its files are on the disk; OSError where one is there."""
+    for path in part.iterdir():
+        _to_disk(path)
+    _to_disk(part)
+    os.rename(part, folder)
+    _to_disk(folder.parent)
+
+
+def take_place(part: Path, path: Path) -> None:
+    """Put a staged file in the place of `path` in one step, once its content is on the disk."""
+    _to_disk(part)
+    os.replace(part, path)
+    _to_disk(path.parent)
+
+
 def _sweep(path: Path) -> None:
-    """Remove parts of a file whose writer is gone: of this computer by its process, of another after a day."""
+    """Remove parts of a file or folder whose writer is gone: of this computer by its process, else after a day."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         host, _, process = part.name.removesuffix(".part").rpartition(".")[2].rpartition("-")
         try:
             gone = _dead(process) if host in (_HOST, "") else time.time() - part.stat().st_mtime > FORGOTTEN_S
         except FileNotFoundError:
             continue
-        if gone:
+        if gone and part.is_dir():
+            shutil.rmtree(part, ignore_errors=True)
+        elif gone:
             part.unlink(missing_ok=True)
 
 

@@ -3,7 +3,7 @@
 
 def own_sets():
     """Names of the sets in the recordings folder: the folders with a vehicle file."""
-    return sorted(path.parent.name for path in Path(CONFIG.recordings).glob("*/vehicle.yaml"))
+    return sorted(path.parent.name for path in Path(CONFIG.recordings).glob("[!.]*/vehicle.yaml"))
 
 
 def folders_to_check(wildcards):

@@ -13,7 +13,7 @@ FLEET_MEMORY = "cache/fleet"
 
 def fleet_sets():
     """Names of the sets of the folder, sorted."""
-    return sorted(path.parent.name for path in Path(CONFIG.recordings).glob("*/vehicle.yaml"))
+    return sorted(path.parent.name for path in Path(CONFIG.recordings).glob("[!.]*/vehicle.yaml"))
 
 
 def fleet_batches():

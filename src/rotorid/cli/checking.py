@@ -14,6 +14,9 @@ from rotorid.cli.console import INTERRUPTED, one_sentence
 def check(
     folder: Annotated[Path, typer.Argument(help="A recording set, or a folder of sets.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")] = False,
+    renew: Annotated[
+        bool, typer.Option("--renew", help="List the runs anew in manifest.json, after runs were changed by hand.")
+    ] = False,
 ) -> None:
     """Say what a recording set contains, its rates and gaps, what it lacks and what cannot be right.
 
@@ -21,6 +24,8 @@ def check(
     """
     from rotorid.recordings import list_sets
     from rotorid.recordings.check import as_text, check_folder
+    from rotorid.recordings.files import run_paths
+    from rotorid.recordings.manifest import write_manifest
 
     is_set = (folder / "vehicle.yaml").is_file()
     folders = [folder] if is_set else [folder / name for name in list_sets(folder)] or [folder]
@@ -29,6 +34,8 @@ def check(
     for number, path in enumerate(folders):
         try:
             with one_sentence():
+                if renew:
+                    write_manifest(path, run_paths(path))
                 result = check_folder(path)
         except typer.Exit as end:
             if end.exit_code == INTERRUPTED:

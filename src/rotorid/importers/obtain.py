@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rotorid.errors import InputError
+from rotorid.recordings.manifest import sha256
 
 RAW_FILES = "https://raw.githubusercontent.com"
 TIMEOUT_S = 20.0
@@ -30,12 +31,6 @@ class Obtained:
     @property
     def complete(self) -> bool:
         return not self.missing
-
-
-def sha256(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def address(source: dict, file: dict, base: str = RAW_FILES) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 
@@ -45,6 +45,18 @@ class ImportReport:
     axes: str = ""
     faults: tuple[Fault, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def after(self, earlier: dict) -> ImportReport:
+        """The report of a set that holds what was imported now and, as its earlier report says, before."""
+        faults = tuple(Fault(**{f.name: fault[f.name] for f in fields(Fault)}) for fault in earlier["faults"])
+        files = {**earlier["files"], **self.files}
+        return replace(
+            self,
+            source=", ".join(files),
+            files=files,
+            faults=tuple(dict.fromkeys((*faults, *self.faults))),
+            notes=tuple(dict.fromkeys((*earlier["notes"], *self.notes))),
+        )
 
     def write(self, folder: Path) -> Path:
         """Write `import_report.json` into a set's folder, the same bytes for the same content."""

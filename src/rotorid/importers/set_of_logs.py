@@ -13,14 +13,16 @@ import pandas as pd
 from rotorid import templates
 from rotorid.bounds import MOST_RUNS
 from rotorid.errors import InputError
+from rotorid.importers.adding import add_to_set
 from rotorid.importers.logfile import TEMPLATES, read_log
 from rotorid.importers.mapping import Mapping
-from rotorid.importers.obtain import sha256
 from rotorid.importers.propose import propose
 from rotorid.importers.report import Fault, ImportReport
 from rotorid.recordings import Run, read_vehicle
-from rotorid.recordings.files import usable_runs
+from rotorid.recordings.files import VEHICLE, usable_runs
+from rotorid.recordings.manifest import sha256, write_manifest
 from rotorid.recordings.tables import check_table, parquet_is_here, write_table
+from rotorid.writing import staging, take_name
 
 
 @dataclass(frozen=True)
@@ -48,18 +50,45 @@ class SetOfLogs:
         return tuple(fault.sentence for fault in self.faults)
 
     def write(self, folder: Path, as_csv: bool = False) -> None:
-        """Write `vehicle.yaml` (unless it was there and is kept), a file a run, and `import_report.json`.
+        """Write `vehicle.yaml` (unless it was there and is kept), a file a run, a report and the list of the runs.
 
-        Runs are Parquet files; plain CSV where wished, and .csv.gz where pyarrow is not installed.
+        All of it or nothing: it is written aside and takes its name in one step. A set that is there already gets the
+        new runs beside its own; until all are there its list says that it is not whole. Runs are Parquet files; plain
+        CSV where wished, and .csv.gz where pyarrow is not installed.
+
+        Raises
+        ------
+        InputError
+            Something that is there already would change.
+        OSError
+            The disk is full or cannot be written.
         """
+        report = self._report(folder.name)
+        if folder.is_dir():
+            with staging(folder / "import") as part:
+                add_to_set(self._write_files(part, as_csv), report, folder)
+        else:
+            with staging(folder) as part:
+                files = self._write_files(part, as_csv)
+                write_manifest(part, [path for path in files if path.name != VEHICLE])
+                report.write(part)
+                take_name(part, folder)
+
+    def _write_files(self, folder: Path, as_csv: bool) -> list[Path]:
+        """Write the vehicle, unless it is kept, and the runs; returns their files."""
         suffix = ".csv" if as_csv else ".parquet" if parquet_is_here() else ".csv.gz"
-        folder.mkdir(parents=True, exist_ok=True)
+        paths = []
         if not self.kept_vehicle:
-            (folder / "vehicle.yaml").write_text(self.vehicle_text, encoding="utf-8")
+            paths.append(folder / VEHICLE)
+            paths[-1].write_text(self.vehicle_text, encoding="utf-8")
         for name, table in self.runs.items():
-            write_table(table, folder / f"{name}{suffix}")
-        ImportReport(
-            folder.name,
+            paths.append(folder / f"{name}{suffix}")
+            write_table(table, paths[-1])
+        return paths
+
+    def _report(self, name: str) -> ImportReport:
+        return ImportReport(
+            name,
             True,
             source=", ".join(self.files),
             licence="",
@@ -68,7 +97,7 @@ class SetOfLogs:
             axes=self.axes,
             faults=self.faults,
             notes=self.remarks,
-        ).write(folder)
+        )
 
 
 def set_of_logs(

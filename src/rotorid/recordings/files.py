@@ -15,6 +15,7 @@ from rotorid.errors import InputError
 from rotorid.names import hint
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import check_belief
+from rotorid.recordings.manifest import check_manifest
 from rotorid.recordings.proposed import proposed_in
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import (
@@ -28,6 +29,7 @@ from rotorid.recordings.tables import (
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.text_files import check_file, read_text, read_yaml, with_exponents
 from rotorid.wording import explain, printable
+from rotorid.writing import staging, take_name
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
@@ -99,7 +101,15 @@ def read_run(path: Path) -> Run:
 
 
 def run_paths(folder: Path) -> list[Path]:
-    """Files of the runs of a set, in the order of the runs' names; InputError for a name that cannot be one."""
+    """Files of the runs of a set, in the order of their names; InputError where there is none, or as `run_files`."""
+    paths = run_files(folder)
+    if not paths:
+        raise InputError(f"{folder}: no run found, expected files ending in {', '.join(RUN_SUFFIXES)}")
+    return paths
+
+
+def run_files(folder: Path) -> list[Path]:
+    """The same of a folder that may have none; InputError for a name that cannot be a run's, and for too many runs."""
     paths = []
     for path in sorted(folder.iterdir()):
         if path.name.startswith("."):  # what systems and editors leave behind
@@ -114,8 +124,6 @@ def run_paths(folder: Path) -> list[Path]:
             raise InputError(f"{path}: expected its ending in small letters ({', '.join(RUN_SUFFIXES)})")
     if len(paths) > MOST_RUNS:
         raise InputError(f"{folder}: has {len(paths)} runs, expected at most {MOST_RUNS}; make several sets of them")
-    if not paths:
-        raise InputError(f"{folder}: no run found, expected files ending in {', '.join(RUN_SUFFIXES)}")
     paths.sort(key=lambda p: run_name(p))
     for first, second in zip(paths, paths[1:], strict=False):
         if run_name(first) == run_name(second):
@@ -192,6 +200,7 @@ def read_set(folder: Path) -> RecordingSet:
     vehicle = read_vehicle(folder / VEHICLE)
     check_belief(vehicle, str(folder / VEHICLE))
     paths = run_paths(folder)
+    check_manifest(folder, paths)
     runs, left_out = usable_runs((partial(read_run, path) for path in paths), folder)
     for run in runs:
         check_rotors(run, vehicle)
@@ -206,24 +215,32 @@ def read_set(folder: Path) -> RecordingSet:
 
 
 def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:
-    """Write a set below `parent`; returns its folder.
+    """Write a set below `parent`, all of it or nothing where its folder is new; returns the folder.
 
     `suffix` is one of RUN_SUFFIXES, by default .parquet, and .csv.gz where pyarrow is not installed.
     """
     suffix = suffix or (".parquet" if parquet_is_here() else ".csv.gz")
     folder = Path(parent) / recordings.name
-    folder.mkdir(parents=True, exist_ok=True)
-    write_vehicle(recordings.vehicle, folder / "vehicle.yaml")
-    for run in recordings.runs:
-        write_table(run.table, folder / f"{run.name}{suffix}")
-    if recordings.held_out is not None:
-        (folder / "split.yaml").write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
+    if folder.is_dir():
+        _write_files(recordings, folder, suffix)
+    else:
+        with staging(folder) as part:
+            _write_files(recordings, part, suffix)
+            take_name(part, folder)
     return folder
 
 
+def _write_files(recordings: RecordingSet, folder: Path, suffix: str) -> None:
+    write_vehicle(recordings.vehicle, folder / VEHICLE)
+    for run in recordings.runs:
+        write_table(run.table, folder / f"{run.name}{suffix}")
+    if recordings.held_out is not None:
+        (folder / SPLIT).write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
+
+
 def list_sets(parent: Path) -> list[str]:
-    """Names of the recording sets below a folder, sorted."""
+    """Names of the recording sets below a folder, sorted; a hidden one is what a writer that was killed left behind."""
     parent = Path(parent)
     if not parent.is_dir():
         return []
-    return sorted(p.name for p in parent.iterdir() if (p / "vehicle.yaml").is_file())
+    return sorted(p.name for p in parent.iterdir() if (p / VEHICLE).is_file() and not p.name.startswith("."))
