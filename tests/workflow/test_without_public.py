@@ -1,0 +1,39 @@
+"""The report on a machine that reaches no public recording and no network: it is built, and says what was left out."""
+
+import re
+from pathlib import Path
+
+import pytest
+from copied_project import Project
+
+NOWHERE = "http://127.0.0.1:9"
+"""A proxy that refuses every connection."""
+SETTINGS = ("--configfile", "tests/configs/small.yaml", "tests/configs/without_public.yaml")
+SAID = {
+    "public_recordings": "Of 6 sources 0 could be obtained for this report. What was left out, and why:",
+    "rotor_coefficients": "which could not be obtained: ",
+    "neurobem": "which could not be obtained:",
+    "mismatch": "a piece of real flights, was left out: ",
+}
+
+
+@pytest.mark.slow
+def test_the_report_is_built_and_says_what_was_left_out(
+    project: Project, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    monkeypatch.setenv("ROTORID_PUBLIC_DATA", str(empty))
+    for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"):
+        monkeypatch.setenv(name, NOWHERE)
+    project.snakemake(*SETTINGS)
+    report = project.root / "results" / "report"
+    assert (report / "report.pdf").is_file() and (report / "report.html").is_file()
+    for chapter, said in SAID.items():
+        text = (report / "chapters" / f"{chapter}.md").read_text()
+        assert said in text and f"{empty}/" in text.replace("\\", "")
+        for line, after in zip(text.splitlines(), [*text.splitlines()[1:], ""], strict=True):
+            assert after.startswith("|") or not re.match(r"\|[ :|-]+\|$", line), f"{chapter}: a table without rows"
+        for figure in re.findall(r"\]\((results/\S+\.svg)\)", text):
+            # A placeholder is a sentence on axes that are not drawn.
+            assert "matplotlib.axis_1" in (project.root / figure).read_text(), f"{chapter}: {figure} shows nothing"
