@@ -39,7 +39,9 @@ def say_refusals():
 
 try:
     for configured in workflow.configfiles:
-        read_yaml(Path(configured))  # Snakemake's own reader takes 0652 for 426 and the last of two equal keys
+        read_yaml(
+            Path(configured)
+        )  # Snakemake's own reader takes 0652 for 426 and the last of two equal keys
     CONFIG = check(config)
 except InputError as error:
     refuse(error)
