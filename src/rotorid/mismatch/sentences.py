@@ -66,7 +66,8 @@ def first_words(text: str, most: int = MOST_WORDS) -> str:
         return text
     short = " ".join(words[:most])
     ends = [short.rfind(mark) for mark in (";", ":", ",")]
-    return short[: max(ends)] if max(ends) > 0 else short
+    short = short[: max(ends)] if max(ends) > 0 else short
+    return f"{short}." if text.endswith(".") else short
 
 
 def headline(told: Told) -> str:
@@ -322,7 +323,8 @@ def _left_out(finding: Finding, share: float | None) -> str:
     numbers = f" ({parameters}{carries})" if parameters else f" ({carries[2:]})" if carries else ""
     if _concerns_the_recording(finding):
         return f"{named}: {sentence}{numbers}."
-    return f"{named} was left out{f': {sentence}' if sentence else ''}{numbers}."
+    kept_out = f" It is not delivered: {finding.withheld}." if finding.withheld else ""
+    return f"{named} was left out{f': {sentence}' if sentence else ''}{numbers}.{kept_out}"
 
 
 def _either(finding: Finding, analysis: Analysis) -> str:
