@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorid.cli.console import one_sentence
 from rotorid.errors import InputError
+
+if TYPE_CHECKING:
+    from rotorid.recordings import Vehicle
 
 
 def simulate(
@@ -27,22 +31,31 @@ def simulate(
     Example: `rotorid simulate flights-verdict/improved_vehicle.yaml -o simulated`
     """
     with one_sentence():
-        from rotorid.control.swings import remarks
         from rotorid.recordings import read_vehicle
 
         vehicle = read_vehicle(vehicle_file)
         folder = out or Path(f"{vehicle_file.resolve().parent.name}-simulated")
         if (folder / "vehicle.yaml").exists():
             raise InputError(f"{folder / 'vehicle.yaml'} is there already; choose another folder with -o")
-        for sentence in remarks(vehicle):
-            typer.echo(f"  - {sentence}")
-        written = fly(vehicle, folder, seconds, flights, seed)
+        written = fly(vehicle, folder, seconds, flights, seed, lambda sentence: typer.echo(f"  - {sentence}"))
         typer.echo(f"{written}: {flights} flights of {seconds:g} s. Next: `rotorid verdict {written}`")
 
 
-def fly(vehicle, folder: Path, seconds: float, flights: int, seed: int) -> Path:
-    """Write `flights` simulated flights of a vehicle as the set `folder`."""
-    from rotorid.control.swings import swings
+def fly(
+    vehicle: Vehicle,
+    folder: Path,
+    seconds: float,
+    flights: int,
+    seed: int,
+    say: Callable[[str], None] = lambda sentence: None,
+) -> Path:
+    """Write `flights` simulated flights of a vehicle as the set `folder`; `say` takes what a reader must know."""
+    from rotorid.control.swings import remarks, swings, turned_over
     from rotorid.recordings import write_set
 
-    return write_set(swings(vehicle, folder.name, seconds, flights, seed), folder.parent)
+    for sentence in remarks(vehicle):
+        say(sentence)
+    flown = swings(vehicle, folder.name, seconds, flights, seed)
+    for sentence in turned_over(flown):
+        say(sentence)
+    return write_set(flown, folder.parent)

@@ -13,6 +13,7 @@ from rotorid.control.references import AttitudeReference
 from rotorid.effects.contract import DELAY, LAG
 from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import columns as c
 from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import hover
 from rotorid.vehicle.improved import active_speed_forms, command_path, record_as_stated, simulate_as_stated
@@ -79,6 +80,18 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
         believed = made.vehicle
         runs += made.runs
     return RecordingSet(name, believed, tuple(runs))
+
+
+def turned_over(recordings: RecordingSet) -> tuple[str, ...]:
+    """A sentence where a vehicle that nothing held upright turned over, by the attitude that was recorded."""
+    names = []
+    for run in recordings.runs:
+        _, x, y, _ = run.array(c.QUATERNION).T
+        if (2 * (x**2 + y**2) > 1.0).any():  # 1 − 2 (x² + y²) is the cosine of the tilt
+            names.append(run.name)
+    return (
+        (f"The vehicle turned over in {', '.join(names)}: its attitude controller does not hold it.",) if names else ()
+    )
 
 
 def lateness_s(vehicle: Vehicle) -> float:

@@ -377,6 +377,7 @@ def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_error
 def fly(
     body,
     start,
+    first_s,
     steps,
     step_s,
     every,
@@ -404,7 +405,7 @@ def fly(
     accelerations_out,
     commands_out,
 ):
-    """Fly n vehicles over `steps` steps of `step_s`; arrays with a first axis of 1 hold for all vehicles.
+    """Fly n vehicles from `first_s` over `steps` steps of `step_s`; arrays with a first axis of 1 hold for all of them.
 
     `body` (n,) BODY; `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
     `closed` whether `loops` (LOOP) command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
@@ -424,13 +425,13 @@ def fly(
             _begin(scratch[c], start, first + c, size)
         kept = 0
         for j in range(steps + 1):
-            now_s = j * step_s
+            now_s = first_s + j * step_s
             for c in range(count):
                 n, m, x = first + c, instant[c], scratch[c]
                 if closed:
                     loop = loops[n if loops.shape[0] > 1 else 0]
                     f, e = n if references.shape[0] > 1 else 0, n if reading_errors.shape[0] > 1 else 0
-                    last_s = (j - 1) * step_s
+                    last_s = first_s + (j - 1) * step_s
                     _attitude_command(x, j, now_s, last_s, loop, body[n], references, f, reading_errors, e, more)
                 else:
                     own = n if commands.shape[0] > 1 else 0

@@ -91,6 +91,7 @@ def fly(
     pushes: np.ndarray | None = None,
     wind_m_s: np.ndarray | None = None,
     ground_z_m: float | None = None,
+    first_s: float = 0.0,
     every: int = 1,
     threads: int | None = None,
 ) -> Flown:
@@ -100,7 +101,7 @@ def fly(
     kernels' values where they differ between vehicles; `lags_s` time constants up and down, (2,) or (n, 2), 0 follows
     at once; `following`, shaped as they, what effects are told of the rotors' acceleration then. `reading_errors`
     (n, steps + 1, 3), rad, are added to the attitude read by the controller, `pushes` (n, steps + 1, 6) to force and
-    moment. `wind_m_s` is (3,) or (n, 3), world axes.
+    moment. `wind_m_s` is (3,) or (n, 3), world axes. `first_s` is the time of the first instant, s.
     """
     start = np.ascontiguousarray(start, float)
     n, k = start.shape[0], start.shape[1] - 13
@@ -120,6 +121,7 @@ def fly(
     told = np.zeros((0, 1, k)) if following is None else np.ascontiguousarray(following, float)
     wind = np.zeros(3) if wind_m_s is None else wind_m_s
     fixed = dict(
+        first_s=first_s,
         steps=steps,
         step_s=step_s,
         every=every,

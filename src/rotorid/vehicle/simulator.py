@@ -2,9 +2,9 @@
 
 Rigid body by quaternion inside, Euler angles outside. The controller and the disturbance are held over each
 step; the motion between is integrated by the classical Runge-Kutta method. It flies compiled where every effect has a
-kernel and the commands, or the controller's whole plan, are known beforehand (`rotorid.vehicle.fast`), else by array
-code that calls the effects' own functions. A test holds that both fly the same. What lies between command and rotor
-speed (`rotorid.vehicle.command_path`) is flown by array code, a lag of the motors alone (`Motors`) by either.
+kernel (`rotorid.vehicle.fast`), as a whole where commands or the controller's plan are known beforehand, else by array
+code that calls the effects' own functions. Commands that only a call can give, and what lies between command and rotor
+speed (`rotorid.vehicle.command_path`), are flown a step at a time by either. Tests hold that all fly the same.
 """
 
 from __future__ import annotations
@@ -249,13 +249,16 @@ class _Flight:
         self.dynamics = Dynamics(vehicle, effects, start.size)
         self.wind = None if wind_m_s is None else np.asarray(wind_m_s, float)
         self.voltage = None if voltage_v is None else np.full(start.size, float(voltage_v))
-        self.kernels = kernels_of(effects, vehicle) if compiled and path is None else None
+        self.kernels = kernels_of(effects, vehicle) if compiled else None
+        self.body = None if self.kernels is None else body_of(vehicle)
 
     def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
         """The flight under a controller, a disturbance (steps + 1, n, 6) and errors of attitude (steps + 1, n, 3)."""
-        commands = None if self.kernels is None else _known_commands(controller, self.step_s * np.arange(len(pushes)))
+        if self.kernels is None:
+            return self._trace(*self._by_steps(self._step_by_arrays, controller, pushes, attitude_errors))
+        commands = _known_commands(controller, self.step_s * np.arange(len(pushes))) if self.path is None else None
         if commands is None:
-            return self._trace(*self._by_arrays(controller, pushes, attitude_errors))
+            return self._trace(*self._by_steps(self._step_compiled, controller, pushes, attitude_errors))
         return self._trace(*self._compiled(controller, commands, pushes, attitude_errors))
 
     def _start(self) -> np.ndarray:
@@ -280,15 +283,14 @@ class _Flight:
         following = None
         if isinstance(controller, Commands) and controller.rotor_acceleration is not None:
             following = controller.acceleration(self.step_s * np.arange(steps + 1))
-        down = self.motors.time_up_s if self.motors.time_down_s is None else self.motors.time_down_s
         flown = fast.fly(
-            body_of(self.vehicle),
+            self.body,
             self.kernels,
             state,
             steps,
             self.step_s,
             commands,
-            lags_s=(self.motors.time_up_s, down),
+            lags_s=self._lags_s,
             limits_rad_s=limits,
             following=following,
             reading_errors=np.moveaxis(attitude_errors, 0, 1) if attitude_errors.any() else None,
@@ -298,20 +300,30 @@ class _Flight:
         )
         return flown.states, flown.accelerations, flown.commands
 
-    def _by_arrays(self, controller, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
-        """The same by array code."""
+    @property
+    def _lags_s(self) -> tuple[float, float]:
+        """Time constants of the motors, up and down."""
+        up, down = self.motors.time_up_s, self.motors.time_down_s
+        return up, up if down is None else down
+
+    def _by_steps(self, move, controller, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+        """The same a step at a time, the controller called at each.
+
+        `move(i, state, command, following, push)` gives the accelerations (n, 6) at instant `i` and the state a step
+        later; `following` (n, k), rad/s², is what effects are told of rotors that follow at once.
+        """
         steps, k = len(pushes) - 1, self.vehicle.rotor_count
         state = self._start()
         states = np.empty((steps + 1, self.size, 13 + k))
         accelerations = np.empty((steps + 1, self.size, 6))
         commands = np.empty((steps + 1, self.size, k))
+        limits = self.motors.limits_rad_s
         for i in range(steps + 1):
             time_s = i * self.step_s
             euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[i]
             command = np.asarray(controller.rotor_command(time_s, euler), float)
             if command.shape != (self.size, k):
                 raise InputError(f"the controller gave commands {command.shape}, expected {(self.size, k)}")
-            limits = self.motors.limits_rad_s
             if limits is not None:
                 command = np.clip(command, *limits)
             speed = command
@@ -322,20 +334,43 @@ class _Flight:
                 state[:, 13:] = self.start.rotor_speed_rad_s
             elif i == 0 or self.motors.time_up_s == 0.0:
                 state[:, 13:] = speed
-            self.command, self.push, self.now_s = command, pushes[i], time_s
-            self.following = controller.acceleration(time_s) if isinstance(controller, Commands) else 0.0
-            if self.path is not None and i > 0:
-                self.following = (state[:, 13:] - states[i - 1][:, 13:]) / self.step_s
-            rounds = 3 if i == 0 and self.dynamics.effects else 1
-            for _ in range(rounds):
-                self.derivative(0.0, state)
-            accelerations[i, :, :3] = self.dynamics.last_acceleration
-            accelerations[i, :, 3:] = self.dynamics.last_specific_force
+            following = np.zeros((self.size, k))
+            if isinstance(controller, Commands):
+                following += controller.acceleration(time_s)
+            elif self.path is not None and i > 0:
+                following = (state[:, 13:] - states[i - 1][:, 13:]) / self.step_s
             states[i], commands[i] = state, command
-            if i < steps:
-                state = rk4_step(self.derivative, 0.0, state, self.step_s)
-                state[:, 3:7] = normalised(state[:, 3:7])
+            accelerations[i], state = move(i, state, speed, following, pushes[i])
         return np.moveaxis(states, 0, 1), np.moveaxis(accelerations, 0, 1), np.moveaxis(commands, 0, 1)
+
+    def _step_compiled(self, i: int, state, command, following, push) -> tuple[np.ndarray, np.ndarray]:
+        """One step by compiled code."""
+        flown = fast.fly(
+            self.body,
+            self.kernels,
+            state,
+            1,
+            self.step_s,
+            np.repeat(command[:, None], 2, axis=1),
+            lags_s=self._lags_s,
+            following=np.repeat(following[:, None], 2, axis=1),
+            pushes=np.repeat(push[:, None], 2, axis=1),
+            wind_m_s=self.wind,
+            ground_z_m=self.vehicle.ground_z_m,
+            first_s=i * self.step_s,
+        )
+        return flown.accelerations[:, 0], flown.states[:, 1]
+
+    def _step_by_arrays(self, i: int, state, command, following, push) -> tuple[np.ndarray, np.ndarray]:
+        """One step by array code."""
+        self.command, self.push, self.now_s, self.following = command, push, i * self.step_s, following
+        rounds = 3 if i == 0 and self.dynamics.effects else 1
+        for _ in range(rounds):
+            self.derivative(0.0, state)
+        accelerations = np.hstack([self.dynamics.last_acceleration, self.dynamics.last_specific_force])
+        state = rk4_step(self.derivative, 0.0, state, self.step_s)
+        state[:, 3:7] = normalised(state[:, 3:7])
+        return accelerations, state
 
     def _trace(self, states, accelerations, commands) -> Trace:
         """States (n, m, 13 + k), accelerations (n, m, 6) and commands (n, m, k) by name."""
@@ -386,10 +421,9 @@ class _Flight:
 
     def _rotor_acceleration(self, rotors: np.ndarray) -> np.ndarray:
         if self.motors.time_up_s == 0.0:
-            return np.zeros_like(rotors) + self.following
-        down = self.motors.time_up_s if self.motors.time_down_s is None else self.motors.time_down_s
+            return self.following
         gap = self.command - rotors
-        return gap / np.where(gap > 0, self.motors.time_up_s, down)
+        return gap / np.where(gap > 0, *self._lags_s)
 
 
 def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage_v=None) -> Motion:

@@ -16,12 +16,12 @@ def run(*words: str):
     return CliRunner().invoke(app, [str(w) for w in words])
 
 
-def simulated(folder, *effects: dict, like: str = "thesis", **changes):
+def simulated(folder, *effects: dict, like: str = "thesis", seconds: int = 1, **changes):
     """The command's result, and the set that it wrote, of a template that states some effects."""
     vehicle = templates.read(like).model_copy(update={"effects": effects, **changes})
     write_vehicle(vehicle, folder / "improved_vehicle.yaml")
     out = folder / "flown"
-    done = run("simulate", folder / "improved_vehicle.yaml", "-o", out, "--seconds", "1", "--flights", "1")
+    done = run("simulate", folder / "improved_vehicle.yaml", "-o", out, "--seconds", seconds, "--flights", "1")
     return done, read_set(out) if done.exit_code == 0 else None
 
 
@@ -83,6 +83,16 @@ def test_what_is_flown_otherwise_is_said(tmp_path):
     said = [line for line in done.output.splitlines() if line.startswith("  - ")]
     assert len(said) == 3 and "left out" in said[0] and "full command" in said[1]
     assert said[2].endswith("The vehicle sinks: all that its rotors can do carries 64 % of what hover needs.")
+
+
+def test_a_vehicle_that_turns_over_is_said(tmp_path):
+    lost = {"id": "unequal_rotors", "form": "thrust of rotor 1", "parameters": {"d_1": 2.0}}
+    done, _ = simulated(tmp_path, lost, seconds=3)
+    assert done.exit_code == 0, done.output
+    assert "The vehicle turned over in flight_1" in done.output
+    (tmp_path / "held").mkdir()
+    held, _ = simulated(tmp_path / "held")
+    assert "turned over" not in held.output
 
 
 @pytest.mark.parametrize("kind", ["stand", "bench"])

@@ -141,6 +141,16 @@ def replace_ground(vehicle: Vehicle) -> Vehicle:
     return vehicle.model_copy(update={"ground_z_m": None, "rotor_speed_limits_rad_s": None})
 
 
-def test_a_path_is_flown_by_array_code_alone():
-    vehicle = stated(*CHAIN)
-    np.testing.assert_array_equal(flown(vehicle).position, flown(vehicle, compiled=False).position)
+def test_a_path_flies_the_same_compiled_and_by_array_code():
+    """With effects of the rotors' acceleration, of the time (a gust) and of the accelerations themselves."""
+    gust = {"f_north_1": 1.0, "f_north_2": -0.6, "f_east_1": 0.4, "f_east_2": 0.8}
+    effects = (
+        {"id": "rotor_acceleration_torque", "form": "reaction", "parameters": {"J_r": 2e-5}},
+        {"id": "gust", "form": "0.10 s to 0.50 s, 2 knots", "parameters": gust},
+        {"id": "payload", "form": "rigid", "parameters": {"m_p": 0.05, "m_p x": 1e-4, "m_p y": 2e-4}},
+    )
+    vehicle = stated(*CHAIN, *effects)
+    fast, slow = flown(vehicle), flown(vehicle, compiled=False)
+    for name in ("position", "angular_velocity", "specific_force", "rotor_speed", "rotor_command"):
+        np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-6, atol=1e-7, err_msg=name)
+    assert np.abs(fast.velocity - flown(stated(*CHAIN)).velocity).max() > 0.1
