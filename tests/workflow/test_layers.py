@@ -63,5 +63,6 @@ def test_a_script_touches_snakemake_only_when_run_by_it(path: Path) -> None:
 def test_acquisition_uses_of_the_library_only_what_it_may(path: Path) -> None:
     used = {name for name in imported(ast.parse(path.read_text())) if name.startswith("rotorid")}
     assert used <= {
-        f"rotorid.{part}" for part in ("acquire", "io", "vehicle", "errors", "recordings", "names", "wording")
+        f"rotorid.{part}"
+        for part in ("acquire", "io", "vehicle", "errors", "recordings", "names", "text_files", "wording")
     }

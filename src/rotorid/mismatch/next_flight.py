@@ -13,13 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.effects.advice import advice
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import catalogue, ids_of, ids_of_stage
+from rotorid.effects.contract import CURVE
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted
 from rotorid.recordings import RecordingSet
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-CURVES = ("throttle_curve", "thrust_curve")
+CURVES = (*ids_of_stage(CURVE), *ids_of("curves_thrust"))
 """Between throttle and speed, and between speed and thrust: one column where no speed is measured."""
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rotorid.control.swings import swings
+from rotorid.control.swings import swings, turned_over
 from rotorid.effects.contract import Motion
 from rotorid.errors import InputError
 from rotorid.recordings import Run, Vehicle
@@ -23,8 +23,6 @@ MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
 FLIGHT_S, FLIGHT_SEED = 2.0, 1
 """The trial flight: swings in roll, pitch and yaw under the project's attitude controller."""
-MOST_TILT_RAD = np.pi / 2
-"""Tilt in the trial flight from which the vehicle has fallen over; a quarter radian is asked for."""
 HIGH_ABOVE_GROUND_M = 1e3
 LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
@@ -113,11 +111,7 @@ def cannot_fly(vehicle: Vehicle) -> str:
         flown = swings(vehicle, "trial", FLIGHT_S, 1, FLIGHT_SEED)
     except InputError as error:
         return f"it cannot be simulated: {error}"
-    quaternion = flown.runs[0].table[list(c.QUATERNION)].to_numpy()
-    tilt = np.arccos(np.clip(1.0 - 2.0 * (quaternion[:, 1] ** 2 + quaternion[:, 2] ** 2), -1.0, 1.0))
-    if not np.isfinite(tilt).all() or tilt.max() > MOST_TILT_RAD:
-        return "simulated under an attitude controller it falls over"
-    return ""
+    return "simulated under an attitude controller it turns over" if turned_over(flown) else ""
 
 
 def recorded_share(runs: Sequence[Run], vehicle: Vehicle) -> float:
