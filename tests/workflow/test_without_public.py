@@ -1,10 +1,13 @@
 """The report on a machine that reaches no public recording and no network: it is built, and says what was left out."""
 
+import json
 import re
 from pathlib import Path
 
 import pytest
-from copied_project import Project
+from copied_project import ROOT, Project
+
+from rotorid import prose
 
 NOWHERE = "http://127.0.0.1:9"
 """A proxy that refuses every connection."""
@@ -37,3 +40,19 @@ def test_the_report_is_built_and_says_what_was_left_out(
         for figure in re.findall(r"\]\((results/\S+\.svg)\)", text):
             # A placeholder is a sentence on axes that are not drawn.
             assert "matplotlib.axis_1" in (project.root / figure).read_text(), f"{chapter}: {figure} shows nothing"
+
+
+@pytest.mark.parametrize("available", [True, False])
+def test_the_grey_box_names_real_flights_that_are_left_out(tmp_path: Path, available: bool) -> None:
+    whole = (ROOT / "notebooks" / "grey_box.md").read_text()
+    section = tmp_path / "grey_box.md"
+    section.write_text(whole[whole.index("## Real flights") : whole.index("## Validation")])
+    missing = "imrc-brushless: 9 files could not be had"
+    summary = {"available": available, "missing": [missing], "band_hz": [5.0, 15.0], "sets": {}}
+    files = {"flight_summary": tmp_path / "summary.json", "flights": tmp_path / "flights.csv"}
+    files["flight_summary"].write_text(json.dumps(summary))
+    columns = "set,axis,published,lower,estimate,upper,low_95,high_95,ratio,r2"
+    files["flights"].write_text(f"{columns}\nneurobem,xx,1,1,1,1,1,1,1,1\n")
+    text = prose.render(section, {name: str(path) for name, path in files.items()})
+    assert f"could not be obtained: {missing}." in text
+    assert ("| neurobem" in text) == available
