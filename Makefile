@@ -65,7 +65,7 @@ test-slow: $(READY) ## the tests on whole recordings and whole builds that `make
 environment: $(READY) ## make the environment alone
 
 # uv, itself from the lock, installs the rest in seconds; where it cannot, or is not to be had, pip does it in a minute
-# without it. Both take packages from where the user told either of them.
+# without it. Both take packages from where the user set either of them.
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "rotorid needs Python 3.11 or newer, and $(PYTHON) is not; say which to use: make PYTHON=python3.12 ..."; \

@@ -1,7 +1,7 @@
 """Where packages come from, said to pip and to uv alike: shell lines that `make environment` evaluates.
 
-uv reads no setting of pip and pip none of uv. Behind a mirror the user has set one of them; the other is told here what
-that one knows. What is set for both stays as it is.
+uv reads no setting of pip and pip none of uv. Behind a mirror the user has set one of them; the other is set here to
+what that one knows. What is set for both stays as it is.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def uv_settings(environment: Mapping[str, str], file: Mapping[str, Any]) -> dict
     return found
 
 
-def told(pip: Mapping[str, list[str]], uv: Mapping[str, list[str]]) -> dict[str, str]:
+def to_hand_over(pip: Mapping[str, list[str]], uv: Mapping[str, list[str]]) -> dict[str, str]:
     """Variables to set, so that each of the two knows what only the other does."""
     out = {}
     for option, names in UV_VARIABLES.items():
@@ -82,7 +82,7 @@ def main() -> None:
     folder = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
     path = folder / "uv" / "uv.toml"
     file = tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    for name, value in told(pip_settings(listed.stdout), uv_settings(os.environ, file)).items():
+    for name, value in to_hand_over(pip_settings(listed.stdout), uv_settings(os.environ, file)).items():
         print(f"export {name}={shlex.quote(value)}")
 
 

@@ -1,6 +1,6 @@
 """How large input may be: beyond these it is refused in one sentence, before it fills the memory or takes minutes.
 
-Each is several times what a sound recording needs. All stand here, so that one can be seen beside the others.
+Each is several times what a sound recording needs. All stand here, so that one can be compared with the others.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`make environment` where packages come from a mirror that only pip or only uv was told of, and where uv is not there.
+"""`make environment` where packages come from a mirror that only pip or only uv knows of, and where uv is not there.
 
 The lock is a short one, its packages are made of what is installed here, and no other index can be reached.
 """
@@ -143,7 +143,8 @@ def test_pip_makes_the_environment_where_the_mirror_has_no_uv(tmp_path: Path, pa
 
 def test_settings_of_pip_and_uv_are_read_and_what_is_set_for_both_stays() -> None:
     package_index = runpy.run_path(str(ROOT / ".ci" / "package_index.py"))
-    pip_settings, uv_settings, told = (package_index[name] for name in ("pip_settings", "uv_settings", "told"))
+    names = ("pip_settings", "uv_settings", "to_hand_over")
+    pip_settings, uv_settings, to_hand_over = (package_index[name] for name in names)
     pip = pip_settings(
         ":env:.index-url='http://e'\nglobal.extra-index-url='\\nfile:///a\\nhttp://b'\nglobal.index-url='g'"
     )
@@ -153,7 +154,7 @@ def test_settings_of_pip_and_uv_are_read_and_what_is_set_for_both_stays() -> Non
     assert uv_settings({}, {"index-url": "http://u", "native-tls": True}) == {"index-url": ["http://u"]}
     assert uv_settings({}, {"pip": {"index-url": "http://u"}}) == {"index-url": ["http://u"]}
     uv = uv_settings({"UV_DEFAULT_INDEX": "http://u", "UV_FIND_LINKS": "/a,/b"}, {"index-url": "http://file"})
-    assert told(pip, uv) == {
+    assert to_hand_over(pip, uv) == {
         "UV_INDEX": "file:///a http://b",
         "UV_INDEX_STRATEGY": "unsafe-best-match",
         "PIP_FIND_LINKS": "/a /b",

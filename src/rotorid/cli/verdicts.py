@@ -61,7 +61,7 @@ def verdict(
     `rotorid verdict flights --ci --max-unexplained 20% --no-doubts`
     """
     with one_sentence():
-        start = time.monotonic()
+        start, limit = time.monotonic(), share_of(max_unexplained)
         is_set = len(paths) == 1 and paths[0].is_dir()
         name = paths[0].resolve().name if is_set else paths[0].name.split(".")[0]
         target = out or Path(f"{name}-verdict")
@@ -74,7 +74,6 @@ def verdict(
             folder = made.folder
             if not quiet and not as_json:
                 tell(made)
-        limit = share_of(max_unexplained)
         found = deliver_set(folder, target, quiet, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)

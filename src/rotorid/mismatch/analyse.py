@@ -26,7 +26,7 @@ from rotorid.mismatch.delivery.stated import restated, value_correlations, value
 from rotorid.mismatch.delivery.usable import question_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed, with_shares
-from rotorid.mismatch.findings import CLAIMED, Analysis, Blow, Estimate, Finding, Trace
+from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, RunWind, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each, without_values
@@ -76,7 +76,7 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0, watch: Watch = un
     """The whole analysis of a set of kind `flight`.
 
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
-    `watch` is told what was chosen just before.
+    `watch` is called with what was chosen, just before.
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
     analysis = analysed(recordings, mistakes, remarks, cutoff_hz, watch)
@@ -138,16 +138,16 @@ class Choice:
     recordings: RecordingSet
     split: Split
     found: Fitted
-    told: Values
+    stated: Values
     """Wrong values as they are stated (by the keys of `PARAMETER_NAMES`)."""
     scale: dict[str, tuple[float, float, float, float]]
     """A full speed that nobody stated, by its contract name."""
     findings: tuple[Finding, ...]
     remarks: tuple[str, ...]
 
-    def vehicle(self, moved: Values, told: Values) -> Vehicle:
+    def vehicle(self, moved: Values, stated: Values) -> Vehicle:
         """The believed vehicle with values moved within their trust and wrong ones as stated."""
-        changed = changed_vehicle(self.found.prepared.vehicle, {k: v[0] for k, v in {**moved, **told}.items()})
+        changed = changed_vehicle(self.found.prepared.vehicle, {k: v[0] for k, v in {**moved, **stated}.items()})
         for _, full, _, _ in self.scale.values():
             changed = changed.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
         return changed
@@ -172,7 +172,7 @@ def account(
     `seen` is the model with the rows of every run, `fit` with `moved` what is delivered, `plain_fit` with
     `plain_values` the believed vehicle with values refitted.
     """
-    found, told, findings = choice.found, choice.told, list(choice.findings)
+    found, stated, findings = choice.found, choice.stated, list(choice.findings)
     model, values, prepared = found.model, found.values, found.prepared
     fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
     delivered = residuals_of(seen, fit)
@@ -196,18 +196,18 @@ def account(
         split=choice.split,
         believed=prepared.vehicle,
         refitted=changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()}),
-        improved=choice.vehicle(moved, told),
+        improved=choice.vehicle(moved, stated),
         findings=tuple(findings),
-        values={**contract_values(prepared.vehicle, told), **choice.scale},
+        values={**contract_values(prepared.vehicle, stated), **choice.scale},
         not_testable=not_testable(prepared, found.chain, findings),
         traces=traces,
         between_sensors=between,
         without=without_each(found, seen, values, fit, findings, (*traces, *between)),
-        without_values=without_values(model, seen, values, moved, names_of(told), (*traces, *between)),
+        without_values=without_values(model, seen, values, moved, names_of(stated), (*traces, *between)),
         noise_floor=noise_floors(prepared, found),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(seen.segments, seen.prepared),
-        blows=blows_of(seen),
+        winds=winds_of(seen),
         unexplained_share=left.share,
         unexplained_channels=left.channels,
         unexplained_depends_on=left.depends_on,
@@ -221,15 +221,15 @@ def account(
     )
 
 
-def blows_of(seen: WrenchModel) -> tuple[Blow, ...]:
+def winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
     """The winds in which a model flies its runs."""
-    out = [Blow(g.run, "in windows", g.knots_s, g.wind_m_s) for g in seen.gusts]
+    out = [RunWind(g.run, "in windows", g.knots_s, g.wind_m_s) for g in seen.gusts]
     if seen.wind is None:
         return tuple(out)
     for run in dict.fromkeys(s.run for s in seen.segments):
         own = [s.motion.time_s for s in seen.segments if s.run == run]
         span = np.array([own[0][0], own[-1][-1]])
-        out.append(Blow(run, "all the time", span, np.tile(np.asarray(seen.wind, float), (2, 1))))
+        out.append(RunWind(run, "all the time", span, np.tile(np.asarray(seen.wind, float), (2, 1))))
     return tuple(out)
 
 
@@ -241,25 +241,25 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
     """
     found, vehicle = choice.found, choice.found.prepared.vehicle
     ids = {f.id for f in claimed(words.findings)}
-    suggested = {key for name in words.suggested_values for key in names_of(choice.told).get(name, ())}
+    suggested = {key for name in words.suggested_values for key in names_of(choice.stated).get(name, ())}
     values = {k: v for k, v in found.values.items() if k not in suggested}
     whole = ids >= {f.id for f in words.findings if f.id in words.without} and not suggested
     fewer = found if whole else with_only(found, ids, values)
     model = fewer.model
     plain = values_alone(found.model)
 
-    def told_of(settled: Settled) -> Values:
+    def stated_of(settled: Settled) -> Values:
         given = settled.offer.values
-        if settled.offer.active or not choice.told:
+        if settled.offer.active or not choice.stated:
             both = {"thrust", "torque"} <= set(given)  # which a full speed stands for
-            return {k: v for k, v in choice.told.items() if k in given or (k == "speed" and both)}
+            return {k: v for k, v in choice.stated.items() if k in given or (k == "speed" and both)}
         return speed_for_coefficients(given, vehicle) if only_throttle(choice.recordings) else given
 
     def vehicle_of(settled: Settled) -> Vehicle:
         stated = restated(words.findings, model, settled)
         inside = {model.search.terms[k].effect for k in settled.offer.active} | chain_ids(fewer)
         kept = [f for f in claimed(stated) if f.id in inside and place_of(f) == "vehicle"]
-        return with_effects(choice.vehicle(settled.moved, told_of(settled)), kept)
+        return with_effects(choice.vehicle(settled.moved, stated_of(settled)), kept)
 
     question = question_of(vehicle, choice.recordings.runs)
     gated = gate(
@@ -273,10 +273,10 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
     stated = restated(words.findings, model, settled)
     findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in stated)
     if whole and gated.passes_whole and settled.moved.keys() == moved.keys():
-        last = replace(words, findings=findings, improved=choice.vehicle(settled.moved, told_of(settled)))
+        last = replace(words, findings=findings, improved=choice.vehicle(settled.moved, stated_of(settled)))
     else:
         kept = with_only(fewer, ids - set(gated.withheld), settled.offer.values)
-        last_choice = replace(choice, found=kept, told=told_of(settled), findings=findings)
+        last_choice = replace(choice, found=kept, stated=stated_of(settled), findings=findings)
         again = replace(seen, selection=kept.model.selection) if kept.model.rows is found.model.rows else None
         every = again or on_every_run(kept, choice.recordings, choice.split, unseen)
         moved_plain = {**gated.refitted.moved, **gated.refitted.offer.values}
@@ -285,7 +285,7 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
                        instead=words.instead, not_testable=words.not_testable,
                        without_values=words.without_values)  # fmt: skip
     reasons = gated.withheld_values
-    withheld = {n: reasons[k] for n, keys in names_of(choice.told).items() for k in keys if k in reasons}
+    withheld = {n: reasons[k] for n, keys in names_of(choice.stated).items() for k in keys if k in reasons}
     notes = [fell_back_note(k, why) for k, why in gated.fell_back.items()]
     return replace(
         with_shares(last),

@@ -18,7 +18,7 @@ class Decided:
 
     found: Fitted
     outside: tuple[Finding, ...]
-    """Decided before or beside the regression of force and moment: mistakes, wind, gusts, the command chain."""
+    """Decided before the regression or outside of it of force and moment: mistakes, wind, gusts, the command chain."""
     findings: tuple[Finding, ...]
     """All of them, those that the regression selected or dropped included."""
     values: Mapping[str, tuple[float, float, float, float]]
@@ -29,4 +29,4 @@ Watch = Callable[[Decided], None]
 
 
 def unwatched(decided: Decided) -> None:
-    """Nobody is told."""
+    """Nobody watches."""

@@ -59,7 +59,7 @@ def deliver(
 def analysis_of(recordings: RecordingSet, off: Collection[str] = (), watch: Watch = unwatched) -> Analysis:
     """The analysis for the kind of the set, without the rules named in `off`.
 
-    `watch` is told what the fitted runs of a flight decide, before the report runs are opened.
+    `watch` is called with what the fitted runs of a flight decide, before the report runs are opened.
 
     InputError in one sentence where the set does not suffice, or no rule has such a name.
     """
@@ -112,7 +112,7 @@ def write_files(
 ) -> Verdict:
     """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
 
-    `conditions.yaml` and `instruments.yaml` stand beside the improved vehicle where there is something to write.
+    `conditions.yaml` and `instruments.yaml` are written next to the improved vehicle where there is something to write.
     """
     progress("locating")
     locations = locate(analysis)

@@ -81,7 +81,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Blow:
+class RunWind:
     """Wind of a run: straight lines between instants, still air outside of them."""
 
     run: str
@@ -94,7 +94,7 @@ class Blow:
 
 @dataclass(frozen=True)
 class ValueRow:
-    """A believed value before and after, with all values free within their trust beside the delivered effects."""
+    """A believed value before and after, all values free within their trust jointly with the delivered effects."""
 
     name: str
     """By its contract name."""
@@ -143,7 +143,7 @@ class Analysis:
     """Channel to p-value that the residual does not depend on the inputs, before and after."""
     regimes: dict[str, dict[str, np.ndarray]]
     """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
-    blows: tuple[Blow, ...] = ()
+    winds: tuple[RunWind, ...] = ()
     """Winds that the model flies in, by run."""
     between_sensors: tuple[Trace, ...] = ()
     """Two sensors of one quantity compared (`accelerometer_x` … `gyroscope_z`): effects are judged by them, too."""

@@ -165,12 +165,12 @@ def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], 
         wind = model.conditions.wind(segment.run, motion.time_s) if model.conditions else None
         slow = [pair for pair in model.forms if remembers(pair[0], pair[1], motion, model.vehicle)]
         turning = replace(motion, rotor_speed=speed, wind=wind)
-        force, moment = _past_wrench(slow, [turning] * len(slow), model.vehicle)
+        force, moment = _wrench_along(slow, [turning] * len(slow), model.vehicle)
         aboard = [
             replace(turning, carried=model.conditions.present(condition, segment.run, motion.time_s))
             for condition, _, _ in model.loads
         ]
-        carried = _past_wrench([pair for _, *pair in model.loads], aboard, model.vehicle)
+        carried = _wrench_along([pair for _, *pair in model.loads], aboard, model.vehicle)
         force, moment = _added(force, carried[0]), _added(moment, carried[1])
         inputs.append(Inputs(speed, acceleration, motion.height, motion.voltage, wind, force, moment))
         states.append(_states(segment, model))
@@ -205,7 +205,7 @@ def remembers(form: Form, values: np.ndarray, motion: Motion, vehicle: Vehicle) 
     )
 
 
-def _past_wrench(
+def _wrench_along(
     forms: Sequence[tuple[Form, np.ndarray]], motions: Sequence[Motion], vehicle: Vehicle
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Wrench of forms along the recorded flight, each with a motion of its own: (n, 3) N and N m, None for nothing."""

@@ -232,8 +232,7 @@ def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
     if not any(groups.values()):
         return []
     texts = [f"{word}: {listed(own)}" for word, own in groups.items() if own]
-    out = [f"Simulated forward for half a second with the improved vehicle, {'; '.join(texts)}."]
-    return out
+    return [f"Simulated forward for half a second with the improved vehicle, {'; '.join(texts)}."]
 
 
 def _concerns_the_recording(finding: Finding) -> bool:

@@ -76,7 +76,7 @@ class Size:
 
     channel: str
     rms: float
-    """In the channel's unit."""
+    unit: str
     share: float
     """Of the channel's scale."""
     words: str
@@ -85,14 +85,16 @@ class Size:
 
 def effect_sizes(analysis: Analysis, held: list[np.ndarray]) -> dict[str, Size]:
     """To every stated effect its size on masked rows of the compared traces: the model with it less that without it."""
-    known = scales(analysis)
+    known, units = scales(analysis), {t.channel: t.unit for t in analysis.compared}
     out: dict[str, Size] = {}
     for effect_id, without in analysis.without.items():
         squares: dict[str, list[np.ndarray]] = {}
         for trace, left, mask in zip(analysis.compared, without, held, strict=True):
             squares.setdefault(trace.channel, []).append((left - trace.after)[mask] ** 2)
         rms = {c: float(np.sqrt(np.nanmean(x))) for c, parts in squares.items() if len(x := np.concatenate(parts))}
-        sizes = [Size(c, r, r / known[c].value, known[c].words) for c, r in rms.items() if c in known and r > 0]
+        sizes = [
+            Size(c, r, units[c], r / known[c].value, known[c].words) for c, r in rms.items() if c in known and r > 0
+        ]
         if sizes:
             out[effect_id] = max(sizes, key=lambda s: s.share)
     return out

@@ -135,6 +135,7 @@ class SizeOfEffect(Part):
 
     channel: str
     rms: Magnitude
+    unit: str
     share: Magnitude
     of: str
 
@@ -180,7 +181,7 @@ class DoubtOfSet(Part):
 
 
 class BelievedValue(Part):
-    """One believed value before and after, with all values free beside the delivered effects."""
+    """One believed value before and after, with all values free, jointly with the delivered effects."""
 
     believed: Number
     estimate: Number
@@ -393,7 +394,9 @@ def effect_verdict(finding: Finding, share: float | None, size: Size | None = No
         sentence=first_words(f"only suggested: {finding.objection}" if finding.objection else finding.sentence),
         size=None
         if size is None
-        else SizeOfEffect(channel=size.channel, rms=size.rms, share=size.share, of=size.words.removeprefix("of ")),
+        else SizeOfEffect(
+            channel=size.channel, rms=size.rms, unit=size.unit, share=size.share, of=size.words.removeprefix("of ")
+        ),
         share=share,
         equation=finding.equation or (finding.form.equation if finding.form else ""),
         channels=finding.channels,

@@ -8,6 +8,8 @@ each held by its trust.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,19 +57,44 @@ def changes(model: FittedModel, values: Values, active: Sequence[str], fit: Fit)
     return out
 
 
-def settled(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:
-    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong.
+@dataclass(frozen=True)
+class Way:
+    """A fit of what may be delivered: values not called wrong as believed, or moved within their trust."""
 
-    Those values move together, and only if where it was not fitted the error falls by it in some channel, grows in
-    none, and none of them would move beyond its trust.
+    model: FittedModel
+    keys: list[str]
+    values: Values
+    fit: Fit
+    moved: Values
+    """What it changes of values that are not called wrong."""
+
+    @cached_property
+    def left(self) -> list[np.ndarray]:
+        """What it leaves of every stretch where it was not fitted, (n, channels)."""
+        return left_out_residuals(self.model, self.keys, self.values)
+
+
+def ways(model: FittedModel, values: Values, active: Sequence[str]) -> list[Way]:
+    """The fits that may be delivered with the terms of `active`, the one to deliver first.
+
+    Values not called wrong move together, and only if where it was not fitted the error falls by it in some channel,
+    grows in none, and none of them would move beyond its trust.
     """
     plain, as_believed = delivered_fit(model, [*values, *active], values)
+    held = Way(model, plain, values, as_believed, {})
     free, fit = all_free(model, values, active)
     moved = changes(model, values, active, fit)
     if strained(model, moved):
-        return as_believed, {}
-    left = (left_out_residuals(model, keys, values) for keys in (plain, free))
-    return (fit, moved) if pays(*left, judged_rows(model), model.rows_per_block) else (as_believed, {})
+        return [held]
+    loose = Way(model, free, values, fit, moved)
+    better = pays(held.left, loose.left, judged_rows(model), model.rows_per_block)
+    return [loose, held] if better else [held, loose]
+
+
+def settled(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:
+    """The fit to deliver with the terms of `active`, and what it changes of values that are not called wrong."""
+    best = ways(model, values, active)[0]
+    return best.fit, best.moved
 
 
 def pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray], per: int) -> bool:

@@ -52,7 +52,6 @@ WORDS = {
     "unexplained": "mismatch, unexplained",
     "not_judged": "not judged",
 }
-SIZE_UNITS = {"force": "N", "moment": "N m", "rotor_speed": "rad/s", "accelerometer": "m/s2", "gyroscope": "rad/s"}
 MOST_LOCATIONS = 12
 MOST_RUNS_IN_STRIP = 8
 STRIP_CELLS = 400
@@ -371,9 +370,8 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
             f"{effect_words(e.id)} in the place of the class."
         )
     if e.size is not None and e.size.share is not None:
-        unit = SIZE_UNITS.get(e.size.channel.rpartition("_")[0], "")
         notes.append(
-            f"Where it does most it moves the {channel_words(e.size.channel)} by {number(e.size.rms)} {unit}".rstrip()
+            f"Where it does most it moves the {channel_words(e.size.channel)} by {number(e.size.rms)} {e.size.unit}"
             + f", {number(100 * e.size.share)} % of {e.size.of} (root mean square on held-out flight)."
         )
     if e.withheld:

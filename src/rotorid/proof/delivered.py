@@ -15,7 +15,7 @@ from rotorid.exports import export_vehicle
 from rotorid.exports.flown import try_out
 from rotorid.mismatch.deliver import analysis_of, verdict_of
 from rotorid.mismatch.delivery.parts import delivered, improved_vehicle
-from rotorid.mismatch.delivery.usable import cannot_fly, cannot_hover, no_body, recorded_share
+from rotorid.mismatch.delivery.usable import question_of
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.verdict import Verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_set
@@ -30,7 +30,7 @@ COLUMNS = (
     "conditions",
     "instruments",
     "withheld",
-    "fell_back",
+    "withheld_values",
     "worse_elsewhere",
     "unfit",
     "not_flown_by",
@@ -59,7 +59,7 @@ def rows_of(folders: Sequence[Path], progress: Callable[[str], None]) -> list[di
 
 def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> dict:
     """What an analysis delivers, and what is asked of it."""
-    vehicle = improved_vehicle(analysis)
+    vehicle, flies = improved_vehicle(analysis), verdict.kind == "flight"
     return {
         "set": recordings.name,
         "kind": verdict.kind,
@@ -69,23 +69,14 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
             for place in ("vehicle", "conditions", "instruments")
         },
         "withheld": "; ".join(f"{f.id}: {f.withheld}" for f in analysis.findings if f.withheld),
-        "fell_back": "; ".join(f"{name}: {why}" for name, why in analysis.withheld_values.items()),
+        "withheld_values": "; ".join(f"{name}: {why}" for name, why in analysis.withheld_values.items()),
         "worse_elsewhere": "; ".join(analysis.worse_elsewhere),
-        "unfit": unfit(vehicle, analysis),
-        "not_flown_by": " ".join(not_flown_by(vehicle)) if verdict.kind == "flight" else "",
+        "unfit": question_of(analysis.believed, analysis.recordings.runs)(vehicle) if flies else "",
+        "not_flown_by": " ".join(not_flown_by(vehicle)) if flies else "",
         "warnings": len(verdict.warnings),
         "doubts": " ".join(d.what for d in verdict.doubts),
         "failed": "",
     }
-
-
-def unfit(vehicle: Vehicle, analysis: Analysis) -> str:
-    """What a delivered vehicle of kind `flight` fails that the believed one does not; empty where it fails nothing."""
-    if vehicle.kind != "flight":
-        return ""
-    share = recorded_share(analysis.recordings.runs, analysis.believed)
-    asked = (no_body, lambda v: cannot_hover(v, share), cannot_fly)
-    return "; ".join(why for question in asked if not question(analysis.believed) and (why := question(vehicle)))
 
 
 def not_flown_by(vehicle: Vehicle) -> list[str]:

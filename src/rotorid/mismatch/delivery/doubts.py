@@ -13,7 +13,7 @@ from rotorid.recordings.doubts import Doubt
 def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
     """The analysis with the doubts about the set as it was given, those that it corrected said to be so.
 
-    Corrected is a doubt that the recordings as analysed, beside the improved vehicle, no longer raise.
+    Corrected is a doubt that the recordings as analysed, with the improved vehicle, no longer raise.
     """
     found = doubts_of(recordings)
     left = found

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.delivery.parts import delivered, form_of
-from rotorid.mismatch.findings import Analysis, Blow, Finding
+from rotorid.mismatch.findings import Analysis, Finding, RunWind
 from rotorid.text_files import read_yaml
 from rotorid.writing import rounded
 
@@ -109,7 +109,7 @@ def conditions_of(analysis: Analysis) -> Conditions:
         own = _entry(finding).model_dump()
         if catalogue()[finding.id].air_moves:
             kind = catalogue()[finding.id].air_moves
-            found += [Condition(**own, run=b.run, **_span(b), air=_air(b)) for b in analysis.blows if b.kind == kind]
+            found += [Condition(**own, run=b.run, **_span(b), air=_air(b)) for b in analysis.winds if b.kind == kind]
         else:
             found += [Condition(**own, run=r, start_s=_known(a), stop_s=_known(b)) for r, a, b in finding.windows]
     return Conditions(set=analysis.recordings.name, conditions=tuple(found))
@@ -121,13 +121,13 @@ def instruments_of(analysis: Analysis) -> Instruments:
     return Instruments(set=analysis.recordings.name, instruments=entries)
 
 
-def _span(blow: Blow) -> dict[str, float | None]:
-    always = blow.kind == "all the time"
-    return {"start_s": None if always else float(blow.time_s[0]), "stop_s": None if always else float(blow.time_s[-1])}
+def _span(wind: RunWind) -> dict[str, float | None]:
+    always = wind.kind == "all the time"
+    return {"start_s": None if always else float(wind.time_s[0]), "stop_s": None if always else float(wind.time_s[-1])}
 
 
-def _air(blow: Blow) -> Air:
-    return Air(time_s=tuple(blow.time_s), north_m_s=tuple(blow.wind_m_s[:, 0]), east_m_s=tuple(blow.wind_m_s[:, 1]))
+def _air(wind: RunWind) -> Air:
+    return Air(time_s=tuple(wind.time_s), north_m_s=tuple(wind.wind_m_s[:, 0]), east_m_s=tuple(wind.wind_m_s[:, 1]))
 
 
 def _known(instant: float) -> float | None:
@@ -138,7 +138,7 @@ def _entry(finding: Finding) -> Entry:
     form = form_of(finding)
     stated = {e.symbol: float(e.value) for e in finding.parameters}
     of_form = {} if form is None else dict(zip((p.symbol for p in form.parameters), finding.values, strict=True))
-    # Moving air is told by its velocity; the force that stands for it at one drag is another parameter.
+    # Moving air is stated by its velocity; the force that stands for it at one drag is another parameter.
     moving = bool(catalogue()[finding.id].air_moves)
     others = [i for i in finding.alternatives if i != finding.id]
     return Entry(

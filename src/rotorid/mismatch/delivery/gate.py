@@ -14,20 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotorid.mismatch.channel_errors import growth
-from rotorid.mismatch.delivered import (
-    FittedModel,
-    Values,
-    delivered_fit,
-    judged_rows,
-    left_out_residuals,
-)
+from rotorid.mismatch.delivered import FittedModel, Values, delivered_fit, judged_rows
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import CHANNELS
-from rotorid.mismatch.within_trust import all_free, changes, pays, strained
+from rotorid.mismatch.within_trust import ways
 from rotorid.mismatch.words import channel_words
 
 WORSE_RATIO = 1.01
-"""Error beside the other model's from which a channel is predicted worse: a percent is what refitting itself moves."""
+"""Error over the other model's from which a channel is predicted worse: a percent is what refitting itself moves."""
 WORSE_Z = 3.0
 """Standard errors over blocks of a second of that growth: six channels and a handful of parts are compared, so that two
 would withhold a sound effect in one set of eight."""
@@ -94,18 +88,11 @@ def settle(model: FittedModel, offer: Offer, reference: Residuals | None = None)
 
     With a `reference` the way is taken by which no channel is worse than it, if one of the two is such.
     """
-    active = list(offer.active)
-    plain, as_believed = delivered_fit(model, [*offer.values, *active], offer.values)
-    free, fit = all_free(model, offer.values, active)
-    moved = changes(model, offer.values, active, fit)
-    held = Settled(offer, as_believed, {}, left_out_residuals(model, plain, offer.values))
-    if strained(model, moved):
-        return held
-    loose = Settled(offer, fit, moved, left_out_residuals(model, free, offer.values))
-    ways = (loose, held) if pays(held.left, loose.left, judged_rows(model), model.rows_per_block) else (held, loose)
-    if reference is not None and worse_than(model, reference, ways[0].left):
-        return min(ways, key=lambda way: excess(worse_than(model, reference, way.left)))
-    return ways[0]
+    found = ways(model, offer.values, list(offer.active))
+    way = found[0]
+    if reference is not None and worse_than(model, reference, way.left):
+        way = min(found, key=lambda w: excess(worse_than(model, reference, w.left)))
+    return Settled(offer, way.fit, way.moved, way.left)
 
 
 def worse_than(model: FittedModel, reference: Residuals, left: Residuals) -> list[Worse]:

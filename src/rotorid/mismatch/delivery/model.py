@@ -1,4 +1,4 @@
-"""A vehicle with its effects, ready to be simulated, and what belongs to the run and to the readings beside it."""
+"""A vehicle with its effects, ready to be simulated, and what belongs to the run and to the readings."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
-from rotorid.errors import InputError
 from rotorid.mismatch.delivery.files import Condition, Conditions, Entry, Instruments
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.improved import ActiveForm, active_forms
+from rotorid.vehicle.improved import ActiveForm, active_forms, all_forms
 
 
 @dataclass(frozen=True)
@@ -34,24 +32,8 @@ class Model:
 
 def model_of(vehicle: Vehicle, conditions: Conditions | None = None, instruments: Instruments | None = None) -> Model:
     """What the three files say, as forms with values; InputError names a faulty entry."""
-    chain, values, wrench = [], [], []
-    for number, entry in enumerate(vehicle.effects, 1):
-        effect = catalogue().get(entry.get("id"))
-        speed = {f.name: f for f in effect.speed_forms} if effect else {}
-        form = speed.get(entry.get("form"))
-        if form is None:
-            wrench.append(entry)
-            continue
-        given = entry.get("parameters") or {}
-        symbols = [p.symbol for p in form.parameters]
-        if set(given) != set(symbols):
-            raise InputError(
-                f"vehicle {vehicle.name}: effects entry {number} ({effect.id}, {form.name}) gives parameters "
-                f"{', '.join(given) or 'none'}, expected {', '.join(symbols)}"
-            )
-        chain.append((effect.id, form))
-        values += [float(given[s]) for s in symbols]
-    forms = active_forms(vehicle.model_copy(update={"effects": tuple(wrench)}))
+    stated = [(entry["id"], *form) for entry, form in zip(vehicle.effects, all_forms(vehicle), strict=True)]
+    chain = [(effect_id, form, values) for effect_id, form, values in stated if isinstance(form, SpeedForm)]
     loads = tuple(
         (condition, *form)
         for condition in (conditions.conditions if conditions else ())
@@ -62,9 +44,9 @@ def model_of(vehicle: Vehicle, conditions: Conditions | None = None, instruments
     )
     return Model(
         vehicle,
-        tuple((f, np.asarray(v, float)) for f, v in forms),
-        tuple(chain),
-        tuple(values),
+        tuple((form, values) for _, form, values in stated if isinstance(form, Form)),
+        tuple((effect_id, form) for effect_id, form, _ in chain),
+        tuple(float(v) for _, _, values in chain for v in values),
         conditions,
         loads,
         readings,

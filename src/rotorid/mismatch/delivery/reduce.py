@@ -14,7 +14,7 @@ from rotorid.effects.catalogue import moving_air
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.fitted import Fitted
-from rotorid.mismatch.leave_one_out import chain_without
+from rotorid.mismatch.leave_one_out import chain_without, without_wind
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import assemble_rows, training_rule
 from rotorid.mismatch.regression import build
@@ -45,7 +45,7 @@ def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:
         if calm:
             segments, noisy = ([in_air(s, steady) for s in own] for own in (segments, noisy))
         if still:
-            segments, noisy = ([without(s, steady) for s in own] for own in (segments, noisy))
+            segments, noisy = ([in_air(s, without_wind(s, model.wind)) for s in own] for own in (segments, noisy))
         own = {"wind": None if still else model.wind, "gusts": () if calm else model.gusts}
         model = rebuilt(replace(model, **own), segments, noisy, active)
     fit = model.regression.fit([t.key for t in model.regression.terms if t.kind != "effect"] + active, jackknife=True)
@@ -56,13 +56,6 @@ def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:
 def in_air(segment: Segment, wind: np.ndarray | None) -> Segment:
     """A stretch in air that moves by `wind` (3,) or (n, 3), m/s, world axes; still for None."""
     return replace(segment, motion=replace(segment.motion, wind=wind))
-
-
-def without(segment: Segment, wind: np.ndarray) -> Segment:
-    """A stretch in its own air less a steady wind (3,), m/s, world axes."""
-    own = segment.motion.wind
-    left = None if own is None or own.ndim == 1 else own - wind
-    return in_air(segment, left)
 
 
 def rebuilt(

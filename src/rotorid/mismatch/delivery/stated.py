@@ -51,7 +51,7 @@ def value_rows(
     believed: Vehicle,
     names: Mapping[str, str] = PARAMETER_NAMES,
 ) -> tuple[ValueRow, ...]:
-    """Every believed value before and after: estimated with all free beside the delivered effects, and delivered."""
+    """Every believed value before and after: estimated jointly with the delivered effects, all free, and delivered."""
     fit = all_free(model, settled.offer.values, list(settled.offer.active))[1]
     rows = []
     for key in model.values_beside(settled.offer.active):

@@ -11,19 +11,22 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rotorid.control.swings import swings, turned_over
-from rotorid.effects.contract import Motion
 from rotorid.errors import InputError
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import NO_BODY
 from rotorid.recordings.body import body_of, unfit
-from rotorid.vehicle.improved import active_forms, speeds_of_commands
+from rotorid.vehicle.flyable import flyable
+from rotorid.vehicle.hover import wrench_at_rest
+from rotorid.vehicle.improved import command_path
 
 MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
 FLIGHT_S, FLIGHT_SEED = 2.0, 1
 """The trial flight: swings in roll, pitch and yaw under the project's attitude controller."""
 HIGH_ABOVE_GROUND_M = 1e3
+BEYOND_ALL = 1e6
+"""Weights that no rotors lift: asked for, each turns at its limit."""
 LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
 
@@ -70,39 +73,9 @@ def full_thrust_n(vehicle: Vehicle) -> float | None:
     """Upward force at rest in still air with full command, effects included, N; None without a limit of the speed."""
     if vehicle.rotor_speed_limits_rad_s is None:
         return None
-    full = np.full((2, vehicle.rotor_count), float(vehicle.rotor_speed_limits_rad_s[1]))
-    volts = np.ones(2)
-    speed = speeds_of_commands(vehicle, full, np.array([0.0, 1.0]), volts, 1.0)[-1:]
-    return float(-static_force(vehicle, speed)[0, 2])
-
-
-def static_force(vehicle: Vehicle, speed: np.ndarray) -> np.ndarray:
-    """Force (n, 3), N, body axes, of rotors at speeds (n, k), rad/s, at rest and level in still air, high up."""
-    zero, n = np.zeros((len(speed), 3)), len(speed)
-    up = np.zeros((n, 3))
-    up[:, 2] = -vehicle.gravity_m_s2
-    motion = Motion(
-        time_s=np.arange(n, dtype=float),
-        rotor_speed=speed,
-        rotor_acceleration=np.zeros_like(speed),
-        angular_velocity=zero,
-        angular_acceleration=zero,
-        specific_force=up,
-        accelerometer=up,
-        gyroscope=zero,
-        rotation=np.broadcast_to(np.eye(3), (n, 3, 3)),
-        velocity=zero,
-        position=zero,
-        height=np.full(n, HIGH_ABOVE_GROUND_M),
-        voltage=np.ones(n),
-    )
-    force = np.zeros((n, 3))
-    force[:, 2] = -(vehicle.thrust_coefficients_n_s2() * speed**2).sum(axis=1)
-    for form, values in active_forms(vehicle):
-        added = form.contribution(motion, vehicle, values).force
-        if added is not None:
-            force = force + added
-    return force
+    flown = flyable(vehicle)[0]
+    asked = np.array([BEYOND_ALL * vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0])
+    return float(wrench_at_rest(flown, command_path(flown), asked, HIGH_ABOVE_GROUND_M)[0])
 
 
 def cannot_fly(vehicle: Vehicle) -> str:

@@ -158,7 +158,7 @@ class Choice:
     chain: ChainResult | None
     measured: bool
     values: Values
-    told: Values
+    stated: Values
     """Wrong values as they are stated."""
     findings: tuple[Finding, ...]
     leftovers: Sequence
@@ -211,7 +211,7 @@ def account(
         refitted=improved(setup.vehicle, plain),
         improved=choice.vehicle({**moved_values, **choice.values}),
         findings=findings,
-        values=contract_values(setup.vehicle, choice.told, VALUE_NAMES) | full_speed_value(setup, chain),
+        values=contract_values(setup.vehicle, choice.stated, VALUE_NAMES) | full_speed_value(setup, chain),
         not_testable={k: v for k, v in choice.reasons.items() if k not in claimed_ids},
         traces=traces,
         noise_floor=noise_floors(setup, model, chain),
@@ -231,14 +231,14 @@ def account(
         put_right=in_words(moved_values, VALUE_NAMES),
         without=without_each(model, seen, choice.values, own_chain, list(findings), traces),
         without_values=without_values(
-            model, seen, choice.values, moved_values, names_of(choice.told, VALUE_NAMES), traces
+            model, seen, choice.values, moved_values, names_of(choice.stated, VALUE_NAMES), traces
         ),
     )
 
 
 def as_delivered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values) -> Analysis:
     """The analysis whose model holds what is claimed and passes the gate, and nothing else; its statuses stay."""
-    model, names = choice.model, names_of(choice.told, VALUE_NAMES)
+    model, names = choice.model, names_of(choice.stated, VALUE_NAMES)
     ids = {f.id for f in claimed(words.findings)}
     suggested = {key for name in words.suggested_values for key in names.get(name, ())}
     values = {k: v for k, v in choice.values.items() if k not in suggested}
@@ -258,8 +258,10 @@ def as_delivered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Val
         chain = choice.chain
         for key in gone if choice.measured else ():
             chain = without_id(choice.setup, chain, key)
-        told = {k: v for k, v in choice.told.items() if k in final.offer.values}
-        own = replace(choice, model=kept, chain=chain, values=final.offer.values, told=told, findings=findings)
+        stated_values = {k: v for k, v in choice.stated.items() if k in final.offer.values}
+        own = replace(
+            choice, model=kept, chain=chain, values=final.offer.values, stated=stated_values, findings=findings
+        )
         every = replace(seen, selection=kept.selection)
         changed = {**gated.refitted.moved, **gated.refitted.offer.values}
         last = account(own, words.recordings, every, final.fit, final.moved, gated.refitted.fit, changed)

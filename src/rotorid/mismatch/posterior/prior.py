@@ -14,7 +14,7 @@ class Prior:
     """What is believed before a recording is looked at."""
 
     effect_nats: float = 3.0
-    """Nats that an id costs, beside the logarithm of its number of forms: one id in twenty is at work."""
+    """Nats that an id costs in addition to the logarithm of its number of forms: one id in twenty is at work."""
     nameless_nats: float = 6.0
     """Further nats of an empirical term without a name: one of the catalogue explains as much more often."""
     form_error: float = 0.05

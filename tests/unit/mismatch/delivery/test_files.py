@@ -16,7 +16,7 @@ from rotorid.mismatch.delivery.files import (
     text_of,
 )
 from rotorid.mismatch.delivery.model import model_of
-from rotorid.mismatch.findings import Blow
+from rotorid.mismatch.findings import RunWind
 from rotorid.mismatch.forward import delivered_model, errors_of, forward_channels
 from rotorid.mismatch.shares import segments_of
 from tests.unit.mismatch.delivery.test_parts import WIND, sensor_error
@@ -27,8 +27,8 @@ NAMES = ("verdict.json", "report.html", "improved_vehicle.yaml")
 
 def windy(**changes):
     """Drag in a steady wind of 2 m/s to the north."""
-    blows = tuple(Blow(run, "all the time", np.array([0.5, 39.5]), np.array([[2.0, 0.0]] * 2)) for run in "abc")
-    return replace(analysis(findings=[drag_finding(), WIND]), blows=blows, **changes)
+    winds = tuple(RunWind(run, "all the time", np.array([0.5, 39.5]), np.array([[2.0, 0.0]] * 2)) for run in "abc")
+    return replace(analysis(findings=[drag_finding(), WIND]), winds=winds, **changes)
 
 
 def test_a_steady_wind_stands_with_its_runs_and_comes_back(tmp_path):
@@ -45,8 +45,8 @@ def test_a_steady_wind_stands_with_its_runs_and_comes_back(tmp_path):
 
 def test_a_gust_blows_in_its_window_alone():
     gust = replace(WIND, id="gust", windows=(("a", 4.0, 6.0),))
-    blow = Blow("a", "in windows", np.array([4.0, 5.0, 6.0]), np.array([[0.0, 0.0], [3.0, 1.0], [0.0, 0.0]]))
-    found = conditions_of(replace(analysis(findings=[gust]), blows=(blow,)))
+    wind = RunWind("a", "in windows", np.array([4.0, 5.0, 6.0]), np.array([[0.0, 0.0], [3.0, 1.0], [0.0, 0.0]]))
+    found = conditions_of(replace(analysis(findings=[gust]), winds=(wind,)))
     assert found.wind("a", np.array([3.0, 4.5, 5.0, 7.0]))[:, 0].tolist() == [0.0, 1.5, 3.0, 0.0]
     assert (found.conditions[0].start_s, found.conditions[0].stop_s) == (4.0, 6.0)
 
@@ -59,7 +59,7 @@ def test_the_simulation_run_forward_flies_in_the_wind_that_was_found():
     )
     made = replace(made, recordings=replace(made.recordings, runs=runs))
     with_wind = forward_channels(made).channels["velocity"].rmse.held_out.after
-    still = forward_channels(replace(made, blows=())).channels["velocity"].rmse.held_out.after
+    still = forward_channels(replace(made, winds=())).channels["velocity"].rmse.held_out.after
     assert with_wind == pytest.approx(0.0, abs=1e-6)
     assert still > 0.1 * K_D * 4 * HOVER * 2.0 / 0.652
 
