@@ -31,6 +31,7 @@ from rotorid.acquire.transport import SerialTransport
 from rotorid.io.logs import read_log
 from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
+from rotorid.io.wire import rotor
 from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
 from tests.acquire.fault_table import seen
@@ -213,6 +214,16 @@ def test_a_reset_makes_a_thrust_test_void(plugged, recorder_on):
     log = read_log(recorder.log_path)
     assert len(log.table) == 80
     assert log.session.ended == Ended.DEVICE_RESET
+
+
+def test_a_reset_before_the_command_is_a_reset_and_no_refusal(plugged, recorder_on):
+    port = plugged("rotor", Faults(reset_at=frozenset({80}))).names[0]
+    with pytest.raises(DeviceReset, match="void.*record again"):
+        with recorder_on("rotor", port) as recorder:
+            recorder.guard()
+            recorder.start(resumable=False)
+            time.sleep(0.3)  # a busy computer: the device is past its 80 samples before it hears of the throttle
+            recorder.command(rotor.THROTTLE, rotor.pack_throttle(0.2, 1.0))
 
 
 @seen("clock rollover")

@@ -257,7 +257,8 @@ class Recorder:
     def command(self, letter: str, arguments: bytes = b"") -> wire.Answer:
         """Send a command and wait for its answer, repeating it if none comes.
 
-        Raises Refused where the device says no, DeviceSilent where it says nothing.
+        Raises Refused where the device says no, DeviceReset where it says so because it restarted in a run that
+        this makes void, DeviceSilent where it says nothing.
         """
         for _ in range(self._timings.tries):
             self._answers.clear()
@@ -268,6 +269,8 @@ class Recorder:
                 for answer in list(self._answers):
                     if answer.letter == letter:
                         if answer.status != OK:
+                            if self._streaming and self._restarted and self.resume is None:
+                                self._after_restart()  # it refuses because it restarted: that is what to say
                             raise Refused(f"the {self.instrument.title} refused {letter!r}: {answer.text}")
                         return answer
         raise DeviceSilent(
