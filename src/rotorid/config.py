@@ -7,8 +7,11 @@ A stage that needs settings adds one class here and one field to `Config`; the J
 
 from __future__ import annotations
 
+import copy
 import json
+import re
 import sys
+import unicodedata
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
@@ -19,16 +22,31 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from rotorid.control.readings import READING_S
 from rotorid.errors import InputError
 from rotorid.mismatch.rules import RULES
-from rotorid.wording import explained
+from rotorid.wording import LONGEST, explained
 
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
 
 LONGEST_WINDOW = 301
 """Samples; the shortest recordings of a steady load have as many."""
-LARGEST_RATE, MOST_EPOCHS, MOST_NODES = 10.0, 10_000_000, 1000
+SMALLEST_RATE, LARGEST_RATE = 1e-6, 10.0
+MOST_EPOCHS, MOST_NODES, MOST_LAYERS = 10_000_000, 1000, 10
 """Bounds of a network's training; beyond them it does not converge, or not on one computer."""
+LONGEST_TITLE = 200
+"""Characters; more do not fit on a title page."""
+MOST_SETS = 10_000
+"""Sets in one job: beyond that what a stopped job had done is lost for days."""
+FASTEST_ROTOR_RAD_S = 1e5
+"""A small turbine's speed, which no propeller reaches."""
 SLOWEST_REAL_FLIGHT_HZ = 400.0
 """Lowest rate of the real flights that the grey box reads."""
+
+
+NARROWEST_BAND_HZ = 1.0
+"""Oscillations in a narrower band have no room to differ."""
+_WHOLE, _NUMBER = (
+    re.compile(r"[-+]?(0|[1-9][0-9]{0,17})"),
+    re.compile(r"[-+]?((0|[1-9][0-9]{0,30})(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?"),
+)
 
 
 class ConfigError(InputError):
@@ -42,7 +60,28 @@ class Section(BaseModel):
 
 
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-Text = Annotated[str, Field(min_length=1)]
+
+
+def _readable(text: str) -> str:
+    if text.isspace():
+        raise ValueError(f"found {text!r}, expected text that is not blank")
+    if any(unicodedata.category(x) in ("Cc", "Zl", "Zp") for x in text):
+        raise ValueError(f"found {_quoted(text)}, expected one line without control characters")
+    return text
+
+
+def _short(text: str) -> str:
+    if len(text) > LONGEST_TITLE:
+        raise ValueError(f"found {_quoted(text)}, expected at most {LONGEST_TITLE} characters, not {len(text)}")
+    return text
+
+
+def _quoted(text: str) -> str:
+    return repr(text if len(text) <= LONGEST else text[: LONGEST - 3] + "...")
+
+
+Text = Annotated[str, Field(min_length=1), AfterValidator(_readable)]
+Title = Annotated[Text, AfterValidator(_short)]
 
 
 def _rising(limits: tuple[float, float]) -> tuple[float, float]:
@@ -83,8 +122,8 @@ def _part_of_a_reading(step_s: float) -> float:
 class Report(Section):
     """What the report is called and which chapters it has, in their order."""
 
-    title: Text = Field(description="Title on the first page [text].")
-    subtitle: Text = Field(description="Line under the title [text].")
+    title: Title = Field(description="Title on the first page [text].")
+    subtitle: Title = Field(description="Line under the title [text].")
     chapters: list[Name] = Field(
         min_length=1,
         description="Chapters in reading order; each has notebooks/<name>.ipynb, notebooks/<name>.md and a "
@@ -102,43 +141,59 @@ class Report(Section):
 class FilterSettings(Section):
     """Filters for one instrument's readings."""
 
-    low_pass_hz: float = Field(gt=0, lt=25, description="Cutoff of the thesis's first-order low-pass [Hz].")
-    zero_phase_hz: float = Field(gt=0, lt=25, description="Cutoff of the zero-phase low-pass [Hz].")
+    low_pass_hz: float = Field(ge=0.01, lt=25, description="Cutoff of the thesis's first-order low-pass [Hz].")
+    zero_phase_hz: float = Field(ge=0.01, lt=25, description="Cutoff of the zero-phase low-pass [Hz].")
     spike_window: Annotated[int, AfterValidator(_odd)] = Field(
         ge=3, le=LONGEST_WINDOW, description="Samples around one that its median is taken of [1]."
     )
-    spike_threshold: float = Field(gt=0, description="Robust standard deviations beyond which a sample is a spike [1].")
+    spike_threshold: float = Field(
+        ge=2, le=1000, description="Robust standard deviations beyond which a sample is a spike [1]."
+    )
     steady_window: int = Field(ge=2, le=LONGEST_WINDOW, description="Samples that have to be steady [1].")
+
+
+class CellFilterSettings(FilterSettings):
+    """The same for readings of load cells, of which 1 kgf is some 0.15 mV."""
+
     steady_tolerance: float = Field(
-        gt=0, description="Span of the low-passed signal that counts as steady [V of cells, N of the reference sensor]."
+        ge=1e-10, le=1e-5, description="Span of the low-passed signal that counts as steady [V]."
+    )
+
+
+class ReferenceFilterSettings(FilterSettings):
+    """The same for readings of the reference sensor."""
+
+    steady_tolerance: float = Field(
+        ge=1e-3, le=10, description="Span of the low-passed signal that counts as steady [N]."
     )
 
 
 class Filters(Section):
     """Filters of the bench's instruments."""
 
-    bench: FilterSettings = Field(description="Load cells of the bench.")
-    jr3: FilterSettings = Field(description="Reference sensor of the bench's tests.")
+    bench: CellFilterSettings = Field(description="Load cells of the bench.")
+    jr3: ReferenceFilterSettings = Field(description="Reference sensor of the bench's tests.")
 
 
 class BenchSettings(Section):
     """The load-cell bench."""
 
-    noise_n: float = Field(ge=0, description="Believed one-sigma noise of a sample of the bench's force [N].")
+    noise_n: float = Field(ge=0, le=10, description="Believed one-sigma noise of a sample of the bench's force [N].")
     matrix_largest_n: float = Field(
-        gt=0,
+        ge=0.1,
+        le=1000,
         description="Largest load that the calibration matrix is fitted to: beyond it cells leave their range [N].",
     )
-    reference_noise_n: float = Field(ge=0, description="Believed one-sigma noise of the reference sensor [N].")
+    reference_noise_n: float = Field(ge=0, le=10, description="Believed one-sigma noise of the reference sensor [N].")
 
 
 class StandSettings(Section):
     """The vehicle on the six-axis sensor."""
 
-    clock_error: float = Field(gt=0, lt=0.1, description="Largest relative error of a device's clock [1].")
-    force_noise_n: float = Field(ge=0, description="Believed one-sigma noise of the sensor's force [N].")
-    moment_noise_n_m: float = Field(ge=0, description="Believed one-sigma noise of the sensor's moment [N m].")
-    thrust_noise_n: float = Field(ge=0, description="Believed one-sigma noise of the thrust tester [N].")
+    clock_error: float = Field(ge=1e-7, lt=0.1, description="Largest relative error of a device's clock [1].")
+    force_noise_n: float = Field(ge=0, le=10, description="Believed one-sigma noise of the sensor's force [N].")
+    moment_noise_n_m: float = Field(ge=0, le=1, description="Believed one-sigma noise of the sensor's moment [N m].")
+    thrust_noise_n: float = Field(ge=0, le=10, description="Believed one-sigma noise of the thrust tester [N].")
     speed_noise_relative: float = Field(
         ge=0, lt=0.2, description="One-sigma noise of the tester's rotor speed, as a share of it [1]."
     )
@@ -150,13 +205,15 @@ class RotorSettings(Section):
     speed_noise_relative: float = Field(
         ge=0, lt=0.2, description="One-sigma noise of a rotor-speed reading, as a share of it [1]."
     )
-    outlying_above: float = Field(gt=0, description="Modified z-score beyond which a motor is called outlying [1].")
+    outlying_above: float = Field(
+        ge=1, le=100, description="Modified z-score beyond which a motor is called outlying [1]."
+    )
 
 
 class Residuals(Section):
     """Rigid-body residuals of the NeuroBEM flights."""
 
-    cutoff_hz: float = Field(gt=0, lt=190, description="Low-pass of both sides of the residual [Hz].")
+    cutoff_hz: float = Field(ge=0.1, lt=190, description="Low-pass of both sides of the residual [Hz].")
     airspeed_bin_m_s: float = Field(ge=0.01, le=100, description="Width of a bin of airspeed [m/s].")
     block_s: float = Field(ge=0.1, le=60, description="Length of the blocks that the bootstrap draws [s].")
     seed: int = Field(ge=0, description="Seed of the bootstrap [1].")
@@ -173,7 +230,7 @@ class Simulation(Section):
     moment_n_m: float = Field(ge=0, le=1, description="One-sigma moment on the airframe about each axis [N m].")
     force_n: float = Field(ge=0, le=10, description="One-sigma force on the airframe along each axis [N].")
     correlation_s: float = Field(ge=0, le=3600, description="Correlation time of moment and force [s].")
-    rate_noise_rad_s: float = Field(gt=0, le=10, description="One-sigma noise of a body rate's reading [rad/s].")
+    rate_noise_rad_s: float = Field(ge=1e-6, le=10, description="One-sigma noise of a body rate's reading [rad/s].")
     acceleration_noise_rad_s2: float = Field(
         ge=0, le=1000, description="One-sigma noise of an angular acceleration's reading [rad/s2]."
     )
@@ -186,10 +243,12 @@ class GreyBox(Section):
     """Parameters of the equations of motion from data."""
 
     seed: int = Field(ge=0, description="Seed of weights, search and draws [1].")
-    rotor_rate: float = Field(gt=0, le=LARGEST_RATE, description="Learning rate of the rotor networks [1].")
+    rotor_rate: float = Field(ge=SMALLEST_RATE, le=LARGEST_RATE, description="Learning rate of the rotor networks [1].")
     rotor_epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the rotor networks [1].")
     rotor_hidden: int = Field(ge=1, le=MOST_NODES, description="Hidden nodes of the rotor networks [1].")
-    inertia_rate: float = Field(gt=0, le=LARGEST_RATE, description="Learning rate of the inertia network [1].")
+    inertia_rate: float = Field(
+        ge=SMALLEST_RATE, le=LARGEST_RATE, description="Learning rate of the inertia network [1]."
+    )
     inertia_epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the inertia network [1].")
     inertia_every: int = Field(ge=1, le=100, description="Every how many samples the inertia network is shown [1].")
     speed_limits_rad_s: Limits = Field(
@@ -198,7 +257,7 @@ class GreyBox(Section):
     design_limits_rad_s: Limits = Field(
         strict=False, description="Rotor speeds that the excitation may use, room left for control [rad/s]."
     )
-    design_tilt_deg: float = Field(gt=0, lt=60, description="Largest tilt that the excitation may cause [deg].")
+    design_tilt_deg: float = Field(ge=0.1, lt=60, description="Largest tilt that the excitation may cause [deg].")
     design_harmonics: Counts = Field(
         strict=False, description="Lowest and highest harmonic of the excitation's period [1]."
     )
@@ -218,9 +277,15 @@ class GreyBox(Section):
     @model_validator(mode="after")
     def _can_be_flown(self) -> GreyBox:
         (low, high), (slowest, fastest) = self.speed_limits_rad_s, self.design_limits_rad_s
+        if high > FASTEST_ROTOR_RAD_S:
+            raise ValueError(f"speed_limits_rad_s reaches {high:g}, expected at most {FASTEST_ROTOR_RAD_S:g}")
         if not low <= slowest < fastest <= high:
             raise ValueError(
                 f"design_limits_rad_s is {[slowest, fastest]}, expected to lie within speed_limits_rad_s, {[low, high]}"
+            )
+        if fastest < 1.05 * slowest:
+            raise ValueError(
+                f"design_limits_rad_s is {[slowest, fastest]}, expected the higher to be 5 % above the lower or more"
             )
         first, last = self.design_harmonics
         # The three axes share the harmonics, and the harmonic 0 is no oscillation.
@@ -242,6 +307,8 @@ class GreyBox(Section):
                 f"band_hz is {list(self.band_hz)}, expected to lie within 0 and "
                 f"{SLOWEST_REAL_FLIGHT_HZ / 2:g} Hz, both not in it"
             )
+        if self.band_hz[1] - self.band_hz[0] < NARROWEST_BAND_HZ:
+            raise ValueError(f"band_hz is {list(self.band_hz)}, expected {NARROWEST_BAND_HZ:g} Hz between them or more")
         return self
 
 
@@ -250,13 +317,15 @@ class BlackBox(Section):
 
     seed: int = Field(ge=0, description="Seed of weights, folds and held-out samples [1].")
     epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the network [1].")
-    rate: float = Field(gt=0, le=LARGEST_RATE, description="Learning rate of the network [1].")
+    rate: float = Field(ge=SMALLEST_RATE, le=LARGEST_RATE, description="Learning rate of the network [1].")
     hidden: tuple[Annotated[int, Field(ge=1, le=MOST_NODES)], ...] = Field(
-        min_length=1, strict=False, description="Nodes of each hidden layer [1]."
+        min_length=1, max_length=MOST_LAYERS, strict=False, description="Nodes of each hidden layer [1]."
     )
-    held_out_samples: int = Field(ge=1, description="Samples held out at random, as the thesis does [1].")
-    folds: int = Field(ge=2, description="Parts into which whole experiments are held out [1].")
-    share: float = Field(gt=0, lt=1, description="Share of new samples that an interval is to cover [1].")
+    held_out_samples: int = Field(
+        ge=2, le=10_000, description="Samples held out at random, as the thesis does; of one alone nothing spreads [1]."
+    )
+    folds: int = Field(ge=2, le=1000, description="Parts into which whole experiments are held out [1].")
+    share: float = Field(ge=0.5, lt=1, description="Share of new samples that an interval is to cover [1].")
 
 
 class Proof(Section):
@@ -272,7 +341,7 @@ class Proof(Section):
         description="Repetitions taken of each family of drawn cases in a release proof [1]."
     )
     cases: list[Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
-    batch: int = Field(ge=1, description="Cases that one job treats [1].")
+    batch: int = Field(ge=1, le=MOST_SETS, description="Cases that one job treats [1].")
     delivered: int = Field(
         ge=1, description="Concealed cases, evenly over the list, whose delivered vehicle is put to the test [1]."
     )
@@ -290,7 +359,7 @@ class Plantings(Section):
     cases: list[Text] = Field(
         min_length=1, description="Shell patterns on the names in workflow/plantings.tsv; one must fit [names]."
     )
-    batch: int = Field(ge=1, description="Sets that one job judges [1].")
+    batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
     kept: Text = Field(
         description="Table whose rows are kept beside new ones, marked where older code judged them; a file that does "
         "not exist keeps none [path]."
@@ -342,7 +411,7 @@ class Ablation(Section):
 class Fleet(Section):
     """Every recording set of a folder, judged together."""
 
-    batch: int = Field(ge=1, description="Sets that one job judges [1].")
+    batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
 
 
 class Config(Section):
@@ -386,6 +455,48 @@ def check(values: Mapping[str, Any], source: str = "config.yaml") -> Config:
         return Config.model_validate(dict(values))
     except ValidationError as error:
         raise ConfigError("\n".join(f"{source}: {clause}" for clause in explained(error, Config))) from None
+
+
+def from_command_line(values: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The values, with numbers, true and false where `given` has them as text.
+
+    Snakemake reads all that stands in braces after `--config` as text: `fleet={batch: 3}` arrives as '3'. Only text at
+    a place where the model wants another type is read.
+
+    Parameters
+    ----------
+    values
+        The whole configuration, as Snakemake holds it.
+    given
+        What of it stands on the command line.
+    """
+    try:
+        Config.model_validate(dict(values))
+    except ValidationError as error:
+        read = copy.deepcopy(dict(values))
+        for entry in error.errors():
+            if isinstance(entry["input"], str) and _at(given, entry["loc"]) == entry["input"]:
+                _at(read, entry["loc"][:-1])[entry["loc"][-1]] = _as_number(entry["input"], entry["type"])
+        return read
+    return dict(values)
+
+
+def _at(values: Any, location: tuple[str | int, ...]) -> Any:
+    """What stands at a location of a pydantic error; None where nothing does."""
+    for part in location:
+        if not (isinstance(values, dict) and part in values or isinstance(values, list) and part in range(len(values))):
+            return None
+        values = values[part]
+    return values
+
+
+def _as_number(text: str, wanted: str) -> str | int | float | bool:
+    """Text as a number of the type that a pydantic error `wanted`, true or false; as it is where it is none."""
+    if wanted.startswith("bool"):
+        return {"true": True, "false": False}.get(text.lower(), text)
+    if wanted.startswith(("int", "float")) and _WHOLE.fullmatch(text):
+        return int(text)
+    return float(text) if wanted.startswith(("int", "float")) and _NUMBER.fullmatch(text) else text
 
 
 def schema_text() -> str:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
-from rotorid.blackbox.compare import folds
-from rotorid.config import ConfigError, check
+from rotorid.blackbox.compare import conformal_coverage, folds
+from rotorid.config import ConfigError, check, from_command_line
 from rotorid.errors import InputError
 from rotorid.proof import plan
 
@@ -26,8 +26,8 @@ WRONG = [
     ("raw", 7, "expected text"),
     ("filter", 5, "expected keys with values"),
     ("filter.bench", [], "expected keys with values"),
-    ("filter.bench.low_pass_hz", -1.0, "greater than 0"),
-    ("filter.bench.low_pass_hz", 0.0, "greater than 0"),
+    ("filter.bench.low_pass_hz", -1.0, "0.01 or more"),
+    ("filter.bench.low_pass_hz", 0.0, "0.01 or more"),
     ("filter.bench.low_pass_hz", 25.0, "less than 25"),
     ("filter.bench.low_pass_hz", INF, "a finite number"),
     ("filter.bench.low_pass_hz", NAN, "a finite number"),
@@ -85,7 +85,7 @@ WRONG = [
     ("simulation.moment_n_m", 1e9, "at most 1"),
     ("simulation.force_n", 1e9, "at most 10"),
     ("simulation.correlation_s", 1e9, "at most 3600"),
-    ("simulation.rate_noise_rad_s", 0.0, "greater than 0"),
+    ("simulation.rate_noise_rad_s", 0.0, "1e-06 or more"),
     ("grey_box.rotor_rate", 100.0, "at most 10"),
     ("grey_box.inertia_rate", 100.0, "at most 10"),
     ("grey_box.rotor_epochs", 10**12, "at most 1e+07"),
@@ -111,6 +111,37 @@ WRONG = [
     ("report.chapters", [], "at least one entry"),
     ("report.chapters", ["../../etc"], "small letters"),
     ("report.chapters", ["A b"], "small letters"),
+    # before: taken, and every sample was steady, or a spike
+    ("filter.bench.steady_tolerance", 1.0, "at most 1e-05"),
+    ("filter.bench.steady_tolerance", 1e-12, "1e-10 or more"),
+    ("filter.jr3.steady_tolerance", 500.0, "at most 10"),
+    ("filter.bench.spike_threshold", 0.001, "2 or more"),
+    ("filter.bench.spike_threshold", 1e9, "at most 1000"),
+    ("filter.bench.zero_phase_hz", 1e-12, "0.01 or more"),
+    ("bench.noise_n", 1e9, "at most 10"),
+    ("bench.matrix_largest_n", 1e-12, "0.1 or more"),
+    ("bench.reference_noise_n", 250.0, "at most 10"),
+    ("stand.clock_error", 1e-12, "1e-07 or more"),
+    ("stand.force_noise_n", 1e9, "at most 10"),
+    ("stand.moment_noise_n_m", 1e9, "at most 1"),
+    ("stand.thrust_noise_n", 1e9, "at most 10"),
+    ("rotor.outlying_above", 0.0035, "1 or more"),
+    ("rotor.outlying_above", 3500.0, "at most 100"),
+    ("residuals.cutoff_hz", 1e-12, "0.1 or more"),
+    ("grey_box.rotor_rate", 1e-12, "1e-06 or more"),
+    ("grey_box.design_tilt_deg", 1e-12, "0.1 or more"),
+    ("black_box.hidden", [20] * 50, "at most 10 entries"),
+    ("black_box.held_out_samples", 1, "2 or more"),
+    ("black_box.held_out_samples", 10**9, "at most 10000"),
+    ("black_box.folds", 10**9, "at most 1000"),
+    ("black_box.share", 1e-3, "0.5 or more"),
+    ("proof.batch", 10**9, "at most 10000"),
+    ("proof.cases", [" "], "text that is not blank"),
+    ("proof.tables", "a\nb", "one line without control characters"),
+    ("report.title", " ", "text that is not blank"),
+    ("report.title", "Two\nlines", "one line without control characters"),
+    ("report.subtitle", "red \x1b[31m", "one line without control characters"),
+    ("report.title", "x" * 5000, "at most 200 characters, not 5000"),
 ]
 
 
@@ -123,6 +154,9 @@ TOGETHER = [
     ("flight_s", 5.0, "flight_s is 5, expected at least design_period_s, 10"),
     ("band_hz", [0.0, 15.0], "within 0 and 200 Hz, both not in it"),
     ("band_hz", [5.0, 200.0], "within 0 and 200 Hz, both not in it"),
+    ("band_hz", [5.0, 5.01], "1 Hz between them or more"),
+    ("speed_limits_rad_s", [300.0, 1e9], "reaches 1e+09, expected at most 100000"),
+    ("design_limits_rad_s", [550.0, 551.0], "5 % above the lower or more"),
 ]
 
 
@@ -179,6 +213,84 @@ def test_an_unknown_family_of_the_proof_is_named() -> None:
         plan.check_families(cases, {"singel": 1}, "proof.released")
 
 
+def test_more_repetitions_than_a_family_has_are_named() -> None:
+    """Before: three were taken in place of 300, without a word."""
+    cases = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")
+    with pytest.raises(InputError, match=r"proof\.seeds\.single is 300, expected at most 3, all that there are"):
+        plan.check_families(cases, {"single": 300})
+
+
+def test_a_proof_without_a_case_is_named() -> None:
+    """Before: tables of no case were made, and the report's chapter shown from them."""
+    entry = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")[:1]
+    plan.check_chosen(entry, [], "")
+    plan.check_chosen([], entry, "2026-11-30")
+    with pytest.raises(InputError, match=r"proof\.seeds and proof\.cases leave no case; expected"):
+        plan.check_chosen([], [], "")
+    with pytest.raises(InputError, match=r"proof\.release is '2026-11-30', but proof\.released and proof\.cases leave"):
+        plan.check_chosen(entry, [], "2026-11-30")
+
+
+def test_a_folder_of_tables_that_is_not_there_is_named(tmp_path: Path) -> None:
+    plan.check_tables(str(ROOT / "docs" / "proof"), ["summary.csv", "state.json"])
+    plan.check_tables("results/proof/", ["summary.csv"])
+    with pytest.raises(InputError, match=r"proof\.tables is '.*/none', expected a folder"):
+        plan.check_tables(str(tmp_path / "none"), ["summary.csv"])
+    with pytest.raises(InputError, match=r"a folder that lacks summary\.csv and state\.json$"):
+        plan.check_tables(str(tmp_path), ["summary.csv", "state.json"])
+
+
+def given(text: str) -> dict[str, Any]:
+    """What Snakemake makes of `--config TEXT`: in braces every value is text."""
+    from snakemake.cli import parse_config
+
+    return parse_config([text])
+
+
+def over(text: str) -> dict[str, Any]:
+    """The project's configuration with that laid over it."""
+    from snakemake.utils import update_config
+
+    values = copy.deepcopy(SOUND)
+    update_config(values, given(text))
+    return from_command_line(values, given(text))
+
+
+def test_numbers_in_braces_on_the_command_line_are_read() -> None:
+    """Before: fleet={batch: 3} was refused with "found '3', expected a whole number (without quotes)"."""
+    assert check(over("fleet={batch: 3}")).fleet.batch == 3
+    assert check(over("bench={noise_n: 1e-3}")).bench.noise_n == 1e-3
+    assert check(over("proof={peers: false}")).proof.peers is False
+    assert check(over("black_box={hidden: [4, 5]}")).black_box.hidden == (4, 5)
+    assert check(over("proof={released: {multibody: 1}}")).proof.released["multibody"] == 1
+    assert check(over('proof={release: "2026-11-30"}')).proof.release == "2026-11-30"
+    assert check(over('report={title: "5"}')).report.title == "5"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("fleet={batch: 0}", "fleet.batch: found 0, expected a number of 1 or more"),
+        ("fleet={batch: 010}", "fleet.batch: found '010', expected a whole number"),
+        ("fleet={batch: 3x}", "fleet.batch: found '3x', expected a whole number"),
+        ("fleet={batch: " + "9" * 5000 + "}", "fleet.batch: found '999"),
+        ("fleet={bacth: 3}", "fleet.bacth: no such key is known; did you mean batch?"),
+        ("proof={relased: {multibody: 1}}", "proof.relased: no such key is known; did you mean released?"),
+    ],
+)
+def test_a_wrong_value_in_braces_is_named(text: str, said: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        check(over(text))
+    assert str(error.value).startswith(f"config.yaml: {said}") and len(str(error.value).splitlines()) == 1
+
+
+def test_a_misspelled_family_in_braces_gets_the_right_one() -> None:
+    """Before: "found '1', expected a whole number", of a family that there is not."""
+    cases = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")
+    with pytest.raises(InputError, match=r"proof\.released\.multibdy is no family .*; did you mean multibody\?"):
+        plan.check_families(cases, check(over("proof={released: {multibdy: 1}}")).proof.released, "proof.released")
+
+
 def test_the_library_reads_yaml_in_one_place() -> None:
     """Another reader would take 0652 for 426 and the last of two equal keys."""
     others = [
@@ -199,3 +311,12 @@ def test_a_pattern_that_fits_no_case_is_named() -> None:
 def test_more_folds_than_experiments_are_refused() -> None:
     with pytest.raises(InputError, match=r"black_box\.folds is 4, expected at most the 3 experiments"):
         folds(np.array([1, 1, 2, 3]), 4, np.random.default_rng(0))
+
+
+def test_an_interval_that_nothing_can_promise_is_refused() -> None:
+    """Before: its width was infinite, and the report called that a calibrated interval."""
+    experiments, values = np.repeat(np.arange(12), 2), np.zeros((24, 6))
+    masks = [experiments % 3 == k for k in range(3)]
+    conformal_coverage(values, values, experiments, masks, 0.88)
+    with pytest.raises(InputError, match=r"black_box\.share is 0\.95, expected at most 0\.889, .* 8 experiments"):
+        conformal_coverage(values, values, experiments, masks, 0.95)

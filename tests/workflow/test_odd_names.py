@@ -86,10 +86,29 @@ def test_a_wrong_row_of_the_index_is_one_sentence(project: Project) -> None:
 
 
 @pytest.mark.slow
-def test_a_wrong_setting_is_one_sentence(project: Project) -> None:
-    said = project.snakemake("--dry-run", "--config", "bench={noise_n: -1}", succeeds=False)
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ("bench={noise_n: -1}", "bench.noise_n: found -1, expected a number of 0 or more"),
+        ("raw=nowhere", "raw is 'nowhere', expected a folder of raw logs that is there"),
+        ("proof={tables: nowhere}", "proof.tables is 'nowhere', expected a folder"),
+        ("proof={tables: docs}", "proof.tables is 'docs', a folder that lacks summary.csv, "),
+        (
+            'proof={cases: ["power/*"], seeds: {power: 0}}',
+            "proof.seeds and proof.cases leave no case; expected a family",
+        ),
+        ('proof={release: "2026-11-30", cases: ["single/*"]}', "proof.released and proof.cases leave no case of it"),
+        ("proof={released: {multibdy: 1}}", "proof.released.multibdy is no family of concealed cases; did you mean"),
+        ('decisions={plantings: ["nix*"]}', "decisions.plantings has 'nix*', expected a pattern that fits a name"),
+        ("plantings={kept: docs}", "plantings.kept is 'docs', a folder, expected a table"),
+    ],
+)
+def test_a_wrong_setting_is_one_sentence(project: Project, setting: str, expected: str) -> None:
+    """Before: a folder that is not there was a list of missing files, or a report without its measurements."""
+    said = project.snakemake("--dry-run", "--config", setting, succeeds=False)
     last = said.splitlines()[-1]
-    assert last.startswith("rotorid: ") and "bench.noise_n" in last and "Traceback" not in said
+    assert last.startswith("rotorid: config.yaml: ") and expected in last, said
+    assert "Traceback" not in said
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rotorid import log as logs
 from rotorid.codehash import Code
-from rotorid.config import check
+from rotorid.config import check, from_command_line
 from rotorid.errors import InputError
 from rotorid.text_files import read_yaml
 
@@ -42,7 +42,7 @@ try:
         read_yaml(
             Path(configured)
         )  # Snakemake's own reader takes 0652 for 426 and the last of two equal keys
-    CONFIG = check(config)
+    CONFIG = check(from_command_line(config, workflow.config_settings.config))
 except InputError as error:
     refuse(error)
 

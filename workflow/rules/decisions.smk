@@ -10,11 +10,12 @@ from rotorid.proof.decisions import plan as bench
 EVIDENCE = os.environ.get("ROTORID_EVIDENCE", "") or "cache/evidence"
 try:
     plan.check_families(CASES, CONFIG.decisions.seeds, "decisions.seeds")
+    plan.check_patterns(
+        [planting.name for planting in LISTED], CONFIG.decisions.plantings, "decisions.plantings"
+    )
 except InputError as error:
     refuse(error)
-KEPT_PLANTINGS = planted.chosen(
-    planted.read_list(ROOT / "workflow/plantings.tsv"), CONFIG.decisions.plantings
-)
+KEPT_PLANTINGS = planted.chosen(LISTED, CONFIG.decisions.plantings)
 KEPT_FLIGHTS = list(dict.fromkeys(p.flight for p in KEPT_PLANTINGS))
 KEPT_STUDIES = real.STUDIES if CONFIG.decisions.studies else ()
 KEPT_ITEMS = [
@@ -23,6 +24,8 @@ KEPT_ITEMS = [
     *bench.studies(KEPT_STUDIES),
     *bench.drawn(plan.choose(CASES, CONFIG.decisions.seeds, ["*"])),
 ]
+if not KEPT_ITEMS:
+    refuse("config.yaml: decisions.seeds, decisions.plantings and decisions.studies leave no set")
 # What judges a set is the mismatch stage without its page: another layout of that is no other evidence.
 JUDGING = ["analyse", "instrument/analyse", "verdict"]
 

@@ -7,7 +7,9 @@ INDEX = f"{CONFIG.raw}/sessions.tsv"
 
 
 def index_rows():
-    """Rows of the index of recordings; none where there is no index."""
+    """Rows of the index of recordings; none where there is no index in the folder."""
+    if not Path(CONFIG.raw).is_dir():
+        refuse(f"config.yaml: raw is {CONFIG.raw!r}, expected a folder of raw logs that is there")
     if not Path(INDEX).exists() and not Path(INDEX).is_symlink():
         return []
     try:

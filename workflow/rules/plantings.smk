@@ -17,7 +17,13 @@ PLANTED = planted.batches(PLANTINGS, CONFIG.plantings.batch)
 PLANTED_FLIGHTS = list(dict.fromkeys(p.flight for p in PLANTINGS))
 PLANTED_MEMORY = "cache/plantings"
 
+if Path(CONFIG.plantings.kept).is_dir():
+    refuse(f"config.yaml: plantings.kept is {CONFIG.plantings.kept!r}, a folder, expected a table")
 if "plantings" in sys.argv:
+    if not Path(CONFIG.plantings.kept).exists():
+        print(
+            f"Plantings: {CONFIG.plantings.kept} is not there, so no earlier rows are kept", file=sys.stderr
+        )
     judged = [name for name in PLANTED if Path(f"results/plantings/verdicts/{name}").is_dir()]
     print(planted.announcement(PLANTED, judged), file=sys.stderr)
 

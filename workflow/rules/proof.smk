@@ -10,6 +10,9 @@ from rotorid.proof import plan, studies as real
 
 CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
 ANEW = plan.released(CASES, CONFIG.proof.release)
+TABLES_OF_PROOF = [
+    f"{name}.csv" for name in "summary cases families effects confusion power peers real coefficients".split()
+] + ["state.json"]
 NAMES_OF_CASES = [entry.case for entry in CASES + ANEW]
 try:
     plan.check_families(CASES, CONFIG.proof.seeds)
@@ -18,10 +21,15 @@ try:
     )
     plan.check_patterns(NAMES_OF_CASES, CONFIG.proof.cases, "proof.cases")
     plan.check_patterns(NAMES_OF_CASES, CONFIG.ablation.cases, "ablation.cases")
+    plan.check_tables(CONFIG.proof.tables, TABLES_OF_PROOF)
 except InputError as error:
     refuse(error)
 CHOSEN = plan.choose(CASES, CONFIG.proof.seeds, CONFIG.proof.cases)
 RELEASED = plan.choose(ANEW, CONFIG.proof.released, CONFIG.proof.cases)
+try:
+    plan.check_chosen(CHOSEN, RELEASED, CONFIG.proof.release)
+except InputError as error:
+    refuse(error)
 BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)
 # Concealed sets whose delivered vehicle is put to the test: as many, evenly over the whole list.
 DELIVERED = plan.batches(plan.spread(CASES, CONFIG.proof.delivered), CONFIG.proof.batch)

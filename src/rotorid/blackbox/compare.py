@@ -82,7 +82,16 @@ def conformal_half_width(absolute_error: np.ndarray, experiments: np.ndarray, sh
 def conformal_coverage(
     measured: np.ndarray, predicted: np.ndarray, experiments: np.ndarray, masks: Sequence[np.ndarray], share: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Half widths (6,) from all folds, and the coverage (6,) of each fold by widths from the other folds alone."""
+    """Half widths (6,) from all folds, and the coverage (6,) of each fold by widths from the other folds alone.
+
+    Raises InputError where no width covers `share`: of n experiments n / (n + 1) can be promised.
+    """
+    fewest = min(len(np.unique(experiments[~held_out])) for held_out in masks)
+    if share > fewest / (fewest + 1):
+        raise InputError(
+            f"black_box.share is {share:g}, expected at most {fewest / (fewest + 1):.3g}, all that the {fewest} "
+            f"experiments outside one of {len(masks)} folds can promise"
+        )
     error = np.abs(measured - predicted)
     inside = np.zeros_like(error, bool)
     for held_out in masks:

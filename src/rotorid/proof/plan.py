@@ -17,6 +17,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from rotorid.errors import InputError
+from rotorid.names import listed
 
 BUILD_S, JUDGE_S, PEERS_S, START_S = 6.0, 8.0, 3.0, 4.0
 """Usual seconds of one core: to fly and record a case, to judge it, to ask the peers, to start a job."""
@@ -26,6 +27,8 @@ INSTRUMENTS = ("stand", "bench")
 DRAWN = ("multibody", "continuous", "stand-rig", "bench-rig")
 """Simulators whose cases are drawn whole from one seed."""
 DEVELOPMENT = "/development/"
+MADE = Path("results/proof")
+"""Where the workflow itself makes the tables of a proof."""
 
 
 @dataclass(frozen=True)
@@ -76,16 +79,21 @@ def spread(entries: Sequence[Entry], count: int) -> list[Entry]:
 
 
 def check_families(entries: Sequence[Entry], seeds: Mapping[str, int], key: str = "proof.seeds") -> None:
-    """InputError where `seeds` names a family that is not there: a misspelled one would leave its cases out.
+    """InputError where `seeds` names a family that is not there, or asks for more repetitions than one has.
 
-    `key` is where the configuration holds `seeds`.
+    A misspelled family would leave its cases out. `key` is where the configuration holds `seeds`.
     """
     families = list(dict.fromkeys(e.family for e in entries))
-    for family in seeds:
+    for family, repetitions in seeds.items():
         if family not in families:
             close = difflib.get_close_matches(family, families, n=1)
             hint = f"did you mean {close[0]}?" if close else f"known are {', '.join(families)}."
             raise InputError(f"config.yaml: {key}.{family} is no family of concealed cases; {hint}")
+        most = 1 + max(e.seed for e in entries if e.family == family)
+        if repetitions > most:
+            raise InputError(
+                f"config.yaml: {key}.{family} is {repetitions}, expected at most {most}, all that there are"
+            )
 
 
 def check_patterns(names: Sequence[str], patterns: Sequence[str], key: str) -> None:
@@ -95,6 +103,32 @@ def check_patterns(names: Sequence[str], patterns: Sequence[str], key: str) -> N
             raise InputError(
                 f"config.yaml: {key} has {pattern!r}, expected a pattern that fits a name, as {names[0]!r}"
             )
+
+
+def check_chosen(chosen: Sequence[Entry], drawn: Sequence[Entry], date: str) -> None:
+    """InputError where a proof's settings leave no case at all, or none of the release that they name a date of."""
+    if date and not drawn:
+        raise InputError(
+            f"config.yaml: proof.release is {date!r}, but proof.released and proof.cases leave no case of it; "
+            "expected a family of 1 or more in proof.released whose cases fit a pattern in proof.cases"
+        )
+    if not chosen and not drawn:
+        raise InputError(
+            "config.yaml: proof.seeds and proof.cases leave no case; expected a family of 1 or more in proof.seeds "
+            "whose cases fit a pattern in proof.cases"
+        )
+
+
+def check_tables(folder: str, names: Sequence[str]) -> None:
+    """InputError where `proof.tables` is no folder with these tables; results/proof, which is made, may lack them."""
+    if Path(folder) == MADE:
+        return
+    if not Path(folder).is_dir():
+        raise InputError(
+            f"config.yaml: proof.tables is {folder!r}, expected a folder: docs/proof, or results/proof, which is made"
+        )
+    if lacking := [name for name in names if not (Path(folder) / name).is_file()]:
+        raise InputError(f"config.yaml: proof.tables is {folder!r}, a folder that lacks {listed(lacking)}")
 
 
 def released(entries: Sequence[Entry], date: str) -> list[Entry]:
