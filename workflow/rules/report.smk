@@ -33,7 +33,10 @@ QUOTED = {
     "proof": f"{CONFIG.proof.tables}/state.json",
     "proof_rows": f"{CONFIG.proof.tables}/summary.csv",
 }
-QUOTED_BY = {"abstract": QUOTED, "conclusions": QUOTED}
+QUOTED_BY = {
+    "abstract": QUOTED,
+    "conclusions": QUOTED | {"propellers": "results/rotor/coefficients.json"},
+}
 RECORDED = {row["kind"] for row in SESSIONS}
 LEFT_OUT = sorted({path.stem for path in Path("notebooks").glob("*.md")} - set(CONFIG.report.chapters))
 EMULATED = any(row["source"] == "emulator" for row in SESSIONS)

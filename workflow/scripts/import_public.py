@@ -36,6 +36,7 @@ def main(
     words = {key: entry[key] for key in ("repository", "commit", "licence", "citation", "contents")}
     status_of = {
         "source": source,
+        "taken_from": "folder" if folder else "network",
         "available": obtained.complete,
         "files": len(entry["files"]),
         "files_missing": len(obtained.missing),

@@ -42,12 +42,19 @@ FAULT_NAMES = {
     "no_clock": "no clock",
     "second_sensor": "second sensor",
 }
+HOW_TO_HAVE = {
+    "folder": "ROTORID_PUBLIC_DATA names a folder and files are taken from there alone, so put the missing ones where "
+    "the list says and run again, or unset it and run again where the network reaches their repositories",
+    "network": "ROTORID_PUBLIC_DATA is not set and files are downloaded, so run again where the network reaches their "
+    "repositories, after deleting results/public/<source>.json, or set it to a folder that holds the files",
+}
+"""What to do about files that are missing, by where they were looked for."""
 CHOICES = {"cut", "on_ground"}
 """Kinds that note what part of a log was kept, which is no fault of the log."""
 
 
 def sources(status_files: Sequence[Path]) -> pd.DataFrame:
-    """One row a source: repository, commit, licence, citation, contents, whether it was had."""
+    """One row a source: repository, commit, licence, citation, contents, whether it was had, and from where."""
     rows = []
     for path in status_files:
         status = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -62,6 +69,7 @@ def sources(status_files: Sequence[Path]) -> pd.DataFrame:
                 "files": status["files"] - status["files_missing"],
                 "obtained": "yes" if status["available"] else "no",
                 "reason": status["reason"],
+                "taken_from": status["taken_from"],
             }
         )
     return pd.DataFrame(rows)
@@ -117,11 +125,11 @@ def faults(folders: Sequence[Path]) -> pd.DataFrame:
 def state(table: pd.DataFrame) -> dict:
     """What the report's text needs to know of the table of sources."""
     missing = table[table["obtained"] == "no"]
+    places = set(missing["taken_from"])
     return {
         "available": bool((table["obtained"] == "yes").all()),
         "sources": len(table),
         "obtained": int((table["obtained"] == "yes").sum()),
         "missing": missing[["source", "reason"]].to_dict("records"),
-        "how": "set ROTORID_PUBLIC_DATA to a folder that holds the files, or run again with a network; a "
-        "result that says unavailable is made anew after deleting results/public/<source>.json",
+        "how": "; ".join(how for place, how in HOW_TO_HAVE.items() if place in places),
     }
