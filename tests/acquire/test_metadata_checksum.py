@@ -1,4 +1,4 @@
-"""Metadata of raw logs carry a checksum: a changed bit is noticed, an edit can be meant, older files still read."""
+"""Metadata of raw logs and their index carry a checksum: a changed bit is told, an edit can be meant, old ones read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.acquire.cli import app
-from rotorid.io.index import write_index
+from rotorid.io.index import KEY, read_index, write_index
 from rotorid.io.logs import read_log
 from rotorid.io.session import SessionError, read_session
 from tests.acquire.fault_table import seen
@@ -120,3 +120,65 @@ def test_no_recording_falls_out_of_the_index(log):
         path.write_bytes(path.read_bytes().replace(path.read_bytes()[:8], spoilt, 1))
         with pytest.raises(SessionError, match="were changed after recording"):
             write_index(log.parent)
+
+
+@seen("a bit of the index flipped", "78 of 200 changed a kind, a load or a path and nothing was said")
+def test_every_flipped_bit_of_the_index_is_noticed(log):
+    write_index(log.parent)
+    path, rng = log.parent / "sessions.tsv", random.Random(42)
+    good, rows = path.read_bytes(), read_index(log.parent)
+    last_row = 8 * good.rindex(KEY.encode())
+    anywhere = [rng.randrange(last_row) for _ in range(200)]
+    for bit in anywhere + rng.sample(range(last_row, 8 * len(good)), 100):
+        changed = bytearray(good)
+        changed[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(changed)
+        with pytest.raises(SessionError, match=r"sessions\.tsv"):
+            read_index(log.parent)
+    path.write_bytes(good)
+    assert [row["id"] for row in rows] == [NAME] and read_index(log.parent) == rows
+
+
+@seen("a row of the index edited", "taken, whether it was meant or not")
+def test_an_edit_of_the_index_can_be_meant(log):
+    write_index(log.parent)
+    path = log.parent / "sessions.tsv"
+    good = path.read_bytes()
+    edited = good.replace(b"35.715", b"135.715")
+    path.write_bytes(edited)
+    with pytest.raises(SessionError, match="the index was changed after it was written") as refused:
+        read_index(log.parent)
+    assert f"rotorid-acquire checksum --renew {path}" in str(refused.value) and "\n" not in str(refused.value)
+    code, text = command("checksum", str(path))
+    assert code == 1 and "was changed after it was written" in text and path.read_bytes() == edited
+    assert command("checksum", "--renew", str(path)) == (0, f"{path}: 1 checksums written, 0 fitted already\n")
+    assert [row["load_gf"] for row in read_index(log.parent)] == ["135.715"]
+    assert path.read_bytes().splitlines()[:-1] == edited.splitlines()[:-1]
+    assert command("index", str(log.parent))[0] == 0 and path.read_bytes() == good
+
+
+def test_rows_behind_the_checksum_and_a_row_that_is_none_are_told(log):
+    write_index(log.parent)
+    path = log.parent / "sessions.tsv"
+    row = path.read_text().splitlines()[1]
+    path.write_text(path.read_text() + row.replace(NAME, "mine", 1) + "\n")
+    with pytest.raises(SessionError, match="the index was changed after it was written"):
+        read_index(log.parent)
+    assert command("checksum", "--renew", str(path))[0] == 0
+    assert [row["id"] for row in read_index(log.parent)] == [NAME, "mine"]
+    assert path.read_text().splitlines()[-1].startswith(KEY)
+    path.write_text(path.read_text() + "short\tline\n")
+    before = path.read_bytes()
+    code, text = command("checksum", "--renew", str(path))
+    assert code == 1 and "has 2 cells, expected 22" in text and path.read_bytes() == before
+
+
+def test_an_index_without_a_checksum_is_read_and_given_one(log):
+    write_index(log.parent)
+    path = log.parent / "sessions.tsv"
+    good, rows = path.read_bytes(), read_index(log.parent)
+    path.write_bytes(good[: good.rindex(KEY.encode())])
+    assert read_index(log.parent) == rows
+    assert command("checksum", str(log.parent)) == (0, f"{log.parent}: 1 checksums written, 1 fitted already\n")
+    assert path.read_bytes() == good
+    assert command("checksum", "--renew", str(path)) == (0, f"{path}: 0 checksums written, 1 fitted already\n")

@@ -22,7 +22,7 @@ import pytest
 from rotorid.acquire.plan import read_plan, steps_of
 from rotorid.errors import InputError
 from rotorid.io import rawlog
-from rotorid.io.index import COLUMNS, read_index, write_index
+from rotorid.io.index import COLUMNS, read_index, with_checksum, write_index
 from rotorid.io.lines import read_description
 from rotorid.io.logs import read_log
 from rotorid.io.session import read_session
@@ -202,6 +202,7 @@ def described(what: str, text: str, *said: str) -> Wrong:
     return Wrong(f"d.yaml: {what}", "d.yaml", written(text), read_description, said)
 
 
+SUMMED = with_checksum(tsv(ROW).encode()).decode()
 TABLE = [
     *yaml_faults("run.yaml", read_session, SESSION),  # before: UnicodeDecodeError, IsADirectoryError, a crash, no end
     session("no id", "id: run\n", "", "id: is missing"),
@@ -248,6 +249,10 @@ TABLE = [
     index("a recording twice", tsv(ROW, ROW), "line 3: run is there twice (first in line 2)"),
     index("a file elsewhere", tsv(ROW | {"file": "../../x.rlog"}), "line 2: file: found '../../x.rlog'"),
     index("a file of the whole computer", tsv(ROW | {"metadata": "/x.yaml"}), "line 2: metadata"),
+    # before: a kind, an order or a load of another recording was taken
+    index("a changed name", SUMMED.replace("\nrun\t", "\nrum\t"), "was changed after it was written", "--renew"),
+    index("a changed path", SUMMED.replace("a/run.rlog", "a/ran.rlog"), "was changed after it was written"),
+    index("a row behind", SUMMED + SUMMED.splitlines()[1].replace("run", "new") + "\n", "was changed after"),
     index("an open quotation", tsv(ROW | {"kind": '"a'}), "not a table"),
     *kinds_of_file("c.npz", network, "")[:2],
     Wrong("c.npz: text", "c.npz", written("hello"), network, ("cannot be read as a checkpoint",)),

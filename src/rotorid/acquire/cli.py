@@ -361,17 +361,17 @@ def check(
 
 @app.command()
 def checksum(
-    place: Annotated[Path, typer.Argument(help="a log, its metadata, or a folder of recordings")],
+    place: Annotated[Path, typer.Argument(help="a log, its metadata, an index (sessions.tsv), or a folder")],
     renew: Annotated[bool, typer.Option("--renew", help="also where one is there and no longer fits")] = False,
 ) -> None:
-    """Add the checksum to metadata that have none. After a meant edit of a recording's metadata, --renew it."""
+    """Add the checksum to metadata and indexes that have none. After a meant edit of such a file, --renew it."""
     from rotorid.acquire import checksum
 
     paths, written = [], 0
     try:
         paths = checksum.metadata_of(place)
         if renew and len(paths) > 1:
-            _fail(f"{place}: --renew is for one recording at a time, found {len(paths)}")
+            _fail(f"{place}: --renew is for one file at a time, found {len(paths)}")
         for path in paths:
             written += checksum.renew(path) if renew else checksum.add(path)
     except (InputError, OSError) as error:

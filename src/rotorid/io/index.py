@@ -1,22 +1,32 @@
-"""`raw/sessions.tsv`: one row per recording, made from the metadata beside the logs."""
+"""`raw/sessions.tsv`: one row per recording, made from the metadata beside the logs.
+
+Its last row is no recording: `sessions_sha256` and the SHA-256 of all bytes but that row's, so that a changed bit is
+noticed, as in metadata (`rotorid.io.metadata_checksum`). An index without that row, as earlier versions wrote it, is
+read all the same.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
+from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
 from rotorid.bounds import LARGEST_INDEX
 from rotorid.errors import InputError
-from rotorid.io.session import Session, SessionError, read_session, replace_text
+from rotorid.io.session import Session, SessionError, read_session, replace_bytes
 from rotorid.names import hint, listed
-from rotorid.text_files import read_text
+from rotorid.text_files import check_text, read_bytes
 
 COLUMNS = (
     "id group kind instrument platform axis load_gf cell experiment mount_roll_deg mount_pitch_deg throttle "
     "infill_percent specimen repeat started source ended samples missing file metadata"
 ).split()
 
+NAME = "sessions.tsv"
+KEY = "sessions_sha256"
+_ROW = re.compile(rb"^sessions_sha256\t.*\n?", re.MULTILINE)
 LOCAL = "local"
 """Folder for recordings that no index takes unasked."""
 
@@ -42,8 +52,40 @@ def write_index(raw: Path) -> list[dict[str, str]]:
     writer = csv.DictWriter(text, COLUMNS, delimiter="\t", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    replace_text(raw / "sessions.tsv", text.getvalue())
+    replace_bytes(raw / NAME, with_checksum(text.getvalue().encode()))
     return rows
+
+
+def with_checksum(data: bytes) -> bytes:
+    """The index with a checksum that fits in its last row; one that is there is replaced, every other byte is kept."""
+    rest = _ROW.sub(b"", data)
+    if not rest.endswith(b"\n"):
+        rest += b"\n"
+    # As many cells as the others: to every reader of tables it stays one.
+    cells = [KEY, sha256(rest).hexdigest()]
+    return rest + "\t".join(cells + [""] * (len(COLUMNS) - len(cells))).encode() + b"\n"
+
+
+def add_checksum(path: Path) -> bool:
+    """Give an index the checksum that it lacks; True if it had none. Raises SessionError for an index that is none."""
+    read_index(path.parent)
+    data = read_bytes(path, LARGEST_INDEX)
+    if _ROW.search(data) is None:
+        replace_bytes(path, with_checksum(data))
+        return True
+    return False
+
+
+def renew_checksum(path: Path) -> bool:
+    """Make the checksum fit what stands in the index now; True if it did not. Raises SessionError where it is none."""
+    if not path.exists():
+        raise SessionError(f"{path}: no such file; `rotorid-acquire index` makes it")
+    data = read_bytes(path, LARGEST_INDEX)
+    if (after := with_checksum(data)) == data:
+        return False
+    _rows(after, path)
+    replace_bytes(path, after)
+    return True
 
 
 def metadata_files(raw: Path) -> list[Path]:
@@ -54,14 +96,31 @@ def metadata_files(raw: Path) -> list[Path]:
 
 
 def read_index(raw: Path) -> list[dict[str, str]]:
-    """Rows of the index. Raises SessionError where there is none, its columns are others or a row is none."""
-    path = raw / "sessions.tsv"
+    """Rows of the index.
+
+    Raises SessionError where there is none, its columns are others, a row is none or its checksum does not fit.
+    """
+    path = raw / NAME
     if not path.exists() and not path.is_symlink():
         raise SessionError(f"{path}: no such file; `rotorid-acquire index` makes it")
     try:
-        lines = read_text(path, LARGEST_INDEX).splitlines()
+        data = read_bytes(path, LARGEST_INDEX)
+        rows = _rows(data, path)
     except InputError as error:
         raise SessionError(str(error)) from None
+    if _ROW.search(data) is not None and with_checksum(data) != data:
+        raise SessionError(
+            f"{path}: the index was changed after it was written, its checksum ({KEY}, the last row) does not fit; "
+            f"make it anew from the metadata: rotorid-acquire index {raw}, or, if the change is meant, renew the "
+            f"checksum: rotorid-acquire checksum --renew {path}"
+        )
+    return rows
+
+
+def _rows(data: bytes, path: Path) -> list[dict[str, str]]:
+    """Rows of an index without that of its checksum."""
+    check_text(data, path)
+    lines = data.decode("utf-8-sig").splitlines()
     found = lines[0].split("\t") if lines else []
     if found != COLUMNS:
         wrong = next((name for name in found if name not in COLUMNS), None)
@@ -73,7 +132,10 @@ def read_index(raw: Path) -> list[dict[str, str]]:
     except csv.Error as error:
         raise SessionError(f"{path}: not a table ({error}); `rotorid-acquire index` makes it anew") from None
     seen: dict[str, int] = {}
+    recordings = []
     for number, row in enumerate(rows, 2):
+        if row[:1] == [KEY]:
+            continue
         if len(row) != len(COLUMNS):
             raise SessionError(f"{path}, line {number}: has {len(row)} cells, expected {len(COLUMNS)}")
         if row[0] in seen:
@@ -82,8 +144,11 @@ def read_index(raw: Path) -> list[dict[str, str]]:
         for name in ("file", "metadata"):
             place = PurePosixPath(row[COLUMNS.index(name)])
             if place.is_absolute() or ".." in place.parts or not place.name:
-                raise SessionError(f"{path}, line {number}: {name}: found {str(place)!r}, expected a file below {raw}")
-    return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
+                raise SessionError(
+                    f"{path}, line {number}: {name}: found {str(place)!r}, expected a file below {path.parent}"
+                )
+        recordings.append(dict(zip(COLUMNS, row, strict=True)))
+    return recordings
 
 
 def _is_session(path: Path) -> bool:

@@ -191,11 +191,6 @@ def write_session(session: Session, path: str | Path) -> None:
     replace_bytes(Path(path), metadata_checksum.with_checksum(text.encode()))
 
 
-def replace_text(path: Path, text: str) -> None:
-    """Put a whole new text in the place of a file, or leave it as it is. Raises OSError."""
-    replace_bytes(path, text.encode())
-
-
 def replace_bytes(path: Path, data: bytes) -> None:
     """Put a whole new content in the place of a file, or leave it as it is. Raises OSError."""
     temporary = path.with_name(path.name + ".tmp")
