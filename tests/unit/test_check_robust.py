@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -45,6 +46,33 @@ def test_a_rotor_that_keeps_its_speed_is_named(tmp_path: Path) -> None:
     folder = sound(tmp_path / "set")
     turning().assign(**{SPEEDS[2]: 1073.0}).to_csv(folder / "run.csv", index=False)
     assert f"run: {SPEEDS[2]} keeps one value (1073)" in found_in(folder, SPEEDS[2], "one value")
+
+
+def test_doubts_of_several_runs_are_sentences(tmp_path: Path) -> None:
+    """Before: "a sensor that stands still The same in 1 more."."""
+    folder = sound(tmp_path / "set")
+    for name in ("run", "run2"):
+        turning(seed=len(name)).assign(**{SPEEDS[2]: 1073.0}).to_csv(folder / f"{name}.csv", index=False)
+    assert found_in(folder, SPEEDS[2], "one value").endswith("a sensor that stands still. The same in 1 more.")
+
+
+@pytest.mark.parametrize(("dead", "stops"), [("xyz", True), ("y", False)])
+def test_readings_of_a_bench_that_stand_still_are_named(tmp_path: Path, dead: str, stops: bool) -> None:
+    """Before: nothing was said, and of a bench that read nothing at all a tare offset was established."""
+    rng, count = np.random.default_rng(0), 200
+    for k in range(3):
+        frame = pd.DataFrame({c.TIME: np.arange(count) / 20})
+        for axis, force, reference in zip("xyz", c.FORCE, c.REFERENCE_FORCE, strict=True):
+            frame[reference] = np.round(rng.standard_normal(count), 4)
+            frame[force] = 1.0 if axis in dead else frame[reference] + 0.01 * rng.standard_normal(count)
+        frame.to_csv(tmp_path / f"run{k}.csv", index=False)
+    (tmp_path / "vehicle.yaml").write_text("name: b\nkind: bench\n")
+    (doubt,) = check_folder(tmp_path).doubts
+    assert doubt.what == c.FORCE["xyz".index(dead[0])] and doubt.stops == stops
+    verb = "keep" if len(dead) > 1 else "keeps"
+    assert (
+        f"{verb} one value (1) in every run while " in doubt.sentence and "a sensor that stands still" in doubt.sentence
+    )
 
 
 def test_a_copied_run_is_named(tmp_path: Path) -> None:

@@ -80,7 +80,8 @@ def _once(found: list[tuple[str, Doubt]]) -> list[Doubt]:
         alike.setdefault((doubt.what, re.sub(r"[-\d.]+", "", doubt.sentence)), []).append((run, doubt))
     out = []
     for (run, first), *others in alike.values():
-        more = f" The same in {len(others)} more." if others else ""
+        end = "" if first.sentence.endswith((".", "?")) else "."
+        more = f"{end} The same in {len(others)} more." if others else ""
         out.append(replace(first, sentence=f"{run}: {first.sentence}{more}"))
     return out
 
