@@ -28,6 +28,8 @@ LATE_RAD = 0.4
 this leaves half of its phase margin of about 70 degrees."""
 MEAN_TILT_COSINE = 0.96
 """Of the swings, roughly."""
+SECONDS, FLIGHTS, SEED = 20.0, 2, 1
+"""The flights that `rotorid simulate` makes unless told otherwise, and that a vehicle must stand to be delivered."""
 START_HEIGHT_M = 100.0
 """Above the ground at the start: out of its effect, and in the air until the end though nobody holds the height."""
 

@@ -1,14 +1,19 @@
 """A delivered vehicle is a body that hovers and flies."""
 
+import inspect
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.cli.simulating import simulate
+from rotorid.control.swings import FLIGHTS, SECONDS, SEED
 from rotorid.mismatch.delivery.usable import (
     cannot_fly,
     cannot_hover,
     full_thrust_n,
     no_body,
+    own_faults,
     question_of,
     recorded_share,
 )
@@ -77,3 +82,16 @@ def test_it_flies_under_the_projects_controller_and_one_that_cannot_is_said():
 def test_what_the_believed_vehicle_fails_itself_is_not_asked_of_another():
     weak = vehicle(thrust_coefficient_n_s2=0.72 * 0.652 * 9.81 / (4 * 1600**2))
     assert question_of(weak, ())(weak) == "" and question_of(vehicle(), ())(weak)
+    (fault,) = own_faults(weak, ())[:1]
+    assert "full thrust is 4.61 N" in fault and own_faults(vehicle(), ()) == ()
+
+
+def test_a_vehicle_that_turns_over_late_is_caught():
+    """Hovering takes 87 % of its thrust: the swings of `rotorid simulate` turn it over after some seconds."""
+    tight = vehicle(rotor_speed_limits_rad_s=(0.0, 1150.0))
+    assert cannot_hover(tight, 0.0) == "" and "turns over" in cannot_fly(tight)
+
+
+def test_the_trial_is_the_flight_that_is_simulated_of_the_file():
+    asked = inspect.signature(simulate).parameters
+    assert [asked[name].default for name in ("seconds", "flights", "seed")] == [SECONDS, FLIGHTS, SEED]
