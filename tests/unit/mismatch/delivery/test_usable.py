@@ -6,8 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid import templates
 from rotorid.cli.simulating import simulate
 from rotorid.control.swings import FLIGHTS, SECONDS, SEED
+from rotorid.mismatch.delivery import usable
 from rotorid.mismatch.delivery.usable import (
     cannot_fly,
     cannot_hover,
@@ -86,10 +88,22 @@ def test_what_the_believed_vehicle_fails_itself_is_not_asked_of_another():
     assert "full thrust is 4.61 N" in fault and own_faults(vehicle(), ()) == ()
 
 
-def test_a_vehicle_that_turns_over_late_is_caught():
-    """Hovering takes 87 % of its thrust: the swings of `rotorid simulate` turn it over after some seconds."""
-    tight = vehicle(rotor_speed_limits_rad_s=(0.0, 1150.0))
-    assert cannot_hover(tight, 0.0) == "" and "turns over" in cannot_fly(tight)
+def test_a_vehicle_that_turns_over_late_is_caught(monkeypatch):
+    """Two seconds of swings do not turn over what the flights of `rotorid simulate` do."""
+    tipping = {"id": "flapping_moment", "form": "at the hubs", "parameters": {"k_flap": -1e-5}}
+    late = vehicle(effects=(tipping,))  # the faster it flies, the more it leans into it
+    assert "turns over" in cannot_fly(late)
+    monkeypatch.setattr(usable, "SECONDS", 2.0)
+    assert cannot_fly(late) == ""
+
+
+@pytest.mark.parametrize("over_weight", [1.12, 1.4])
+def test_a_sound_vehicle_with_little_to_spare_is_not_turned_over_by_its_pilot(over_weight):
+    """An x500, as proposed for a Copter's log, turned over: a yaw that its rotors could not make took the rest."""
+    made = templates.read("x500")
+    full = np.sqrt(over_weight * made.mass_kg * made.gravity_m_s2 / made.thrust_coefficients_n_s2().sum())
+    assert cannot_fly(made) == ""
+    assert cannot_fly(made.model_copy(update={"rotor_speed_limits_rad_s": (0.0, float(full))})) == ""
 
 
 def test_the_trial_is_the_flight_that_is_simulated_of_the_file():
