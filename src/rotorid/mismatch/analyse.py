@@ -23,7 +23,7 @@ from rotorid.mismatch.delivery.gate import Offer, Settled, gate
 from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
 from rotorid.mismatch.delivery.reduce import chain_ids, with_only
 from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
-from rotorid.mismatch.delivery.usable import own_faults, question_of
+from rotorid.mismatch.delivery.usable import exports_lost, own_faults, question_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed, with_shares
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, RunWind, Trace
@@ -287,11 +287,13 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
     reasons = gated.withheld_values
     withheld = {n: reasons[k] for n, keys in names_of(choice.stated).items() for k in keys if k in reasons}
     notes = [fell_back_note(k, why) for k, why in gated.fell_back.items()]
+    carried = with_effects(last.improved, [f for f in claimed(findings) if f.delivered and place_of(f) == "vehicle"])
+    notes += [*own_faults(vehicle, choice.recordings.runs), *exports_lost(carried, vehicle)]
     return replace(
         with_shares(last),
         worse_elsewhere=tuple(map(str, gated.worse(model))),
         withheld_values=withheld,
-        notes=(*last.notes, *notes, *own_faults(vehicle, choice.recordings.runs)),
+        notes=(*last.notes, *notes),
         believed_values=value_rows(model, settled, last.improved, vehicle),
         value_correlations=value_correlations(model, settled),
     )

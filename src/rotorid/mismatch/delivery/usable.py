@@ -12,6 +12,7 @@ import numpy as np
 
 from rotorid.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.errors import InputError
+from rotorid.exports.forms import FORMS, export_vehicle
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import NO_BODY
@@ -114,3 +115,18 @@ def recorded_share(runs: Sequence[Run], vehicle: Vehicle) -> float:
             flying = share[share > LIGHT * np.nanmax(share)]
             return float(np.median(flying)) if len(flying) else 0.0
     return 0.0
+
+
+def exports_lost(vehicle: Vehicle, believed: Vehicle) -> tuple[str, ...]:
+    """Forms of other tools that take the believed vehicle and not this one, a sentence each."""
+    out = []
+    for form in FORMS:
+        try:
+            export_vehicle(believed, form)
+        except InputError:
+            continue
+        try:
+            export_vehicle(vehicle, form)
+        except InputError as error:
+            out.append(f"The improved vehicle cannot be exported as {form}: {error}.")
+    return tuple(out)
