@@ -17,14 +17,13 @@ EXACT_BODIES = {"mjcf": "MuJoCo", "sdf": "Gazebo"}
 
 
 def refusal(to: str, rotor_count: int, inertia_kg_m2: np.ndarray) -> str:
-    """Why the tool of a form does not take a vehicle with this inertia (3, 3), without a full stop; empty if it does."""
+    """Why the tool of a form does not take a vehicle with this inertia (3, 3); no full stop, empty where it does."""
     if to in FOUR_ROTORS and rotor_count != 4:
         return f"{FOUR_ROTORS[to]} knows four rotors, found {rotor_count}"
     principal = np.linalg.eigvalsh(inertia_kg_m2)
     if to in EXACT_BODIES and (principal[0] <= 0 or principal[2] > (principal[0] + principal[1]) * (1 + 1e-9)):
         shown = listed([f"{moment:.5g}" for moment in principal])
         return (
-            f"{EXACT_BODIES[to]} takes no principal moment of inertia above the sum of the others, "
-            f"found {shown} kg m2"
+            f"{EXACT_BODIES[to]} takes no principal moment of inertia above the sum of the others, found {shown} kg m2"
         )
     return ""

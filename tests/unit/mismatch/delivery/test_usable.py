@@ -118,5 +118,7 @@ def test_an_export_that_the_estimates_cost_is_said_and_the_vehicle_stays():
     flat = vehicle(inertia_kg_m2=j.model_copy(update={"zz": 1.03 * (j.xx + j.yy)}))
     assert no_body(flat) == "" and exports_lost(vehicle(), vehicle()) == ()
     said = exports_lost(flat, vehicle())
-    assert [s.split(":")[0] for s in said] == [f"The improved vehicle cannot be exported as {f}" for f in ("mjcf", "sdf")]
+    assert [s.split(":")[0] for s in said] == [
+        f"The improved vehicle cannot be exported as {f}" for f in ("mjcf", "sdf")
+    ]
     assert exports_lost(flat, flat) == ()
