@@ -34,7 +34,8 @@ def test_the_schema_is_in_step():
 def test_the_file_has_the_keys_of_the_contract():
     content = json.loads(verdict_of(analysis(findings=[drag_finding()])).text())
     assert list(content) == [
-        *("set", "kind", "runs", "verdict", "doubts", "sentence", "details", "warnings", "channels", "locations"),
+        *("set", "kind", "runs", "verdict", "basis", "doubts", "sentence", "size", "details", "warnings", "channels"),
+        "locations",
         *("effects", "absent", "parameters", "believed_values", "correlations"),
         *("not_testable", "unexplained", "next_experiment"),
     ]
