@@ -77,6 +77,13 @@ def test_a_stand_says_how_long_it_was_read_and_what_is_missing():
     )
 
 
+def test_a_stand_that_reads_one_axis_lacks_the_others():
+    time = np.arange(2001) / 100
+    table = pd.DataFrame({"time_s": time, "force_z_n": np.sin(time)})
+    names = list(missing(set_of(Run("a", table), kind="stand")))
+    assert names[:2] == ["force along x and y", "moments"]
+
+
 def test_a_bench_lacks_the_reference_of_an_axis_alone():
     time = np.arange(2001) / 100
     table = pd.DataFrame({"time_s": time, "force_x_n": time, "force_y_n": time, "reference_force_x_n": time})

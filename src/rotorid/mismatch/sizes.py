@@ -53,7 +53,7 @@ def of_flight(vehicle: Vehicle) -> dict[str, Scale]:
     out = {f"force_{axis}": Scale(weight, "of the weight") for axis in "xyz"}
     for axis, name, moment in zip("xyz", AXES, moments, strict=True):
         if moment > 0:
-            out[f"moment_{axis}"] = Scale(float(moment), f"of the {name} moment it can make")
+            out[f"moment_{axis}"] = Scale(float(moment), f"of the available {name} moment")
     out |= {f"rotor_speed_{i + 1}": Scale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
     out |= {f"accelerometer_{axis}": Scale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
     return out | {f"gyroscope_{axis}": Scale(FASTEST_RAD_S, "of 1 rad/s") for axis in "xyz"}

@@ -93,46 +93,42 @@ def _squares(run: Run, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray] | None
 
 def missing(recordings: RecordingSet) -> Iterator[str]:
     """Names of what the contract knows for this kind of set and no run has; with a count where some runs have it."""
-    count, kind = recordings.vehicle.rotor_count, recordings.vehicle.kind
-    speeds = c.rotor_columns("rotor_speed", count)
-    commands = [c.rotor_columns("rotor_command", count), c.rotor_columns("throttle", count)]
-    groups: dict[str, list[tuple[str, ...]]]
-    if kind == "flight":
-        groups = {
-            "rotor speeds": [speeds],
-            "commands": commands,
+    runs = recordings.runs
+    for name, ways in wanted(recordings).items():
+        having = sum(any(run.has(*way) for way in ways) for run in runs)
+        if having == 0:
+            yield name
+        elif having < len(runs):
+            yield f"{name} in {len(runs) - having} of {len(runs)} runs"
+
+
+def wanted(recordings: RecordingSet) -> dict[str, list[tuple[str, ...]]]:
+    """Name of each thing that may be recorded to the columns, any of which in full are it."""
+    vehicle, runs = recordings.vehicle, recordings.runs
+
+    def rotors(kind: str) -> tuple[str, ...]:
+        return c.rotor_columns(kind, vehicle.rotor_count)
+
+    def there(name: str) -> bool:
+        return any(run.has(name) for run in runs)
+
+    turning = {"rotor speeds": [rotors("rotor_speed")], "commands": [rotors("rotor_command"), rotors("throttle")]}
+    voltage = {"battery voltage": [(c.BATTERY_VOLTAGE,)]}
+    if vehicle.kind == "flight":
+        heights = [(c.HEIGHT,)] if vehicle.ground_z_m is None else [(c.HEIGHT,), (c.POSITION[2],)]
+        return turning | {
             "accelerometer": [c.SPECIFIC_FORCE],
             "body rates": [c.ANGULAR_VELOCITY],
             "attitude": [c.QUATERNION],
             "position and velocity": [c.POSITION, c.VELOCITY],
-            "height above ground": [
-                (c.HEIGHT,),
-                *([("position_z_m",)] if recordings.vehicle.ground_z_m is not None else []),
-            ],
-            "battery voltage": [(c.BATTERY_VOLTAGE,)],
-        }
-    elif kind == "stand":
-        groups = {
-            "forces": [c.FORCE],
-            "moments": [c.MOMENT],
-            "rotor speeds": [speeds],
-            "commands": commands,
-            "attitude of the mount": [c.MOUNT],
-            "battery voltage": [(c.BATTERY_VOLTAGE,)],
-        }
-    else:
-        pairs = zip(c.FORCE, c.REFERENCE_FORCE, strict=True)
-        there = {
-            n
-            for run in recordings.runs
-            for pair in zip(c.FORCE, c.REFERENCE_FORCE, strict=True)
-            for n in pair
-            if run.has(n)
-        }
-        groups = {n: [(n,)] for pair in pairs if there & set(pair) for n in pair}
-    for name, ways in groups.items():
-        having = sum(any(run.has(*way) for way in ways) for run in recordings.runs)
-        if having == 0:
-            yield name
-        elif having < len(recordings.runs):
-            yield f"{name} in {len(recordings.runs) - having} of {len(recordings.runs)} runs"
+            "height above ground": heights,
+        } | voltage  # fmt: skip
+    if vehicle.kind == "stand":
+        wrench = {}
+        for group, names in (("force", c.FORCE), ("moment", c.MOMENT)):
+            axes = [axis for axis, name in zip("xyz", names, strict=True) if not there(name)]
+            along = f"{group} along {listed(axes)}" if 0 < len(axes) < 3 else f"{group}s"
+            wrench[along] = [tuple(name for name in names if not axes or not there(name))]
+        return wrench | turning | {"attitude of the mount": [c.MOUNT]} | voltage
+    pairs = zip(c.FORCE, c.REFERENCE_FORCE, strict=True)
+    return {name: [(name,)] for pair in pairs if any(map(there, pair)) for name in pair}

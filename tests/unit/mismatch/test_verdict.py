@@ -171,7 +171,7 @@ def test_the_sentence_goes_by_size_and_names_what_stays_off():
     made = replace(made, traces=tuple(map(changed, made.traces)), noise_floor=made.noise_floor | {"force_x": 0.002})
     found = verdict_of(made)
     assert "the pitch moment stays 0.32 N m off" in found.sentence
-    assert "% of the pitch moment it can make" in found.sentence
+    assert "% of the available pitch moment" in found.sentence
     assert "rotor drag" in found.sentence
 
 
