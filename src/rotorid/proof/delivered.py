@@ -109,4 +109,4 @@ def refused_by(vehicle: Vehicle) -> dict[str, str]:
 def table(files: Sequence[Path]) -> pd.DataFrame:
     """Rows of all sets in one table."""
     rows = [row for file in files for row in json.loads(file.read_text(encoding="utf-8"))]
-    return pd.DataFrame(rows, columns=COLUMNS).fillna("")
+    return pd.DataFrame([[row.get(name, "") for name in COLUMNS] for row in rows], columns=COLUMNS)
