@@ -46,6 +46,9 @@ class Offered:
     unusable: Callable[[Settled], str] = lambda settled: ""
     """Why the vehicle of a settled offer is no body that hovers and flies; empty where it is."""
     remarks: tuple[str, ...] = ()
+    restates: bool = True
+    """Whether numbers are stated by the settled fit even where nothing was kept out; else by the fit that found them,
+    with the believed values free."""
 
 
 def suggested_keys(words: Analysis, stated: Values, names: Mapping[str, str]) -> set[str]:
@@ -59,9 +62,10 @@ def as_delivered(offered: Offered) -> Analysis:
     words, model = offered.words, offered.model
     gated = gate(model, offered.offer, offered.plain, offered.believed_left, offered.unusable)
     settled = gated.settled
-    stated = restated(words.findings, model, settled)
+    through = offered.whole and gated.passes_whole and settled.moved.keys() == offered.moved.keys()
+    stated = words.findings if through and not offered.restates else restated(words.findings, model, settled)
     findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in stated)
-    if offered.whole and gated.passes_whole and settled.moved.keys() == offered.moved.keys():
+    if through:
         last = replace(words, findings=findings, improved=offered.improved(settled))
     else:
         last = replace(

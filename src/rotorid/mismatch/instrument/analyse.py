@@ -273,6 +273,7 @@ def offered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, 
         whole=len(active) == len(model.selection.active) and not suggested and not gone,
         improved=lambda settled: choice.vehicle({**settled.moved, **settled.offer.values}),
         again=again,
+        restates=False,
     )
 
 
