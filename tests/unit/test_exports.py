@@ -12,10 +12,11 @@ from typer.testing import CliRunner
 
 from rotorid import templates
 from rotorid.cli import app
-from rotorid.exports import export_vehicle, flown
+from rotorid.errors import InputError
+from rotorid.exports import export_vehicle, flown, forms
 from rotorid.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 from rotorid.recordings import Vehicle, write_vehicle
-from rotorid.recordings.vehicle import Inertia
+from rotorid.recordings.vehicle import Inertia, Rotor
 
 
 def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
@@ -304,9 +305,50 @@ def test_a_trial_that_fails_is_one_sentence_and_the_file_is_there(tmp_path, monk
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["vehicle.py"]
 
 
-def test_a_file_that_the_tool_does_not_read_is_not_written(tmp_path) -> None:
+FLAT = with_effects().model_copy(update={"inertia_kg_m2": Inertia(xx=0.002, yy=0.002, zz=0.0041)})
+"""A yaw inertia 2.5 % above what a body can have, as estimates of flat vehicles are."""
+
+
+def six_rotors() -> Vehicle:
+    angles = np.pi / 3 * np.arange(6)
+    rotors = [Rotor(x_m=0.1 * np.cos(a), y_m=0.1 * np.sin(a), spin=("ccw", "cw")[i % 2]) for i, a in enumerate(angles)]
+    return with_effects().model_copy(update={"rotors": tuple(rotors)})
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "form", "said"),
+    [
+        (FLAT, "mjcf", "MuJoCo takes no principal moment of inertia above the sum of the others"),
+        (FLAT, "sdf", "Gazebo takes no principal moment"),
+        (six_rotors(), "rotorpy", "RotorPy knows four rotors, found 6"),
+        (six_rotors(), "gym-pybullet-drones", "knows four rotors, found 6"),
+    ],
+)
+def test_what_a_tool_does_not_take_is_one_sentence_before_anything_is_written(tmp_path, vehicle, form, said) -> None:
+    done = exported_by_command(tmp_path, vehicle, form, "file")
+    assert done.exit_code == 1 and said in done.output
+    assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()
+
+
+def test_a_tool_refuses_what_is_refused_for_it(monkeypatch) -> None:
+    """The limits are the tools' own: without them the tools say the same."""
+    monkeypatch.setattr(forms, "refusal", lambda *asked: "")
+    for vehicle, form, module in ((FLAT, "mjcf", "mujoco"), (six_rotors(), "rotorpy", "rotorpy")):
+        pytest.importorskip(module)
+        with pytest.raises(InputError, match="does not read the exported vehicle"):
+            flown.try_out(vehicle, form, export_vehicle(vehicle, form))
+
+
+def test_other_tools_take_what_one_refuses() -> None:
+    for form in ("rotorpy", "gym-pybullet-drones", "px4"):
+        assert export_vehicle(FLAT, form).text
+    for form in ("mjcf", "sdf", "px4"):
+        assert export_vehicle(six_rotors(), form).text
+
+
+def test_a_file_that_the_tool_does_not_read_is_not_written(tmp_path, monkeypatch) -> None:
     pytest.importorskip("mujoco")
-    flat = Inertia(xx=0.002, yy=0.002, zz=0.02)  # more than xx + yy: of no body
-    done = exported_by_command(tmp_path, with_effects().model_copy(update={"inertia_kg_m2": flat}), "mjcf", "v.xml")
+    monkeypatch.setattr(forms, "refusal", lambda *asked: "")
+    done = exported_by_command(tmp_path, FLAT, "mjcf", "v.xml")
     assert done.exit_code == 1 and "MuJoCo does not read the exported vehicle" in done.output
     assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()

@@ -78,6 +78,7 @@ def verdict(
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)
         else:
+            typer.echo(found.basis.sentence)
             for line in (*(d.sentence for d in found.doubts), *found.warnings):
                 typer.echo(f"! {line}")
             typer.echo(found.sentence)

@@ -17,6 +17,7 @@ from rotorid.recordings import columns as c
 from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import hover
 from rotorid.vehicle.improved import active_speed_forms, command_path, record_as_stated, simulate_as_stated
+from rotorid.vehicle.mixer import allocation_matrix
 from rotorid.vehicle.simulator import Noise, Start
 
 STIFFNESS_RAD_S, DAMPING = 10.0, 0.8
@@ -28,6 +29,16 @@ LATE_RAD = 0.4
 this leaves half of its phase margin of about 70 degrees."""
 MEAN_TILT_COSINE = 0.96
 """Of the swings, roughly."""
+SECONDS, FLIGHTS, SEED = 20.0, 2, 1
+"""The flights that `rotorid simulate` makes unless told otherwise, and that a vehicle must stand to be delivered."""
+YAW_SHARE = 0.6
+"""Of what each rotor may turn faster or slower than in hover, by its square: what the yaw may ask for.
+
+A yaw that asks for all that the rotors can do leaves nothing to hold roll and pitch: such a pilot turns a sound vehicle
+over.
+"""
+LEAST_ROOM = 0.05
+"""Of the square of the hover's speed: below it a vehicle that is at its limit could not be steered at all."""
 START_HEIGHT_M = 100.0
 """Above the ground at the start: out of its effect, and in the air until the end though nobody holds the height."""
 
@@ -58,6 +69,7 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
     thrust_n = steady.thrust_n + tilted / steady.gain
     j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
     gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * DAMPING * stiffness * j))
+    most = (np.inf, np.inf, most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
     noise = Noise(0.0, 0.01, 0.0, 0.1, 0.02, 0.01, 0.003)
     start = Start()
     if vehicle.ground_z_m is not None:
@@ -72,14 +84,22 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
             swing = np.sin(np.array([0.9, 0.7, 0.5]) * t + phase) + 0.5 * np.sin(np.array([3.1, 3.7, 1.3]) * t)
             return np.array([0.25, 0.25, 0.4]) * (swing + 0.3 * np.sin(np.array([9.1, 11.3, 7.1]) * t + phase[::-1]))
 
-        pilot = AttitudePid(
-            vehicle, AttitudeReference("swings", thrust_n, wanted), gains, DERIVATIVE_S, None, steady.moments_n_m
-        )
+        reference = AttitudeReference("swings", thrust_n, wanted)
+        pilot = AttitudePid(vehicle, reference, gains, DERIVATIVE_S, most, steady.moments_n_m)
         trace = simulate_as_stated(vehicle, pilot, seconds, 0.002, start=start)
         made = record_as_stated(trace, vehicle, f"flight_{number + 1}", noise, rng, every=every)
         believed = made.vehicle
         runs += made.runs
     return RecordingSet(name, believed, tuple(runs))
+
+
+def most_yaw_n_m(vehicle: Vehicle, hovering: np.ndarray) -> float:
+    """Yaw moment, N m, that the pilot asks for at most, beyond the wrench (4,) of the hover."""
+    asked, yaw = allocation_matrix(vehicle) @ hovering, allocation_matrix(vehicle)[:, 3]
+    limits = vehicle.rotor_speed_limits_rad_s
+    room = asked if limits is None else np.minimum(asked - limits[0] ** 2, limits[1] ** 2 - asked)
+    room = np.maximum(room, LEAST_ROOM * asked.mean())
+    return float(YAW_SHARE * (room / np.abs(yaw)).min())
 
 
 def turned_over(recordings: RecordingSet) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.exports.limits import refusal
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
@@ -396,8 +397,6 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     about z up, a ground effect, and a drag by the sum of rotor speeds at the centre. Source: gym-pybullet-drones,
     `BaseAviary._parseURDFParameters`, `_physics`, `_drag`, `_groundEffect`, and `cf2x.urdf`.
     """
-    if vehicle.rotor_count != 4:
-        raise InputError(f"{vehicle.name}: gym-pybullet-drones knows four rotors, found {vehicle.rotor_count}")
     parts = parts_of(vehicle, KNOWS["gym-pybullet-drones"])
     left = [*parts.left_out, *_left_of_each_rotor(parts), *_left_of_the_lowest_speed(parts)]
     if parts.drag[0]:
@@ -491,11 +490,13 @@ FORMS: dict[str, Callable[[Vehicle], Exported]] = {
 
 
 def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
-    """The vehicle for another tool; InputError names the forms there are."""
+    """The vehicle for another tool; InputError names the forms there are, or why the tool does not take it."""
     if to not in FORMS:
         near = get_close_matches(to, list(FORMS), 1)
         meant = f"; did you mean {near[0]}?" if near else f", expected one of {', '.join(FORMS)}"
         raise InputError(f"no form is called {to!r}{meant}")
     if vehicle.kind == "bench" or vehicle.mass_kg is None or vehicle.inertia_kg_m2 is None:
         raise InputError(f"vehicle {vehicle.name}: only a vehicle with mass, inertia and rotors can be exported")
+    if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
+        raise InputError(f"{vehicle.name}: {why}")
     return FORMS[to](vehicle)

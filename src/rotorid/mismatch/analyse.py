@@ -6,7 +6,7 @@ established, and on the believed values, 4. what is left.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,13 +19,14 @@ from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.decided import Decided, Watch, unwatched
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
-from rotorid.mismatch.delivery.gate import Offer, Settled, gate
+from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
+from rotorid.mismatch.delivery.gate import Gated, Offer, Settled
 from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
 from rotorid.mismatch.delivery.reduce import chain_ids, with_only
-from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
-from rotorid.mismatch.delivery.usable import question_of
+from rotorid.mismatch.delivery.stated import restated
+from rotorid.mismatch.delivery.usable import own_faults, question_of
 from rotorid.mismatch.dependence import dependence
-from rotorid.mismatch.evidence import weighed, with_shares
+from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, RunWind, Trace
 from rotorid.mismatch.fitted import Chain, Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
@@ -57,7 +58,6 @@ from rotorid.mismatch.values import (
     with_values_in_question,
 )
 from rotorid.mismatch.within_trust import beyond_trust, settled
-from rotorid.mismatch.words import parameter_words
 from rotorid.mismatch.wrench import WrenchModel, linear_drag, nonlinear_intervals
 from rotorid.recordings import RecordingSet, Split, Vehicle
 
@@ -128,7 +128,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float, watc
     plain_fit, plain_values = refitted(model)
     first = account(choice, seen, fit, moved, plain_fit, plain_values)
     words = with_values_in_question(weighed(first))
-    return with_noise_held_out(as_delivered(choice, words, seen, unseen, moved))
+    return with_noise_held_out(as_delivered(offered(choice, words, seen, unseen, moved)))
 
 
 @dataclass(frozen=True)
@@ -233,20 +233,19 @@ def winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
     return tuple(out)
 
 
-def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values) -> Analysis:
-    """The analysis whose model holds what is claimed and passes the gate, and nothing else.
+def offered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values) -> Offered:
+    """What a choice offers for delivery: what is claimed, fitted without what is only suggested.
 
-    `words` is the analysis of the whole choice with its statuses, which stay; `moved` are the values that it moved
-    within their trust.
+    `words` is the analysis of the whole choice with its statuses; `moved` are the values that it moved within their
+    trust.
     """
     found, vehicle = choice.found, choice.found.prepared.vehicle
     ids = {f.id for f in claimed(words.findings)}
-    suggested = {key for name in words.suggested_values for key in names_of(choice.stated).get(name, ())}
+    suggested = suggested_keys(words, choice.stated, PARAMETER_NAMES)
     values = {k: v for k, v in found.values.items() if k not in suggested}
     whole = ids >= {f.id for f in words.findings if f.id in words.without} and not suggested
     fewer = found if whole else with_only(found, ids, values)
     model = fewer.model
-    plain = values_alone(found.model)
 
     def stated_of(settled: Settled) -> Values:
         given = settled.offer.values
@@ -255,51 +254,41 @@ def as_delivered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Rec
             return {k: v for k, v in choice.stated.items() if k in given or (k == "speed" and both)}
         return speed_for_coefficients(given, vehicle) if only_throttle(choice.recordings) else given
 
+    def improved(settled: Settled) -> Vehicle:
+        return choice.vehicle(settled.moved, stated_of(settled))
+
     def vehicle_of(settled: Settled) -> Vehicle:
         stated = restated(words.findings, model, settled)
         inside = {model.search.terms[k].effect for k in settled.offer.active} | chain_ids(fewer)
         kept = [f for f in claimed(stated) if f.id in inside and place_of(f) == "vehicle"]
-        return with_effects(choice.vehicle(settled.moved, stated_of(settled)), kept)
+        return with_effects(improved(settled), kept)
+
+    def again(gated: Gated, findings: tuple[Finding, ...]) -> Analysis:
+        settled = gated.settled
+        kept = with_only(fewer, ids - set(gated.withheld), settled.offer.values)
+        last = replace(choice, found=kept, stated=stated_of(settled), findings=findings)
+        same_rows = replace(seen, selection=kept.model.selection) if kept.model.rows is found.model.rows else None
+        every = same_rows or on_every_run(kept, choice.recordings, choice.split, unseen)
+        moved_plain = {**gated.refitted.moved, **gated.refitted.offer.values}
+        return account(last, every, settled.fit, settled.moved, gated.refitted.fit, moved_plain)
 
     question = question_of(vehicle, choice.recordings.runs)
-    gated = gate(
-        model,
-        Offer(values, tuple(model.selection.active)),
-        plain,
-        believed_residuals(fewer.prepared, model.rows, fewer.commanded),
-        lambda settled: question(vehicle_of(settled)),
+    return Offered(
+        words=words,
+        model=model,
+        offer=Offer(values, tuple(model.selection.active)),
+        plain=values_alone(found.model),
+        believed_left=believed_residuals(fewer.prepared, model.rows, fewer.commanded),
+        believed=vehicle,
+        stated=choice.stated,
+        moved=moved,
+        names=PARAMETER_NAMES,
+        whole=whole,
+        improved=improved,
+        again=again,
+        unusable=lambda settled: question(vehicle_of(settled)),
+        remarks=own_faults(vehicle, choice.recordings.runs),
     )
-    settled = gated.settled
-    stated = restated(words.findings, model, settled)
-    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in stated)
-    if whole and gated.passes_whole and settled.moved.keys() == moved.keys():
-        last = replace(words, findings=findings, improved=choice.vehicle(settled.moved, stated_of(settled)))
-    else:
-        kept = with_only(fewer, ids - set(gated.withheld), settled.offer.values)
-        last_choice = replace(choice, found=kept, stated=stated_of(settled), findings=findings)
-        again = replace(seen, selection=kept.model.selection) if kept.model.rows is found.model.rows else None
-        every = again or on_every_run(kept, choice.recordings, choice.split, unseen)
-        moved_plain = {**gated.refitted.moved, **gated.refitted.offer.values}
-        own = account(last_choice, every, settled.fit, settled.moved, gated.refitted.fit, moved_plain)
-        last = replace(own, findings=findings, values=words.values, suggested_values=words.suggested_values,
-                       instead=words.instead, not_testable=words.not_testable,
-                       without_values=words.without_values)  # fmt: skip
-    reasons = gated.withheld_values
-    withheld = {n: reasons[k] for n, keys in names_of(choice.stated).items() for k in keys if k in reasons}
-    notes = [fell_back_note(k, why) for k, why in gated.fell_back.items()]
-    return replace(
-        with_shares(last),
-        worse_elsewhere=tuple(map(str, gated.worse(model))),
-        withheld_values=withheld,
-        notes=(*last.notes, *notes),
-        believed_values=value_rows(model, settled, last.improved, vehicle),
-        value_correlations=value_correlations(model, settled),
-    )
-
-
-def fell_back_note(key: str, why: str, names: Mapping[str, str] = PARAMETER_NAMES) -> str:
-    """That a value of the refitted vehicle is left as believed."""
-    return f"Refitted, the {parameter_words(names[key])[0]} stays as believed: {why}."
 
 
 def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from rotorid.mismatch.consistency import by_share, carrying, quoted
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, one_per_class, with_status
-from rotorid.mismatch.sizes import Scale, scales, share_words
+from rotorid.mismatch.sizes import Size, channel_size, metres_words, scales, share_words
 from rotorid.mismatch.words import (
     capital,
     channel_words,
@@ -37,6 +37,10 @@ WORTH_A_WORD = 0.03
 pilot trims without noticing is less."""
 NO_BETTER = 0.02
 """Relative change of an error run forward below which it is neither better nor worse."""
+
+
+SizeWords = Literal["both", "share", "metres", ""]
+"""Which sizes stand in a text: share of the weight and metres after half a second."""
 
 
 @dataclass(frozen=True)
@@ -83,29 +87,40 @@ def headline(told: Told) -> str:
         rest = "" if told.word == "explained" else f" {_rest(told)}"
         return first_words(f"{_put_right(stated)}{rest}")
     main = main_channel(analysis, told.locations, told.channels)
-    where = _where(main, told.locations, told.channels, analysis)
+    places = _places(main, told.locations, told.channels, analysis)
     causes = _causes(told)
     if not causes:
-        return first_words(capital(f"{where}; {_rest(told)}"))
+        texts = [capital(f"{where}; {_rest(told)}") for where in places]
+        return next((text for text in texts if len(text.split()) <= MOST_WORDS), first_words(texts[-1]))
     better = _better_in_short(main, told.channels)
     rest = "" if told.word == "explained" else f"; {100 * told.left:.0f} % stays unexplained"
-    still = _still_off(told, main)
-    off = off_words(main, told.channels, scales(analysis))
+    still, short = _still_off(told, main), _still_off(told, main, metres=False)
+    surely, where, in_metres, off, off_in_metres, plain = places
     for parts in (
-        (where, causes, better, rest, still),
-        (where, causes, "", rest, still),
-        (off, causes, "", rest, still),
-        (off_words(main, told.channels), causes, "", "", still),
-        ("", causes, "", "" if still else rest, still),
+        (surely, causes, better, rest, still),
+        (where, causes, better, rest, short),
+        (in_metres, causes, better, rest, short),
+        (where, causes, "", rest, short),
+        (off, causes, "", rest, short),
+        (off_in_metres, causes, "", rest, short),
+        (off_in_metres, causes, "", "" if short else rest, short),
+        (plain, causes, "", "", short),
+        ("", causes, "", "" if short else rest, short),
     ):
         text = "".join([f"{parts[0]}; " if parts[0] else "", *parts[1:]]) + "."
         if len(text.split()) <= MOST_WORDS:
             return capital(text)
-    return first_words(capital(f"{causes}{still or rest}."))
+    return first_words(capital(f"{causes}{short or rest}."))
 
 
-def _still_off(told: Told, main: str) -> str:
-    """The channel that stays off most with what was found, as a clause.
+def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) -> Size | None:
+    """The size of the error in the main channel as believed."""
+    before = quoted(channels[main]).before if main in channels else None
+    return None if before is None else channel_size(analysis, main, before, "before")
+
+
+def _still_off(told: Told, main: str, metres: bool = True) -> str:
+    """The channel that stays off most with what was found, as a clause, with or without the metres that it leads off.
 
     Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
     """
@@ -118,8 +133,9 @@ def _still_off(told: Told, main: str) -> str:
     most = max(left, key=lambda c: left[c] / known[c].value, default=None)
     if most in (None, main) or left[most] < WORTH_A_WORD * known[most].value:
         return ""
+    size = channel_size(told.analysis, most, left[most], "after")
     off = f"{number(left[most])} {told.channels[most].unit}"
-    return f"; the {channel_words(most)} stays {off} off ({share_words(left[most], most, known)})"
+    return f"; the {channel_words(most)} stays {off} off ({size_words(size, 'both' if metres else 'share')})"
 
 
 def details(told: Told) -> list[str]:
@@ -176,14 +192,22 @@ def _put_right(stated: Sequence[Finding]) -> str:
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
 
 
-def off_words(main: str, channels: Mapping[str, Channel], known: Mapping[str, Scale] | None = None) -> str:
-    """How much a channel is off, in words; with the `known` scales as a share of the weight, too."""
+def off_words(main: str, channels: Mapping[str, Channel], size: Size | None = None, how: SizeWords = "both") -> str:
+    """How much a channel is off, in words; with its size, as far as asked."""
     if not main:
         return "the model and the recordings differ"
-    before = quoted(channels[main]).before
-    share = share_words(before, main, known) if known and before is not None else ""
-    said = f", {share}" if share else ""
-    return f"the {channel_words(main)} is {number(before)} {channels[main].unit} off{said}"
+    said = size_words(size, how) if size is not None else ""
+    off = f"{number(quoted(channels[main]).before)} {channels[main].unit} off"
+    return f"the {channel_words(main)} is {off}{f', {said}' if said else ''}"
+
+
+def size_words(size: Size, how: SizeWords = "both") -> str:
+    """`6 % of the weight or 0.060 m after 0.5 s simulated`, or one of the two, or neither."""
+    share = share_words(size) if how in ("both", "share") else ""
+    metres = metres_words(size) if how in ("both", "metres") else ""
+    if how == "metres" and not metres:
+        return share_words(size)
+    return " or ".join(filter(None, (share, metres)))
 
 
 def _better_in_short(main: str, channels: Mapping[str, Channel]) -> str:
@@ -262,16 +286,23 @@ def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Ma
     return max(dict.fromkeys(pool), key=size) if pool else ""
 
 
-def _where(main: str, locations: Sequence[Location], channels: Mapping[str, Channel], analysis: Analysis) -> str:
-    if not main:
-        return off_words(main, channels)
+def _places(
+    main: str, locations: Sequence[Location], channels: Mapping[str, Channel], analysis: Analysis
+) -> tuple[str, str, str, str, str, str]:
+    """Where and how much the main channel is off, from all that can be said to the least.
+
+    With regime, both sizes and significance; without the significance; with the metres alone; the same two without
+    regime; and the error alone.
+    """
+    size = main_size(analysis, main, channels)
+    both, metres, plain = (off_words(main, channels, size, how) for how in ("both", "metres", ""))
     here = [loc for loc in locations if loc.channel == main]
-    off = off_words(main, channels, scales(analysis))
-    if not here:
-        return off
+    if not main or not here:
+        return both, both, metres, both, metres, plain
     best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
     doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < WORTH_SAYING_P else ""
-    return f"{_when(best, here, analysis)}{off}{doubt}"
+    when = _when(best, here, analysis)
+    return f"{when}{both}{doubt}", f"{when}{both}", f"{when}{metres}", both, metres, plain
 
 
 def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:

@@ -1,4 +1,5 @@
-"""How large an error is in units that a pilot knows: shares of the weight, of the moment that the rotors can make.
+"""How large an error is in units that a pilot knows: shares of the weight, of the moment that the rotors can make, and
+metres after half a second of simulation.
 
 Errors in units of a sensor's noise order a verdict by what is surest: on a vehicle of 20 N, 0.015 N sideways would lead
 before half a newton metre of pitch.
@@ -6,12 +7,16 @@ before half a newton metre of pitch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from rotorid.mismatch.findings import Analysis
+from rotorid.mismatch.drift import drift_m
+from rotorid.mismatch.findings import Analysis, Trace
+from rotorid.mismatch.shares import fitted_part
+from rotorid.mismatch.words import number
 from rotorid.recordings import Vehicle
 
 AXES = ("roll", "pitch", "yaw")
@@ -48,7 +53,7 @@ def of_flight(vehicle: Vehicle) -> dict[str, Scale]:
     out = {f"force_{axis}": Scale(weight, "of the weight") for axis in "xyz"}
     for axis, name, moment in zip("xyz", AXES, moments, strict=True):
         if moment > 0:
-            out[f"moment_{axis}"] = Scale(float(moment), f"of the {name} moment it can make")
+            out[f"moment_{axis}"] = Scale(float(moment), f"of the available {name} moment")
     out |= {f"rotor_speed_{i + 1}": Scale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
     out |= {f"accelerometer_{axis}": Scale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
     return out | {f"gyroscope_{axis}": Scale(FASTEST_RAD_S, "of 1 rad/s") for axis in "xyz"}
@@ -81,6 +86,8 @@ class Size:
     """Of the channel's scale."""
     words: str
     """What it is a share of: `of the weight`."""
+    metres: float | None = None
+    """How far off it alone leads within half a second of simulation; None where it moves nothing."""
 
 
 def effect_sizes(analysis: Analysis, held: list[np.ndarray]) -> dict[str, Size]:
@@ -96,13 +103,43 @@ def effect_sizes(analysis: Analysis, held: list[np.ndarray]) -> dict[str, Size]:
             Size(c, r, units[c], r / known[c].value, known[c].words) for c, r in rms.items() if c in known and r > 0
         ]
         if sizes:
-            out[effect_id] = max(sizes, key=lambda s: s.share)
+            most = max(sizes, key=lambda s: s.share)
+            moved = [(t, left - t.after, mask) for t, left, mask in zip(analysis.compared, without, held, strict=True)]
+            out[effect_id] = replace(most, metres=_metres(analysis, most.channel, moved))
     return out
 
 
-def share_words(value: float, channel: str, known: Mapping[str, Scale]) -> str:
-    """`6 % of the weight`; empty where the channel has no scale."""
-    if channel not in known:
-        return ""
-    share = 100 * value / known[channel].value
-    return f"{share:.0f} % {known[channel].words}" if share >= 1 else f"{share:.1g} % {known[channel].words}"
+def channel_metres(analysis: Analysis, channel: str, stage: Literal["before", "after"]) -> float | None:
+    """How far off a channel's error leads within half a second, on the runs held out where there are any."""
+    part = fitted_part(analysis)
+    own = [(t, getattr(t, stage), part(t.run, t.time_s)) for t in analysis.traces if t.channel == channel]
+    held = any((sign < 0).any() for _, _, sign in own)
+    return _metres(analysis, channel, [(t, error, sign < 0 if held else sign > 0) for t, error, sign in own])
+
+
+def _metres(analysis: Analysis, channel: str, errors: Iterable[tuple[Trace, np.ndarray, np.ndarray]]) -> float | None:
+    """Drift of one channel's errors, each with its trace and the mask of the rows that count."""
+    if analysis.instrument is not None:
+        return None
+    own = [(t.time_s, np.where(mask, error, np.nan)) for t, error, mask in errors if t.channel == channel]
+    return drift_m(analysis.believed, channel, own)
+
+
+def channel_size(analysis: Analysis, channel: str, rms: float, stage: Literal["before", "after"]) -> Size | None:
+    """The size of a channel's error; None where the channel has no scale."""
+    known, units = scales(analysis), {t.channel: t.unit for t in analysis.traces}
+    if channel not in known or channel not in units:
+        return None
+    scale = known[channel]
+    return Size(channel, rms, units[channel], rms / scale.value, scale.words, channel_metres(analysis, channel, stage))
+
+
+def share_words(size: Size) -> str:
+    """`6 % of the weight`."""
+    share = 100 * size.share
+    return f"{share:.0f} % {size.words}" if share >= 1 else f"{share:.1g} % {size.words}"
+
+
+def metres_words(size: Size) -> str:
+    """`0.060 m after 0.5 s simulated`; empty where it moves nothing."""
+    return "" if size.metres is None else f"{number(size.metres)} m after 0.5 s simulated"

@@ -100,5 +100,8 @@ def _how_much(verdict: Verdict, main: str) -> Tile:
     channel = verdict.channels[main]
     errors, where = errors_of(channel)
     large = f"{number(errors.before)} → {number(errors.after)} {channel.unit}"
+    size = verdict.size
+    metres = size.metres_after_half_a_second if size is not None and size.channel == main else None
+    led = "" if metres is None else f"; as believed {number(metres)} m off after half a second of simulation"
     noise = f"noise {number(channel.noise_floor)} {channel.unit}, " if channel.noise_floor else ""
-    return Tile("Error before and after", large, f"{channel_words(main)}; {noise}{where}")
+    return Tile("Error before and after", large, f"{channel_words(main)}; {noise}{where}{led}")

@@ -25,9 +25,19 @@ from rotorid.mismatch.consistency import (
 )
 from rotorid.mismatch.delivery.doubts import stopping
 from rotorid.mismatch.findings import Analysis, Finding, Trace, ValueRow, one_per_class, with_status
-from rotorid.mismatch.sentences import Told, details, first_words, headline, main_channel, spoken, warnings_of
+from rotorid.mismatch.sentences import (
+    Told,
+    details,
+    first_words,
+    headline,
+    main_channel,
+    main_size,
+    spoken,
+    warnings_of,
+)
 from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.sizes import Size
+from rotorid.recordings.basis import basis_of
 
 __all__ = ["Verdict", "main_channel", "make_verdict", "one_per_class", "spoken", "with_status"]
 
@@ -130,14 +140,27 @@ class Gain(Part):
     interval_95: Interval
 
 
-class SizeOfEffect(Part):
-    """Root mean square of what an effect does to a channel, in its unit and as a share of what a pilot knows."""
+class SizeOfError(Part):
+    """Root mean square of an error, or of what an effect does, in a channel's unit and in units that a pilot knows."""
 
     channel: str
     rms: Magnitude
     unit: str
     share: Magnitude
     of: str
+    metres_after_half_a_second: Magnitude = Field(
+        description="How far off it alone leads within half a second of simulation; null where it moves nothing."
+    )
+
+
+class BasisOfVerdict(Part):
+    """What the verdict rests on, said before anything else."""
+
+    sentence: str
+    recorded_s: Magnitude
+    in_the_air_s: Magnitude = Field(description="Null for a stand or bench, and where no rotors are recorded.")
+    ground_share: Magnitude = Field(description="Of the time recorded, on the ground with rotors that idle.")
+    not_recorded: tuple[str, ...]
 
 
 class EffectVerdict(Part):
@@ -149,7 +172,7 @@ class EffectVerdict(Part):
     withheld: str = Field(description="Of one that is established or of a class and not delivered: why.")
     alternatives: tuple[str, ...]
     sentence: str
-    size: SizeOfEffect | None = Field(description="What it does where it does most, on the held-out runs.")
+    size: SizeOfError | None = Field(description="What it does where it does most, on the held-out runs.")
     share: Share | None = Field(
         description="Part of the squared error between before and after on the held-out runs that goes without it, "
         "two sensors of one quantity compared among the channels."
@@ -240,8 +263,10 @@ class Verdict(Part):
     kind: Literal["flight", "stand", "bench"]
     runs: Runs
     verdict: Literal["no_mismatch", "explained", "partly_explained", "unexplained", "not_judged"]
+    basis: BasisOfVerdict
     doubts: tuple[DoubtOfSet, ...]
     sentence: str
+    size: SizeOfError | None = Field(description="Of the error as believed in the channel that the sentence names.")
     details: tuple[str, ...] = Field(description="What the sentence has no room for, the largest share first.")
     warnings: tuple[str, ...] = Field(description="Channels that are worse with what is delivered.")
     channels: dict[str, Channel]
@@ -282,8 +307,10 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         kind=analysis.recordings.vehicle.kind,
         runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
         verdict=word,
+        basis=basis_of_verdict(analysis),
         doubts=tuple(DoubtOfSet(what=d.what, sentence=d.sentence, stops=d.stops) for d in analysis.doubts),
         sentence=spoken(headline(told), analysis),
+        size=size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
         details=tuple(spoken(text, analysis) for text in details(told)),
         warnings=tuple(spoken(text, analysis) for text in warnings_of({**inverse, **forward})),
         channels=inverse | dict(forward),
@@ -311,6 +338,32 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             separates=analysis.next_separates,
             predicted_separation_sigma=None,
         ),
+    )
+
+
+def basis_of_verdict(analysis: Analysis) -> BasisOfVerdict:
+    """Time and columns of the recordings as analysed."""
+    found = basis_of(analysis.recordings)
+    return BasisOfVerdict(
+        sentence=found.sentence,
+        recorded_s=found.recorded_s,
+        in_the_air_s=found.in_the_air_s,
+        ground_share=found.ground_share,
+        not_recorded=found.missing,
+    )
+
+
+def size_of(size: Size | None) -> SizeOfError | None:
+    """A size as the file has it."""
+    if size is None:
+        return None
+    return SizeOfError(
+        channel=size.channel,
+        rms=size.rms,
+        unit=size.unit,
+        share=size.share,
+        of=size.words.removeprefix("of "),
+        metres_after_half_a_second=size.metres,
     )
 
 
@@ -392,11 +445,7 @@ def effect_verdict(finding: Finding, share: float | None, size: Size | None = No
         withheld=finding.withheld,
         alternatives=finding.alternatives,
         sentence=first_words(f"only suggested: {finding.objection}" if finding.objection else finding.sentence),
-        size=None
-        if size is None
-        else SizeOfEffect(
-            channel=size.channel, rms=size.rms, unit=size.unit, share=size.share, of=size.words.removeprefix("of ")
-        ),
+        size=size_of(size),
         share=share,
         equation=finding.equation or (finding.form.equation if finding.form else ""),
         channels=finding.channels,

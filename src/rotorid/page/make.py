@@ -97,6 +97,7 @@ def make_page(
         word=WORDS[verdict.verdict],
         word_class=verdict.verdict,
         headline=pretty(verdict.sentence),
+        basis=verdict.basis.sentence,
         doubts=[{"sentence": pretty(d.sentence), "stops": d.stops} for d in verdict.doubts],
         warnings=[pretty(text) for text in verdict.warnings],
         tiles=[
@@ -370,9 +371,11 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
             f"{effect_words(e.id)} in the place of the class."
         )
     if e.size is not None and e.size.share is not None:
+        off = e.size.metres_after_half_a_second
+        metres = "" if off is None else f", {number(off)} m after half a second of simulation"
         notes.append(
             f"Where it does most it moves the {channel_words(e.size.channel)} by {number(e.size.rms)} {e.size.unit}"
-            + f", {number(100 * e.size.share)} % of {e.size.of} (root mean square on held-out flight)."
+            + f", {number(100 * e.size.share)} % of {e.size.of}{metres} (root mean square on held-out flight)."
         )
     if e.withheld:
         notes.append(f"Not delivered: {e.withheld}.")

@@ -13,6 +13,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.exports import export_vehicle
 from rotorid.exports.flown import try_out
+from rotorid.exports.forms import FORMS
 from rotorid.mismatch.deliver import analysis_of, verdict_of
 from rotorid.mismatch.delivery.parts import delivered, improved_vehicle
 from rotorid.mismatch.delivery.usable import question_of
@@ -33,6 +34,7 @@ COLUMNS = (
     "withheld_values",
     "worse_elsewhere",
     "unfit",
+    "not_exported",
     "not_flown_by",
     "warnings",
     "doubts",
@@ -72,6 +74,7 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
         "withheld_values": "; ".join(f"{name}: {why}" for name, why in analysis.withheld_values.items()),
         "worse_elsewhere": "; ".join(analysis.worse_elsewhere),
         "unfit": question_of(analysis.believed, analysis.recordings.runs)(vehicle) if flies else "",
+        "not_exported": " ".join(refused_by(vehicle)) if flies else "",
         "not_flown_by": " ".join(not_flown_by(vehicle)) if flies else "",
         "warnings": len(verdict.warnings),
         "doubts": " ".join(d.what for d in verdict.doubts),
@@ -80,10 +83,10 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
 
 
 def not_flown_by(vehicle: Vehicle) -> list[str]:
-    """Forms of export whose engine is installed here and does not fly the vehicle."""
+    """Forms of export that are written and whose engine, installed here, does not fly the vehicle."""
     out = []
-    for form, module in ENGINES.items():
-        if importlib.util.find_spec(module) is None:
+    for form in sorted(ENGINES.keys() - refused_by(vehicle).keys()):
+        if importlib.util.find_spec(ENGINES[form]) is None:
             continue
         try:
             try_out(vehicle, form, export_vehicle(vehicle, form))
@@ -92,7 +95,18 @@ def not_flown_by(vehicle: Vehicle) -> list[str]:
     return out
 
 
+def refused_by(vehicle: Vehicle) -> dict[str, str]:
+    """Forms of export that are not written, because their tool does not take such a vehicle, to the reason."""
+    out = {}
+    for form in FORMS:
+        try:
+            export_vehicle(vehicle, form)
+        except InputError as error:
+            out[form] = str(error)
+    return out
+
+
 def table(files: Sequence[Path]) -> pd.DataFrame:
     """Rows of all sets in one table."""
     rows = [row for file in files for row in json.loads(file.read_text(encoding="utf-8"))]
-    return pd.DataFrame(rows, columns=COLUMNS).fillna("")
+    return pd.DataFrame([[row.get(name, "") for name in COLUMNS] for row in rows], columns=COLUMNS)

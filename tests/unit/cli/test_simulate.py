@@ -86,8 +86,8 @@ def test_what_is_flown_otherwise_is_said(tmp_path):
 
 
 def test_a_vehicle_that_turns_over_is_said(tmp_path):
-    lost = {"id": "unequal_rotors", "form": "thrust of rotor 1", "parameters": {"d_1": 2.0}}
-    done, _ = simulated(tmp_path, lost, seconds=3)
+    tipping = {"id": "flapping_moment", "form": "at the hubs", "parameters": {"k_flap": -1e-4}}
+    done, _ = simulated(tmp_path, tipping, seconds=3)
     assert done.exit_code == 0, done.output
     assert "The vehicle turned over in flight_1" in done.output
     (tmp_path / "held").mkdir()

@@ -1,5 +1,6 @@
 """`rotorid verdict --ci`: a regression test of an airframe, and what the screen says before the verdict."""
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -52,8 +53,10 @@ def grams(tmp_path_factory) -> Path:
 def test_a_mass_in_grams_is_not_judged_and_said_first(grams: Path, tmp_path: Path):
     done = CliRunner().invoke(app, ["verdict", str(grams), "-o", str(tmp_path / "out"), "-q", "--ci"])
     assert done.exit_code == 1, done.output
-    first, *rest = done.output.splitlines()
+    basis, first, *rest = done.output.splitlines()
+    assert basis.startswith("The verdict rests on 12 s in the air; none of it is on the ground; not recorded:")
     assert first.startswith("! ") and "mass_kg" in first
     assert any(line.startswith("Not judged.") for line in rest) and any("ci: the set is not judged" in x for x in rest)
     page = (tmp_path / "out" / "report.html").read_text()
+    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["basis"]["sentence"] == basis and basis in page
     assert "not judged" in page and "Before you believe this" in page

@@ -34,7 +34,8 @@ def test_the_schema_is_in_step():
 def test_the_file_has_the_keys_of_the_contract():
     content = json.loads(verdict_of(analysis(findings=[drag_finding()])).text())
     assert list(content) == [
-        *("set", "kind", "runs", "verdict", "doubts", "sentence", "details", "warnings", "channels", "locations"),
+        *("set", "kind", "runs", "verdict", "basis", "doubts", "sentence", "size", "details", "warnings", "channels"),
+        "locations",
         *("effects", "absent", "parameters", "believed_values", "correlations"),
         *("not_testable", "unexplained", "next_experiment"),
     ]
@@ -170,7 +171,7 @@ def test_the_sentence_goes_by_size_and_names_what_stays_off():
     made = replace(made, traces=tuple(map(changed, made.traces)), noise_floor=made.noise_floor | {"force_x": 0.002})
     found = verdict_of(made)
     assert "the pitch moment stays 0.32 N m off" in found.sentence
-    assert "% of the pitch moment it can make" in found.sentence
+    assert "% of the available pitch moment" in found.sentence
     assert "rotor drag" in found.sentence
 
 

@@ -93,13 +93,30 @@ class Conditions(BaseModel):
         return ((condition.run == run) & (time_s >= start) & (time_s <= stop)).astype(float)
 
 
+class Window(BaseModel):
+    """A part of a run, s on its clock."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    run: str
+    start_s: float | None = None
+    stop_s: float | None = None
+
+
+class Fault(Entry):
+    """A finding about a sensor, a clock or a rig."""
+
+    windows: tuple[Window, ...] = ()
+    """When it was so; empty for always."""
+
+
 class Instruments(BaseModel):
     """The whole of `instruments.yaml`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     set: str
-    instruments: tuple[Entry, ...] = ()
+    instruments: tuple[Fault, ...] = ()
 
 
 def conditions_of(analysis: Analysis) -> Conditions:
@@ -117,7 +134,13 @@ def conditions_of(analysis: Analysis) -> Conditions:
 
 def instruments_of(analysis: Analysis) -> Instruments:
     """What an analysis found of the instruments."""
-    entries = tuple(_entry(f) for f in delivered(analysis, "instruments"))
+    entries = tuple(
+        Fault(
+            **_entry(f).model_dump(),
+            windows=tuple(Window(run=run, start_s=_known(a), stop_s=_known(b)) for run, a, b in f.windows),
+        )
+        for f in delivered(analysis, "instruments")
+    )
     return Instruments(set=analysis.recordings.name, instruments=entries)
 
 

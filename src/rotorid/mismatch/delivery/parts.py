@@ -35,9 +35,9 @@ def place_of(finding: Finding) -> Place | None:
     form = form_of(finding)
     if isinstance(form, SpeedForm):
         return "vehicle"
-    if finding.windows:  # with a payload on board for a time, say
-        return "conditions"
-    return "instruments" if effect.kind == "sensor" or effect.of_the_rig else "vehicle"
+    if effect.kind == "sensor" or effect.of_the_rig:
+        return "instruments"
+    return "conditions" if finding.windows else "vehicle"  # with a payload on board for a time, say
 
 
 def claimed(findings: Sequence[Finding]) -> list[Finding]:

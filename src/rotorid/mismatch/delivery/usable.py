@@ -10,8 +10,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rotorid.control.swings import swings, turned_over
+from rotorid.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.errors import InputError
+from rotorid.exports.forms import FORMS, export_vehicle
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import NO_BODY
@@ -22,8 +23,6 @@ from rotorid.vehicle.improved import command_path
 
 MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
-FLIGHT_S, FLIGHT_SEED = 2.0, 1
-"""The trial flight: swings in roll, pitch and yaw under the project's attitude controller."""
 HIGH_ABOVE_GROUND_M = 1e3
 BEYOND_ALL = 1e6
 """Weights that no rotors lift: asked for, each turns at its limit."""
@@ -40,10 +39,20 @@ def question_of(believed: Vehicle, runs: Sequence[Run]) -> Question:
 
     What the believed vehicle fails itself is not asked: no part of the model is to blame for it.
     """
-    share = recorded_share(runs, believed)
-    every = (no_body, lambda vehicle: cannot_hover(vehicle, share), cannot_fly)
-    asked = [question for question in every if not question(believed)]
+    asked = [question for question in questions(believed, runs) if not question(believed)]
     return lambda vehicle: next((why for question in asked if (why := question(vehicle))), "")
+
+
+def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, ...]:
+    """Everything that is asked, the cheapest first."""
+    share = recorded_share(runs, believed)
+    return no_body, lambda vehicle: cannot_hover(vehicle, share), cannot_fly
+
+
+def own_faults(believed: Vehicle, runs: Sequence[Run]) -> tuple[str, ...]:
+    """What the believed vehicle fails itself, a sentence each: what is derived from it may fail it, too."""
+    found = [why for question in questions(believed, runs) if (why := question(believed))]
+    return tuple(f"The believed vehicle itself is not fit to be flown: {why}." for why in found)
 
 
 def no_body(vehicle: Vehicle) -> str:
@@ -79,9 +88,12 @@ def full_thrust_n(vehicle: Vehicle) -> float | None:
 
 
 def cannot_fly(vehicle: Vehicle) -> str:
-    """Why it does not fly swings about hover under the project's attitude controller; empty where it does."""
+    """Why it does not fly the swings about hover of `rotorid simulate`; empty where it does.
+
+    The very flights that are made of the file later: shorter ones end before a slow swing has grown.
+    """
     try:
-        flown = swings(vehicle, "trial", FLIGHT_S, 1, FLIGHT_SEED)
+        flown = swings(vehicle, "trial", SECONDS, FLIGHTS, SEED)
     except InputError as error:
         return f"it cannot be simulated: {error}"
     return "simulated under an attitude controller it turns over" if turned_over(flown) else ""
@@ -103,3 +115,18 @@ def recorded_share(runs: Sequence[Run], vehicle: Vehicle) -> float:
             flying = share[share > LIGHT * np.nanmax(share)]
             return float(np.median(flying)) if len(flying) else 0.0
     return 0.0
+
+
+def exports_lost(vehicle: Vehicle, believed: Vehicle) -> tuple[str, ...]:
+    """Forms of other tools that take the believed vehicle and not this one, a sentence each."""
+    out = []
+    for form in FORMS:
+        try:
+            export_vehicle(believed, form)
+        except InputError:
+            continue
+        try:
+            export_vehicle(vehicle, form)
+        except InputError as error:
+            out.append(f"The improved vehicle cannot be exported as {form}: {error}.")
+    return tuple(out)

@@ -17,13 +17,13 @@ from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS
 from rotorid.mismatch import rules
 from rotorid.mismatch.absorbed import absorbed_findings
-from rotorid.mismatch.analyse import fell_back_note, throttle_or_thrust
+from rotorid.mismatch.analyse import throttle_or_thrust
 from rotorid.mismatch.decide import wrong_values
 from rotorid.mismatch.delivered import Values, residuals_of
-from rotorid.mismatch.delivery.gate import Offer, gate
+from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
+from rotorid.mismatch.delivery.gate import Gated, Offer
 from rotorid.mismatch.delivery.parts import claimed
-from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
-from rotorid.mismatch.evidence import weighed, with_shares
+from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
 from rotorid.mismatch.instrument.chain import (
@@ -146,7 +146,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     seen = on_every_run(model, chain, unseen)
     refitted, moved_plain = settled(model, plain, [])
     first = account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
-    return as_delivered(choice, weighed(first), seen, plain)
+    return as_delivered(offered(choice, weighed(first), seen, plain, moved_values))
 
 
 @dataclass(frozen=True)
@@ -236,51 +236,44 @@ def account(
     )
 
 
-def as_delivered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values) -> Analysis:
-    """The analysis whose model holds what is claimed and passes the gate, and nothing else; its statuses stay."""
-    model, names = choice.model, names_of(choice.stated, VALUE_NAMES)
+def offered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values) -> Offered:
+    """What a choice offers for delivery: what is claimed, fitted without what is only suggested.
+
+    `words` is the analysis of the whole choice with its statuses; `plain` are the values called wrong where no effect
+    is at work, `moved` those that the choice moved within their trust.
+    """
+    model, chain = choice.model, choice.chain
     ids = {f.id for f in claimed(words.findings)}
-    suggested = {key for name in words.suggested_values for key in names.get(name, ())}
+    suggested = suggested_keys(words, choice.stated, VALUE_NAMES)
     values = {k: v for k, v in choice.values.items() if k not in suggested}
     active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
     fewer = with_terms(model, active)
-    gated = gate(fewer, Offer(values, tuple(active)), plain, [np.nan_to_num(r.y) for r in model.rows])
-    final = gated.settled
-    whole = len(active) == len(model.selection.active) and not suggested and gated.passes_whole
-    stated = words.findings if whole else restated(words.findings, fewer, final)
-    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in stated)
-    gone = [] if choice.chain is None else [k for k, _ in choice.chain.fit.chain if k not in ids]
-    vehicle = choice.vehicle({**final.moved, **final.offer.values})
-    if whole and not (gone and choice.measured):
-        last = replace(words, findings=findings, improved=vehicle)
-    else:
-        kept = with_terms(fewer, list(final.offer.active))
-        chain = choice.chain
-        for key in gone if choice.measured else ():
-            chain = without_id(choice.setup, chain, key)
-        stated_values = {k: v for k, v in choice.stated.items() if k in final.offer.values}
-        own = replace(
-            choice, model=kept, chain=chain, values=final.offer.values, stated=stated_values, findings=findings
-        )
-        every = replace(seen, selection=kept.selection)
-        changed = {**gated.refitted.moved, **gated.refitted.offer.values}
-        last = account(own, words.recordings, every, final.fit, final.moved, gated.refitted.fit, changed)
-        last = replace(
-            last,
-            findings=findings,
-            values=words.values,
-            suggested_values=words.suggested_values,
-            not_testable=words.not_testable,
-            without_values=words.without_values,
-        )
-    reasons = gated.withheld_values
-    return replace(
-        with_shares(last),
-        worse_elsewhere=tuple(map(str, gated.worse(fewer))),
-        withheld_values={n: reasons[k] for n, keys in names.items() for k in keys if k in reasons},
-        notes=(*last.notes, *(fell_back_note(k, why, VALUE_NAMES) for k, why in gated.fell_back.items())),
-        believed_values=value_rows(fewer, final, last.improved, choice.setup.vehicle, VALUE_NAMES),
-        value_correlations=value_correlations(fewer, final, VALUE_NAMES),
+    gone = [k for k, _ in chain.fit.chain if k not in ids] if chain is not None and choice.measured else []
+
+    def again(gated: Gated, findings: tuple[Finding, ...]) -> Analysis:
+        final, refitted = gated.settled, gated.refitted
+        kept, shorter = with_terms(fewer, list(final.offer.active)), chain
+        for key in gone:
+            shorter = without_id(choice.setup, shorter, key)
+        stated = {k: v for k, v in choice.stated.items() if k in final.offer.values}
+        own = replace(choice, model=kept, chain=shorter, values=final.offer.values, stated=stated, findings=findings)
+        every, changed = replace(seen, selection=kept.selection), {**refitted.moved, **refitted.offer.values}
+        return account(own, words.recordings, every, final.fit, final.moved, refitted.fit, changed)
+
+    return Offered(
+        words=words,
+        model=fewer,
+        offer=Offer(values, tuple(active)),
+        plain=plain,
+        believed_left=[np.nan_to_num(r.y) for r in model.rows],
+        believed=choice.setup.vehicle,
+        stated=choice.stated,
+        moved=moved,
+        names=VALUE_NAMES,
+        whole=len(active) == len(model.selection.active) and not suggested and not gone,
+        improved=lambda settled: choice.vehicle({**settled.moved, **settled.offer.values}),
+        again=again,
+        restates=False,
     )
 
 

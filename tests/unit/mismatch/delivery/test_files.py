@@ -84,6 +84,15 @@ def test_the_files_are_there_where_there_is_something_to_write_and_gone_where_no
     assert {p.name for p in tmp_path.iterdir()} == {*NAMES, "ledger.json"}
 
 
+def test_a_fault_of_a_sensor_has_the_times_at_which_it_was_there(tmp_path):
+    dropped = sensor_error(id="sensor_dropout", form=None, values=(), windows=(("a", 4.0, 6.0), ("b", 1.0, np.inf)))
+    path = tmp_path / "instruments.yaml"
+    path.write_text(text_of(instruments_of(analysis(findings=[dropped]))))
+    (found,) = read_instruments(path).instruments
+    assert [(w.run, w.start_s, w.stop_s) for w in found.windows] == [("a", 4.0, 6.0), ("b", 1.0, None)]
+    assert empty(conditions_of(analysis(findings=[dropped])))
+
+
 def test_nothing_found_is_empty():
     made = analysis(findings=[drag_finding()])
     assert empty(conditions_of(made)) and empty(instruments_of(made))

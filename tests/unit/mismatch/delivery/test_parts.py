@@ -57,6 +57,10 @@ def test_a_payload_for_a_time_is_a_condition():
     assert place_of(always) == "vehicle" and place_of(for_a_time) == "conditions"
 
 
+def test_a_sensor_that_drops_out_for_a_time_is_an_instrument():
+    assert place_of(Finding(id="sensor_dropout", status="established", windows=(("a", 1.0, 2.0),))) == "instruments"
+
+
 def test_nothing_suggested_is_in_any_file():
     findings = [drag_finding(status="suggested"), sensor_error(status="suggested")]
     made = analysis(findings=findings)
