@@ -15,7 +15,7 @@ import unicodedata
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
@@ -376,6 +376,9 @@ class Decisions(Section):
         description="Shell patterns on the names in workflow/plantings.tsv of those kept [names]."
     )
     studies: bool = Field(description="Whether the studies of real recordings are kept, too [true, false].")
+    chooser: Literal["search", "posterior"] = Field(
+        description="Who chooses the effects of a flight while it is judged; the posterior on this bench alone [name]."
+    )
 
 
 class Rules(Section):

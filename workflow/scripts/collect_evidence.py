@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rotorid import log
 from rotorid.importers.report import read_report
+from rotorid.mismatch.choosing import KEPT, POSTERIOR
 from rotorid.proof.decisions import truths
 from rotorid.proof.decisions.collect import Made, collect
 from rotorid.proof.decisions.plan import Item, in_order
@@ -89,14 +90,20 @@ class Sets:
             return Made(recordings, {"answer": json.loads(answer.read_text(encoding="utf-8"))})
 
 
-def main(items: Sequence[Item], folder: str, public: str, hashes: Mapping[str, str], root: str, out: str) -> None:
+CHOOSERS = {"search": KEPT, "posterior": POSTERIOR}
+
+
+def main(
+    items: Sequence[Item], folder: str, public: str, hashes: Mapping[str, str], chooser: str, root: str, out: str
+) -> None:
     """Keep the evidence of `items` in `folder`, those first that tell most, and write the names of its files to `out`.
 
-    `hashes` are those of the code that draws (`drawing`), plants (`planting`) and judges (`engine`).
+    `hashes` are those of the code that draws (`drawing`), plants (`planting`) and judges (`engine`); the `chooser`
+    chooses the effects of a flight.
     """
     sets = Sets(Path(root), Path(public), hashes["drawing"], hashes["planting"])
     wanted = [item for item in in_order(items) if sets.available(item)]
-    stems = collect(wanted, Path(folder), sets.make, sets.source_of, hashes["engine"], log.progress)
+    stems = collect(wanted, Path(folder), sets.make, sets.source_of, hashes["engine"], CHOOSERS[chooser], log.progress)
     Path(out).write_text(json.dumps({"engine": hashes["engine"], "kept": stems}, indent=1) + "\n", encoding="utf-8")
 
 
@@ -107,6 +114,7 @@ if __name__ == "__main__":
             folder=snakemake.params.folder,
             public=snakemake.params.public,
             hashes=snakemake.params.hashes,
+            chooser=snakemake.params.chooser,
             root=str(Path.cwd()),
             out=snakemake.output.kept,
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from itertools import combinations
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch import rules
 from rotorid.mismatch.contributions import Contributions
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.findings import Estimate, Finding, Status
 from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import (
@@ -25,6 +25,10 @@ from rotorid.mismatch.select import (
     Selection,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.posterior.choose import PosteriorSearch
+    from rotorid.mismatch.posterior.statements import Statement
 
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
@@ -48,16 +52,6 @@ def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray
     cols = regression.columns([key])
     where = fit.places(cols)
     return fit.beta[where], fit.covariance[np.ix_(where, where)]
-
-
-def suggested(search: Search, active: list[str]) -> Fit | None:
-    """The model with the strongest effect beside it that explains more than it costs and is still not stated.
-
-    It may be too small, too unsure or too much like the others; as long as it may be there, what is stated may be off
-    by what it would change.
-    """
-    found = next((c for c in search.candidates(active) if c.score > 0 and c.physical), None)
-    return None if found is None else search.regression.fit([*search.always, *active, found.key])
 
 
 def estimates(
@@ -110,6 +104,15 @@ class Told(NamedTuple):
     parameters: tuple[Estimate, ...]
     channels: tuple[str, ...]
     alternatives: Collection[str]
+    statement: Statement | None = None
+    """What the posterior states, where it decided."""
+
+    @property
+    def status(self) -> Status:
+        """Its status."""
+        if self.statement is not None:
+            return self.statement.status
+        return "ambiguous" if self.alternatives else "established"
 
 
 def findings_of(search: Search, selection: Selection, told: Callable[[str], Told]) -> list[Finding]:
@@ -126,7 +129,9 @@ def findings_of(search: Search, selection: Selection, told: Callable[[str], Told
         findings.append(
             Finding(
                 id=term.effect,
-                status="ambiguous" if own.alternatives else "established",
+                status=own.status,
+                probability=None if own.statement is None else own.statement.probability,
+                objection="" if own.statement is None else own.statement.objection,
                 form=term.form,
                 values=tuple(float(v) for v in own.values),
                 equation=term.form.equation,
@@ -151,7 +156,7 @@ def findings_of(search: Search, selection: Selection, told: Callable[[str], Told
 def wrench_findings(
     contributions: Contributions,
     regression: Regression,
-    search: Search,
+    search: Search | PosteriorSearch,
     selection: Selection,
     noise: np.ndarray,
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
@@ -159,7 +164,7 @@ def wrench_findings(
 ) -> list[Finding]:
     """Findings of the terms of a flight; `nonlinear` holds values and one-sigma of those with nonlinear parameters,
     `delivered` the fit whose numbers are stated."""
-    beside = suggested(search, selection.active)
+    beside = search.beside(selection.active)
 
     def told(key: str) -> Told:
         term = search.terms[key]
@@ -180,7 +185,9 @@ def wrench_findings(
                 for p, v, a, b in zip(term.form.parameters, values, low, high, strict=True)
             )
         names = tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels)
-        return Told(values, parameters, names, search.alternatives(key, selection.active))
+        stated = selection.statements.get(key)
+        others = search.alternatives(key, selection.active) if stated is None else stated.alternatives
+        return Told(values, parameters, names, others, stated)
 
     return findings_of(search, selection, told)
 

@@ -71,6 +71,8 @@ class Finding:
     """Of a `suggested` one: why it is not established."""
     windows: tuple[tuple[str, float, float], ...] = ()
     """(run, start_s, stop_s) where it acts, for effects in part of the flight; empty for always."""
+    probability: float | None = None
+    """That it, or one of its class, is at work; None where none was computed."""
     withheld: str = ""
     """Of one that is claimed: why the gate keeps it out of the files; empty where it is delivered."""
 

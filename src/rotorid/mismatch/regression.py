@@ -118,10 +118,50 @@ class Apart:
     bias_gram: np.ndarray
     """(m, K), as in `Regression`."""
     bias_cross: np.ndarray
+    told_by: np.ndarray
+    """(channels,) numbers of the channels."""
 
     def before(self, kept: int) -> Apart:
         """The same without the columns from `kept` on."""
         return replace(self, gram=self.gram[:, :, :kept], bias_gram=self.bias_gram[:, :kept])
+
+
+MOST_ENVIRONMENTS = 120
+"""Environments of which products are kept channel by channel; those of a longer flight are joined."""
+
+
+@dataclass(frozen=True)
+class ByChannel:
+    """Products of the fitted blocks channel by channel, summed over environments."""
+
+    channels: np.ndarray
+    """(C,) of the twelve."""
+    gram: np.ndarray
+    """(C, E, K, K)."""
+    cross: np.ndarray
+    """(C, E, K)."""
+    square: np.ndarray
+    """(C, E)."""
+    environment: np.ndarray
+    """(blocks,) number of each block's environment; −1 for one that is not fitted."""
+    bias_gram: np.ndarray
+    """(C, K, K) what the noise of the regressors adds over all blocks, fitted or not."""
+    bias_cross: np.ndarray
+    """(C, K)."""
+
+    def projected(self, kept: int, follows: np.ndarray, alone: np.ndarray) -> ByChannel:
+        """The same with what the columns from `kept` on take of the others taken out (`Regression.without_winds`)."""
+        count, environments = self.square.shape
+        gram = np.zeros((count, environments, kept, kept))
+        cross, square = np.zeros((count, environments, kept)), np.zeros((count, environments))
+        bias_gram, bias_cross = np.zeros((count, kept, kept)), np.zeros((count, kept))
+        for c in range(count):
+            for e in range(environments):
+                own = self.gram[c, e], self.cross[c, e], self.square[c, e]
+                gram[c, e], cross[c, e], square[c, e] = projected(*own, kept, follows, alone)
+            noise = self.bias_gram[c], self.bias_cross[c], 0.0
+            bias_gram[c], bias_cross[c], _ = projected(*noise, kept, follows, alone)
+        return replace(self, gram=gram, cross=cross, square=square, bias_gram=bias_gram, bias_cross=bias_cross)
 
 
 @dataclass
@@ -158,6 +198,8 @@ class Regression:
     """Of every stretch the block that each of its rows is in, (n,); -1 where it is in none."""
     apart: Apart | None = None
     """Terms that some of the channels alone estimate; None where all channels estimate all."""
+    by_channel: ByChannel | None = None
+    """Products of the fitted blocks channel by channel, where they were asked for."""
 
     def keys_of(self, *kinds: str) -> list[str]:
         """Keys of the terms of some kinds."""
@@ -249,6 +291,7 @@ class Regression:
             bias_cross=bias_cross,
             # No wind of a single run acts in the channels of which others are estimated apart.
             apart=None if self.apart is None else self.apart.before(kept),
+            by_channel=None if self.by_channel is None else self.by_channel.projected(kept, follows, alone),
         )
 
     def _apart(self, cols: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -787,6 +830,7 @@ def build(
     noisy: list[Rows] | None = None,
     told_by: Collection[int] = (),
     apart: Iterable[str] = (),
+    by_channel: bool = False,
 ) -> Regression:
     """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
 
@@ -799,24 +843,21 @@ def build(
         at += term.size
     per_block = max(2, int(round(block_s * rate_hz)))
     longest = max(len(f) for f in filters.values()) - 1
-    grams, crosses, squares, runs, training = [], [], [], [], []
-    bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
     own = np.sort([start[t.key] + i for t in terms if t.key in set(apart) for i in range(t.size)]).astype(int)
-    own_grams, own_crosses, own_bias, own_bias_cross = [], [], np.zeros((len(own), at)), np.zeros(len(own))
     names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
-    blocks_of_rows = []
-    for k, r in enumerate(rows):
-        size = len(r.y) - longest
-        blocks_of_rows.append(np.full(len(r.y), -1))
-        if size < 2:
+    parts_of, blocks_of_rows, runs, training = blocks_of(rows, names, per_block, longest, in_training)
+    count = len(runs)
+    fitted = np.array([t is True for t in training])
+    gram, cross, square = np.zeros((count, at, at)), np.zeros((count, at)), np.zeros(count)
+    own_gram, own_cross = np.zeros((count, len(own), at)), np.zeros((count, len(own)))
+    bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
+    own_bias, own_bias_cross = np.zeros((len(own), at)), np.zeros(len(own))
+    kept = empty_by_channel(np.array(list(filters)), runs, fitted, per_block / rate_hz, at) if by_channel else None
+    for k, (r, parts) in enumerate(zip(rows, parts_of, strict=True)):
+        if not parts:
             continue  # shorter than the whitening reaches: it says nothing
-        parts = np.array_split(np.arange(size), max(1, size // per_block))
-        for b, part in enumerate(parts):
-            blocks_of_rows[-1][longest + part] = len(runs) + b
-        blocks_of_rows[-1][:longest] = len(runs)
-        gram, cross, square = np.zeros((len(parts), at, at)), np.zeros((len(parts), at)), np.zeros(len(parts))
-        own_gram, own_cross = np.zeros((len(parts), len(own), at)), np.zeros((len(parts), len(own)))
-        for channel, taps in filters.items():
+        first = blocks_of_rows[k][0]
+        for place, (channel, taps) in enumerate(filters.items()):
             y, x = whiten(r, channel, taps, longest)
             again = None if noisy is None else whiten(noisy[k], channel, taps, longest)
             # Many columns say nothing in a channel (a moment in a force): they are left out of the products.
@@ -833,31 +874,30 @@ def build(
                 bias_cross[used] += with_y
                 own_bias[ours_grid] += noise[ours]
                 own_bias_cross[ours_at] += with_y[ours]
-            for b, part in enumerate(parts):
-                products, with_y = x[part].T @ x[part], x[part].T @ y[part]
+                if kept is not None:
+                    kept.bias_gram[place][grid] += noise
+                    kept.bias_cross[place, used] += with_y
+            for b, part in enumerate(parts, first):
+                products, with_y, own_square = x[part].T @ x[part], x[part].T @ y[part], float(y[part] @ y[part])
                 gram[b][grid] += products
                 cross[b, used] += with_y
                 if len(ours):
                     own_gram[b][ours_grid] += products[ours]
                     own_cross[b, ours_at] += with_y[ours]
-                square[b] += float(y[part] @ y[part])
-        grams.append(gram)
-        crosses.append(cross)
-        own_grams.append(own_gram)
-        own_crosses.append(own_cross)
-        squares.append(square)
-        runs += [names[r.run]] * len(parts)
-        middles = [r.time_s[min(len(r.time_s) - 1, longest + int(part.mean()))] for part in parts]
-        training += [in_training(r.run, float(middle)) for middle in middles]
+                square[b] += own_square
+                if kept is not None and (e := kept.environment[b]) >= 0:
+                    kept.gram[place, e][grid] += products
+                    kept.cross[place, e, used] += with_y
+                    kept.square[place, e] += own_square
     precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     return Regression(
         terms,
         start,
-        np.concatenate(grams),
-        np.concatenate(crosses),
-        np.concatenate(squares),
+        gram,
+        cross,
+        square,
         np.array(runs),
-        np.array([t is True for t in training]),
+        fitted,
         np.array([t is False for t in training]),
         precision,
         bias_gram,
@@ -866,7 +906,50 @@ def build(
         names,
         block_s=per_block / rate_hz,
         blocks_of_rows=tuple(blocks_of_rows),
-        apart=Apart(own, np.concatenate(own_grams), np.concatenate(own_crosses), own_bias, own_bias_cross)
+        apart=Apart(own, own_gram, own_cross, own_bias, own_bias_cross, np.array(sorted(told_by), int))
         if len(own)
         else None,
+        by_channel=kept,
+    )
+
+
+def blocks_of(
+    rows: list[Rows], names: dict[str, int], per_block: int, longest: int, in_training
+) -> tuple[list[list[np.ndarray]], list[np.ndarray], list[int], list[bool | None]]:
+    """Of every stretch its blocks as places behind the whitening's reach `longest`, and of each of its rows the block;
+    of every block the run's number, and whether it is fitted."""
+    parts_of, blocks_of_rows = [], []
+    runs: list[int] = []
+    training: list[bool | None] = []
+    for r in rows:
+        size = len(r.y) - longest
+        blocks_of_rows.append(np.full(len(r.y), -1))
+        parts_of.append([] if size < 2 else np.array_split(np.arange(size), max(1, size // per_block)))
+        for b, part in enumerate(parts_of[-1], len(runs)):
+            blocks_of_rows[-1][longest + part] = b
+        if parts_of[-1]:
+            blocks_of_rows[-1][:longest] = len(runs)
+        runs += [names[r.run]] * len(parts_of[-1])
+        middles = [r.time_s[min(len(r.time_s) - 1, longest + int(part.mean()))] for part in parts_of[-1]]
+        training += [in_training(r.run, float(middle)) for middle in middles]
+    return parts_of, blocks_of_rows, runs, training
+
+
+def empty_by_channel(
+    channels: np.ndarray, runs: list[int], fitted: np.ndarray, block_s: float, columns: int
+) -> ByChannel:
+    """Products of no rows yet, for every channel and environment of the fitted blocks."""
+    environment = np.full(len(runs), -1)
+    environment[fitted] = environments(np.array(runs)[fitted], block_s)
+    count = int(environment.max(initial=0)) + 1
+    environment //= -(-count // MOST_ENVIRONMENTS)  # joined where they are more than that
+    count = int(environment.max(initial=0)) + 1
+    return ByChannel(
+        channels=channels,
+        environment=environment,
+        gram=np.zeros((len(channels), count, columns, columns)),
+        cross=np.zeros((len(channels), count, columns)),
+        square=np.zeros((len(channels), count)),
+        bias_gram=np.zeros((len(channels), columns, columns)),
+        bias_cross=np.zeros((len(channels), columns)),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.posterior.statements import Statement
 
 ENTER_P = 5e-5
 """A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
@@ -76,6 +80,8 @@ class Selection:
     p_values: dict[str, float] = field(default_factory=dict)
     trail: list[str] = field(default_factory=list)
     not_established: dict[str, str] = field(default_factory=dict)
+    statements: Mapping[str, Statement] = field(default_factory=dict)
+    """Key of an active term to what the posterior states of it; empty where no posterior decided."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,8 @@ class Search:
 
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
+    widened = False
+    """Whether believed values have more room than their trust gives."""
 
     def __init__(self, regression: Regression, ask: Questions):
         self.regression = regression
@@ -281,6 +289,15 @@ class Search:
         wide = reg.with_room(VALUE_LIMITS[1])
         enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
         return wide if rules.VALUES_FIRST(enough) else None
+
+    def beside(self, active: list[str]) -> Fit | None:
+        """The model with the strongest effect beside it that explains more than it costs and is still not stated.
+
+        It may be too small, too unsure or too much like the others; as long as it may be there, what is stated may be
+        off by what it would change.
+        """
+        found = next((c for c in self.candidates(active) if c.score > 0 and c.physical), None)
+        return None if found is None else self.regression.fit([*self.always, *active, found.key])
 
     def _all_physical(self, active: list[str]) -> bool:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)

@@ -453,7 +453,7 @@ def effect_verdict(finding: Finding, share: float | None, size: Size | None = No
             ParameterEstimate(symbol=e.symbol, value=e.value, unit=e.unit, interval_95=(e.low, e.high))
             for e in finding.parameters
         ),
-        probability=None,
+        probability=finding.probability,
         p_value=finding.p_value,
         held_out_gain=None
         if finding.gain is None

@@ -8,15 +8,16 @@ from scipy.stats import multivariate_normal
 
 from rotorid.mismatch.comparison import environments
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
+from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, problem_of
-from rotorid.mismatch.posterior.score import Posterior, contributions, log_prior, power_of_leftover, scored
+from rotorid.mismatch.posterior.score import Posterior, log_prior, scored
 from rotorid.mismatch.posterior.search import decide, most_probable
 from rotorid.mismatch.posterior.statements import statements_of
 
-BLOCKS, ROWS = 36, 12
+BLOCKS, ROWS = 90, 8
 OFFSET = EvidenceTerm("offset", "nuisance", "", 1, (0.5,))
-PLAIN = Prior(form_error=0.0)
+PLAIN = Prior()
 
 
 def effect(key, low=-np.inf, high=np.inf, negligible=0.0, **more):
@@ -38,24 +39,22 @@ class Flight:
     def evidence(self, active=()):
         """Its Gram matrices."""
         count = self.x.shape[2]
+        environment = environments(np.repeat([0, 1], BLOCKS // 2), 1.0)
+        kinds = range(int(environment.max()) + 1)
+        x, y = ([rows[environment == e].reshape(-1, *rows.shape[2:]) for e in kinds] for rows in (self.x, self.y))
         return Evidence(
             terms=self.terms,
             start={t.key: i for i, t in enumerate(self.terms)},
-            gram=np.einsum("bni,bnj->bij", self.x, self.x),
-            cross=np.einsum("bni,bn->bi", self.x, self.y),
-            square=(self.y**2).sum(axis=1),
-            run=np.repeat([0, 1], BLOCKS // 2),
-            training=np.ones(BLOCKS, bool),
-            precision=np.zeros(count),
-            bias_gram=np.zeros((count, count)),
-            bias_cross=np.zeros(count),
-            limit=np.full(count, np.inf),
-            block_s=1.0,
-            apart=None,
+            channels=np.array([2]),
+            gram=np.array([[own.T @ own for own in x]]),
+            cross=np.array([[own.T @ left for own, left in zip(x, y, strict=True)]]),
+            square=np.array([[left @ left for left in y]]),
+            blocks=np.bincount(environment),
+            bias_gram=np.zeros((1, count, count)),
+            bias_cross=np.zeros((1, count)),
+            apart_columns=np.zeros(0, int),
+            apart_channels=np.zeros(0, int),
             active=tuple(active),
-            trail=(),
-            not_established={},
-            values={},
         )
 
 
@@ -70,43 +69,81 @@ def flight(beta, terms=None, seed=0, alike=0.3, noise=1.0):
     return Flight(x, y, tuple(terms))
 
 
-def problem(of: Flight, prior=PLAIN, power=1.0) -> Problem:
-    """The problem that a flight poses."""
-    return problem_of(of.evidence(), power, prior)
+def asked_of(evidence: Evidence, variance=0.0, prior=PLAIN) -> Problem:
+    """The problem that an evidence poses, with a leftover of a given variance."""
+    return problem_of(evidence, spectrum_of(evidence), np.full(len(evidence.channels), variance), prior)
 
 
-def log_normal(of: Flight, asked: Problem, model, parts=None):
-    """Log density of all rows where the model's coefficients, and the errors of its contributions, are normal."""
+def problem(of: Flight, variance=0.0, prior=PLAIN) -> Problem:
+    """The problem that a flight poses, with a leftover of a given variance."""
+    return asked_of(of.evidence(), variance, prior)
+
+
+def log_normal(of: Flight, asked: Problem, model):
+    """Log density of all rows where the model's coefficients, and the leftover's of each environment, are normal."""
     columns = asked.columns(model)
     x = of.x.reshape(-1, of.x.shape[2]) * asked.unit
-    covariance = asked.power * np.eye(len(x)) + (x[:, columns] * asked.prior_sd[columns] ** 2) @ x[:, columns].T
-    if parts is not None:
-        environment = np.repeat(environments(np.repeat([0, 1], BLOCKS // 2), 1.0), ROWS)
-        for e in np.unique(environment):
-            own = np.where(environment == e, 1.0, 0.0)[:, None] * (x @ parts)
-            covariance += asked.prior.form_error**2 * own @ own.T
+    covariance = np.eye(len(x)) + (x[:, columns] * asked.believed(model)[0][columns] ** 2) @ x[:, columns].T
+    environment = np.repeat(environments(np.repeat([0, 1], BLOCKS // 2), 1.0), ROWS)
+    for e in np.unique(environment):
+        own = np.where(environment == e, 1.0, 0.0)[:, None] * x
+        covariance += asked.variance[0] * own @ own.T
     return multivariate_normal.logpdf(of.y.ravel(), np.zeros(len(x)), covariance)
 
 
-def test_log_odds_are_those_of_the_normal_distribution():
+@pytest.mark.parametrize("variance", [0.0, 3.0, 50.0])
+def test_log_odds_are_those_of_the_normal_distribution(variance):
     of = flight([0.02, 0.1, 0.3, 0.0, 0.1])
-    asked = problem(of, power=1.7)
+    asked = problem(of, variance)
     a, b = ("drag/plain",), ("drag/plain", "tilt/plain")
     ours = Posterior(asked)(b) - Posterior(asked)(a) - log_prior(asked, b) + log_prior(asked, a)
-    assert ours == pytest.approx(log_normal(of, asked, b) - log_normal(of, asked, a), abs=1e-8)
+    assert ours == pytest.approx(log_normal(of, asked, b) - log_normal(of, asked, a), abs=1e-6)
 
 
-def test_errors_of_the_forms_are_integrated_out():
-    of = flight([0.0, 0.0, 3.0, 0.0, 2.0])
-    asked = problem(of, Prior(form_error=0.1))
-    values = {}
-    for model in (("drag/plain",), ("drag/plain", "tilt/plain")):
-        at = scored(asked, model)
-        # The mode moves by next to nothing after two rounds: the parts are taken there.
-        parts = contributions(asked, model, at.columns, at.mode.beta)
-        values[model] = at.log_posterior - log_prior(asked, model), log_normal(of, asked, model, parts)
-    (ours_a, theirs_a), (ours_b, theirs_b) = values.values()
-    assert ours_b - ours_a == pytest.approx(theirs_b - theirs_a, rel=1e-3)
+def test_a_leftover_that_is_new_in_each_environment_is_no_evidence_of_an_effect():
+    of = flight([0.0, 0.0, 0.0, 0.0, 0.0])
+    wave = np.repeat([-0.8, 1.2], 5)[np.arange(BLOCKS) % 10, None]
+    bent = replace(of, y=of.y + 2.0 * wave * of.x[:, :, 2])
+    white, left = (spectrum_of(f.evidence()).variance_of_leftover(np.zeros(5))[0] for f in (of, bent))
+    assert white < 0.1 * left
+    assert decide(bent.evidence(), Prior()).model == ()
+    assert most_probable(problem(bent), [()]).model  # taken for white noise it would be one
+
+
+def test_noise_that_cancels_between_columns_cancels_beside_a_leftover_too():
+    """Columns of one sensor have its noise in common; what does not cancel would be taken for what they have in sum."""
+    of = flight([0.0, 0.0, 0.5, 0.0, 0.0])
+    seen = of.evidence()
+    both = np.concatenate([seen.gram, 0.01 * seen.gram]), np.concatenate([seen.cross, 0.1 * seen.cross])
+    noise = np.zeros((2, 5, 5))
+    noise[0, 2:4, 2:4] = 40.0 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    two = replace(
+        seen,
+        channels=np.array([2, 3]),
+        gram=both[0],
+        cross=both[1],
+        square=np.concatenate([seen.square, seen.square]),
+        bias_gram=noise,
+        bias_cross=np.zeros((2, 5)),
+    )
+    asked = asked_of(two, 30.0)
+    own_units = asked.bias / np.maximum(np.outer(asked.unit, asked.unit), 1e-300)
+    assert own_units[2, 2] > 0
+    assert own_units[2:4, 2:4].sum() == pytest.approx(0.0, abs=1e-9 * own_units[2, 2])
+
+
+def test_a_value_that_is_plainly_wrong_is_freed_before_an_effect_stands_in():
+    terms = (EvidenceTerm("thrust", "value", "", 1, (0.05,)), OFFSET, effect("drag/plain"), effect("lift/plain"))
+    found = decide(flight([0.5, 0.0, 0.0, 0.0], terms).evidence(), Prior())
+    assert found.model == ("thrust",)
+
+
+def test_of_a_ratio_one_side_stays_as_believed_and_its_doubt_is_the_others():
+    terms = (EvidenceTerm("mass", "value", "", 1, (0.05,)), EvidenceTerm("thrust", "value", "", 1, (0.1,)))
+    asked = problem(flight([0.0, 0.0, 0.5], (*terms, effect("drag/plain"))))
+    sd = asked.prior_sd * asked.unit
+    assert sd[0] < 1e-3 and sd[1] == pytest.approx(np.hypot(0.05, 0.1))
+    assert set(asked.freed) == {"thrust"}
 
 
 def test_what_is_at_work_is_found_and_nothing_else():
@@ -158,20 +195,11 @@ def test_the_noise_of_a_regressor_does_not_shrink_its_coefficient():
     bias[2, 2] = (error**2).sum()
 
     def size(evidence):
-        asked = problem_of(evidence, 1.0, PLAIN)
+        asked = asked_of(evidence)
         return scored(asked, ("drag/plain",)).mode.beta[-1] * asked.unit[2]
 
     assert size(seen) < 0.87
-    assert size(replace(seen, bias_gram=bias)) == pytest.approx(1.0, abs=0.06)
-
-
-def test_power_is_one_of_white_noise_and_more_of_a_leftover_that_differs_between_environments():
-    of = flight([0.0, 0.0, 1.0, 0.0, 0.0])
-    wave = np.repeat([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0], BLOCKS // 6)[:, None]
-    bent = replace(of, y=of.y + 0.8 * wave * of.x[:, :, 2])
-    powers = [power_of_leftover(problem(f, Prior(), 8.0), ("drag/plain",)) for f in (of, bent)]
-    assert powers[0] == pytest.approx(1.0, abs=0.5)
-    assert powers[1] > 5.0
+    assert size(replace(seen, bias_gram=bias[None])) == pytest.approx(1.0, abs=0.06)
 
 
 def test_what_could_stand_in_an_ids_place_is_its_class():

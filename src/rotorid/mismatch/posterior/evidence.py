@@ -1,20 +1,22 @@
 """What a decision needs of a flight: Gram matrices of the whitened columns, and what each column stands for.
 
-`Evidence` holds them block by block (about 1 s each), as the engine's last search saw them; it needs no recording and
-no code of an effect, so it can be kept in a file and decided on anew. `Sums` holds the same by environment (about 5 s).
+`Evidence` holds them channel by channel and environment by environment (about 5 s each), as the engine's last search
+saw them; it needs no recording and no code of an effect, so it can be kept in a file and decided on anew.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.mismatch.comparison import environments
-from rotorid.mismatch.fitted import Fitted
-from rotorid.mismatch.regression import Apart
+from rotorid.mismatch.regression import Regression
 from rotorid.mismatch.rows import Term
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.fitted import Fitted
 
 
 @dataclass(frozen=True)
@@ -72,40 +74,37 @@ class EvidenceTerm:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Products of whitened columns (K) and residual over blocks of time, and the engine's own choice from them."""
+    """Products of K whitened columns and the residual in C channels over E environments of the fitted blocks, and the
+    engine's own choice from them."""
 
     terms: tuple[EvidenceTerm, ...]
     start: Mapping[str, int]
     """Key of a term to its first column."""
+    channels: np.ndarray
+    """(C,) numbers of the channels: force, moment, accelerometer, gyroscope, three axes each."""
     gram: np.ndarray
-    """(blocks, K, K), each in the units of its coefficients to the power −1."""
+    """(C, E, K, K), each in the units of its coefficients to the power −1."""
     cross: np.ndarray
-    """(blocks, K)."""
+    """(C, E, K)."""
     square: np.ndarray
-    """(blocks,) whitened squares of the believed vehicle's residual."""
-    run: np.ndarray
-    """(blocks,) number of the run."""
-    training: np.ndarray
-    """(blocks,) mask of the blocks fitted."""
-    precision: np.ndarray
-    """(K,) prior precision that the engine uses."""
+    """(C, E) whitened squares of the believed vehicle's residual."""
+    blocks: np.ndarray
+    """(E,) number of blocks of about a second."""
     bias_gram: np.ndarray
-    """(K, K) what the noise of the regressors adds to the sum of `gram` over all blocks."""
+    """(C, K, K) what the noise of the regressors adds to the sum of `gram`."""
     bias_cross: np.ndarray
-    """(K,) the same of `cross`."""
-    limit: np.ndarray
-    """(K,) how far the engine lets a coefficient move; infinite for all but believed values."""
-    block_s: float
-    """Length of a block, s."""
-    apart: Apart | None
-    """Products of the channels that alone estimate some terms; None where all channels estimate all."""
-    active: tuple[str, ...]
+    """(C, K) the same of `cross`."""
+    apart_columns: np.ndarray
+    """(m,) columns that some of the channels alone estimate (`Regression.apart`); none where all estimate all."""
+    apart_channels: np.ndarray
+    """Numbers of those channels."""
+    active: tuple[str, ...] = ()
     """Keys of the effects that the engine selected."""
-    trail: tuple[str, ...]
+    trail: tuple[str, ...] = ()
     """Steps of its search."""
-    not_established: Mapping[str, str]
+    not_established: Mapping[str, str] = field(default_factory=dict)
     """Ids that it looked at and dropped, with the reason."""
-    values: Mapping[str, tuple[float, float]]
+    values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Believed values that it calls wrong: relative change and one-sigma."""
 
 
@@ -139,21 +138,9 @@ def term_of(term: Term) -> EvidenceTerm:
 
 def evidence_of(found: Fitted) -> Evidence:
     """What the last search on a flight saw, and what it chose."""
-    regression, selection = found.model.search.regression, found.model.selection
-    return Evidence(
-        terms=tuple(term_of(t) for t in regression.terms),
-        start=dict(regression.start),
-        gram=regression.gram,
-        cross=regression.cross,
-        square=regression.square,
-        run=regression.run,
-        training=regression.training,
-        precision=regression.precision,
-        bias_gram=regression.bias_gram,
-        bias_cross=regression.bias_cross,
-        limit=regression.limit,
-        block_s=float(regression.block_s),
-        apart=regression.apart,
+    selection = found.model.selection
+    return replace(
+        evidence_from(found.model.search.regression),
         active=tuple(selection.active),
         trail=tuple(selection.trail),
         not_established={k: str(v) for k, v in selection.not_established.items()},
@@ -161,59 +148,20 @@ def evidence_of(found: Fitted) -> Evidence:
     )
 
 
-@dataclass(frozen=True)
-class ApartSums:
-    """Sums over the fitted blocks of the products that alone estimate some columns (`Regression.Apart`)."""
-
-    columns: np.ndarray
-    """(m,) columns estimated so."""
-    gram: np.ndarray
-    """(m, K) less the noise of the regressors."""
-    cross: np.ndarray
-    """(m,) less the same."""
-
-
-@dataclass(frozen=True)
-class Sums:
-    """Evidence summed over the environments of the fitted blocks."""
-
-    gram: np.ndarray
-    """(environments, K, K)."""
-    cross: np.ndarray
-    """(environments, K)."""
-    square: np.ndarray
-    """(environments,)."""
-    blocks: np.ndarray
-    """(environments,) number of blocks."""
-    bias_gram: np.ndarray
-    """(K, K) noise of the regressors in the sum of `gram`."""
-    bias_cross: np.ndarray
-    """(K,)."""
-    apart: ApartSums | None
-
-
-def sums_of(evidence: Evidence) -> Sums:
-    """Evidence by environment: stretches of five seconds within a run, shorter where the flight is short."""
-    fitted = evidence.training
-    environment = environments(evidence.run[fitted], evidence.block_s)
-    count, share = int(environment.max()) + 1, float(fitted.mean())
-
-    def summed(blocks: np.ndarray) -> np.ndarray:
-        return np.array([blocks[fitted][environment == e].sum(axis=0) for e in range(count)])
-
-    apart = evidence.apart
-    return Sums(
-        gram=summed(evidence.gram),
-        cross=summed(evidence.cross),
-        square=summed(evidence.square),
-        blocks=np.bincount(environment),
-        bias_gram=evidence.bias_gram * share,
-        bias_cross=evidence.bias_cross * share,
-        apart=None
-        if apart is None or not len(apart.columns)
-        else ApartSums(
-            columns=apart.columns,
-            gram=apart.gram[fitted].sum(axis=0) - apart.bias_gram * share,
-            cross=apart.cross[fitted].sum(axis=0) - apart.bias_cross * share,
-        ),
+def evidence_from(regression: Regression) -> Evidence:
+    """What a regression holds, its products kept by channel."""
+    kept, apart = regression.by_channel, regression.apart
+    share = float(regression.training.mean())
+    return Evidence(
+        terms=tuple(term_of(t) for t in regression.terms),
+        start=dict(regression.start),
+        channels=kept.channels,
+        gram=kept.gram,
+        cross=kept.cross,
+        square=kept.square,
+        blocks=np.bincount(kept.environment[kept.environment >= 0], minlength=kept.square.shape[1]),
+        bias_gram=kept.bias_gram * share,
+        bias_cross=kept.bias_cross * share,
+        apart_columns=np.zeros(0, int) if apart is None else apart.columns,
+        apart_channels=np.zeros(0, int) if apart is None else apart.told_by,
     )

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, Sums, sums_of
+from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm
+from rotorid.mismatch.posterior.leftover import TINY, Spectrum
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.regression import NEVER_EXCITED
 from rotorid.mismatch.unknowns import UNKNOWNS
 
-TINY = 1e-300
-FEWEST_ROWS = 50.0
-"""Rows that a flight is taken to have at least."""
-FULL_RIDGE = 1e-6
-"""Ridge of the model of all columns, in units of their length."""
+RATIOS = {"mass": ("thrust",), "arm": ("inertia_xx", "inertia_yy"), "torque": ("inertia_zz",)}
+"""Believed values of which a flight knows no more than the ratio to others. Were both free, noise alone would say what
+they have in common (the residual is itself their sum): the first stay as believed, their doubt is the others'."""
+HELD_SD = 1e-4
+"""Relative one-sigma of a value that stays as believed."""
 ALWAYS = ("value", "nuisance", "wind")
 """Kinds of terms that are in every model."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Sums of products of K columns over E environments, scaled to unit length, and what is believed of them."""
+    """Sums of products of K columns, scaled to unit length, and what is believed of them."""
 
     terms: Mapping[str, EvidenceTerm]
     columns_of: Mapping[str, np.ndarray]
@@ -32,18 +32,16 @@ class Problem:
     """Columns that are in every model."""
     effects: Mapping[str, str]
     """Key of an effect's term to what can be in a model only once: its id, or of one window its key."""
+    freed: Mapping[str, float]
+    """Key of a believed value to its scaled one-sigma where it may be plainly wrong: such keys are part of a model."""
     log_prior_of: Mapping[str, float]
-    """Key of an effect's term to its log prior, nats."""
+    """Key of what a model may hold to its log prior, nats."""
     unit: np.ndarray
     """(K,) coefficient in its own unit of a scaled one of 1; 0 for a column that is never excited."""
     gram: np.ndarray
-    """(E, K, K)."""
+    """(K, K) products over all environments and channels, the leftover taken out."""
     cross: np.ndarray
-    """(E, K)."""
-    square: np.ndarray
-    """(E,)."""
-    share: np.ndarray
-    """(E,) share of the blocks in each environment."""
+    """(K,)."""
     bias: np.ndarray
     """(K, K) what the regressors' noise adds to the sum of `gram`."""
     limited_bias: np.ndarray
@@ -65,62 +63,81 @@ class Problem:
     """(K,) mask of the believed values, whose bounds have no slack."""
     rows: float
     """Whitened squares that the model of all columns leaves: the number of rows, as the whitening counts them."""
-    power: float
-    """What whitened squares are divided by: the leftover's power over white noise."""
+    variance: np.ndarray
+    """(C,) variance of the leftover's coefficients in each channel; all products are weighed by it already."""
     prior: Prior
-    total_gram: np.ndarray
-    """(K, K) sum of `gram`."""
-    total_cross: np.ndarray
-    """(K,) sum of `cross`."""
+    channel_gram: np.ndarray
+    """(C, K, K) products in each channel with the leftover in them: how large a contribution is."""
 
     def columns(self, keys: Iterable[str]) -> np.ndarray:
-        """Columns of the model with the effects `keys`: those that are always there, then theirs."""
-        return np.concatenate([self.always, *(self.columns_of[k] for k in keys)]).astype(int)
+        """Columns of the model `keys`: those that are always there, then those of its effects."""
+        own = (self.columns_of[k] for k in keys if k in self.effects)
+        return np.concatenate([self.always, *own]).astype(int)
 
-    def with_power(self, power: float) -> Problem:
-        """The same with another power of the leftover."""
-        return replace(self, power=power)
+    @property
+    def choices(self) -> dict[str, str]:
+        """Key of all that a model may hold or not, to what it can hold only once."""
+        return {**self.effects, **{key: key for key in self.freed}}
+
+    def believed(self, keys: Iterable[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One-sigma, lower and upper bound of every scaled coefficient in the model `keys`, (K,) each."""
+        freed = [k for k in keys if k in self.freed]
+        if not freed:
+            return self.prior_sd, self.low, self.high
+        sd, low, high = self.prior_sd.copy(), self.low.copy(), self.high.copy()
+        for key in freed:
+            (at,) = self.columns_of[key]
+            most = self.prior.freed_reach / max(self.unit[at], TINY)
+            sd[at], low[at], high[at] = self.freed[key], -most, most
+        return sd, low, high
 
 
-def problem_of(evidence: Evidence, power: float, prior: Prior) -> Problem:
+def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, prior: Prior) -> Problem:
     """The problem that a flight's evidence poses.
 
     Parameters
     ----------
     evidence
-        Gram matrices of the flight, by block.
-    power
-        What whitened squares are divided by, 1.
+        Gram matrices of the flight, by channel and environment.
+    spectrum
+        The same in the eigenvectors of each Gram matrix.
+    variance
+        Variance of the leftover's coefficients in each channel, scaled as the columns, (C,).
     prior
         The numbers of the decision.
     """
-    sums = sums_of(evidence)
     terms = {t.key: t for t in evidence.terms}
     columns_of = {t.key: evidence.start[t.key] + np.arange(t.size) for t in evidence.terms}
     always = [columns_of[t.key] for kind in ALWAYS for t in evidence.terms if t.kind == kind]
-    unit = units(sums)
-    gram, cross = sums.gram * np.outer(unit, unit), sums.cross * unit
-    total_gram, total_cross = gram.sum(axis=0), cross.sum(axis=0)
-    bias = sums.bias_gram * np.outer(unit, unit)
-    root = np.sqrt(np.minimum(1.0, prior.attenuation / np.maximum(np.diag(bias), TINY)))
-    rows = max(leftover(total_gram, total_cross, sums.square.sum()), FEWEST_ROWS)
-    place, gram_apart, cross_apart = scaled_apart(sums, unit)
-    sd, low, high, is_value = believed(evidence.terms, columns_of, unit, rows, prior)
+    unit = spectrum.unit
+    seen = spectrum.weighed(variance)
+    bias = np.tensordot(seen.kept, evidence.bias_gram, 1) * np.outer(unit, unit)
+    bias_cross = (seen.kept @ evidence.bias_cross) * unit
+    energy = np.maximum(np.diag(seen.gram), TINY)
+    root = np.sqrt(np.minimum(1.0, prior.attenuation * energy / np.maximum(np.diag(bias), TINY)))
+    rows = spectrum.rows
+    place, gram_apart, cross_apart = scaled_apart(evidence, np.ones(len(evidence.channels)), unit)
+    sd, low, high, is_value = believed(evidence.terms, trusts_of(evidence.terms), columns_of, unit, rows, prior)
     effects = {t.key: t.key if t.run else t.effect for t in evidence.terms if t.kind == "effect"}
+    trusts = trusts_of(evidence.terms)
+    freed = {
+        key: float(np.clip(prior.value_reach * trust, *prior.freed_sd) / unit[evidence.start[key]])
+        for key, trust in trusts.items()
+        if trust > HELD_SD and unit[evidence.start[key]] > 0
+    }
     return Problem(
         terms=terms,
         columns_of=columns_of,
         always=np.concatenate(always) if always else np.zeros(0, int),
         effects=effects,
-        log_prior_of=log_priors(effects, terms, prior),
+        freed=freed,
+        log_prior_of={**log_priors(effects, terms, prior), **dict.fromkeys(freed, -prior.freed_nats)},
         unit=unit,
-        gram=gram,
-        cross=cross,
-        square=sums.square,
-        share=sums.blocks / sums.blocks.sum(),
+        gram=seen.gram,
+        cross=seen.cross,
         bias=bias,
         limited_bias=bias * np.outer(root, root),
-        limited_bias_cross=sums.bias_cross * unit * root,
+        limited_bias_cross=bias_cross * root,
         place_apart=place,
         gram_apart=gram_apart,
         cross_apart=cross_apart,
@@ -129,33 +146,23 @@ def problem_of(evidence: Evidence, power: float, prior: Prior) -> Problem:
         high=high,
         is_value=is_value,
         rows=rows,
-        power=power,
+        variance=variance,
         prior=prior,
-        total_gram=total_gram,
-        total_cross=total_cross,
+        channel_gram=evidence.gram.sum(axis=1) * np.outer(unit, unit),
     )
 
 
-def units(sums: Sums) -> np.ndarray:
-    """One over the length of every column (K,); 0 for one that is never excited."""
-    energy = np.diag(sums.gram.sum(axis=0))
-    return np.where(energy > NEVER_EXCITED, 1.0 / np.sqrt(np.maximum(energy, TINY)), 0.0)
-
-
-def leftover(gram: np.ndarray, cross: np.ndarray, square: float) -> float:
-    """Whitened squares that the model of all columns leaves."""
-    full = gram + FULL_RIDGE * np.eye(len(gram))
-    return float(square - cross @ np.linalg.solve(full, cross))
-
-
-def scaled_apart(sums: Sums, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def scaled_apart(
+    evidence: Evidence, weights: np.ndarray, unit: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place of the columns that some channels alone estimate, and those channels' products, scaled."""
+    own = evidence.apart_columns
     place = np.full(len(unit), -1)
-    if sums.apart is None:
-        return place, np.zeros((0, len(unit))), np.zeros(0)
-    own = unit[sums.apart.columns]
-    place[sums.apart.columns] = np.arange(len(own))
-    return place, sums.apart.gram * np.outer(own, unit), sums.apart.cross * own
+    place[own] = np.arange(len(own))
+    told = np.isin(evidence.channels, evidence.apart_channels) * weights
+    gram = np.tensordot(told, evidence.gram.sum(axis=1) - evidence.bias_gram, 1)
+    cross = told @ (evidence.cross.sum(axis=1) - evidence.bias_cross)
+    return place, (gram * np.outer(unit, unit))[own], (cross * unit)[own]
 
 
 def log_priors(effects: Mapping[str, str], terms: Mapping[str, EvidenceTerm], prior: Prior) -> dict[str, float]:
@@ -169,8 +176,21 @@ def log_priors(effects: Mapping[str, str], terms: Mapping[str, EvidenceTerm], pr
     }
 
 
+def trusts_of(terms: Iterable[EvidenceTerm]) -> dict[str, float]:
+    """Relative one-sigma of every believed value, those that stay held and their doubt the others'."""
+    out = {t.key: float(t.prior_sd[0]) for t in terms if t.kind == "value"}
+    for held, others in RATIOS.items():
+        if held in out and any(other in out for other in others):
+            for other in others:
+                if other in out:
+                    out[other] = float(np.hypot(out[other], out[held]))
+            out[held] = HELD_SD
+    return out
+
+
 def believed(
     terms: Iterable[EvidenceTerm],
+    trusts: Mapping[str, float],
     columns_of: Mapping[str, np.ndarray],
     unit: np.ndarray,
     rows: float,
@@ -191,7 +211,7 @@ def believed(
             stated = np.asarray(term.prior_sd)
             sd[at] = np.where(np.isfinite(stated), stated / own, np.sqrt(rows))
         if term.kind == "value":
-            is_value[at] = True
+            sd[at], is_value[at] = trusts[term.key] / own, True
             low[at], high[at] = -prior.value_reach * sd[at], prior.value_reach * sd[at]
         for column, parameter in zip(at, term.linear, strict=False):  # the gain of a form has no parameter of its own
             length = max(unit[column], TINY)

@@ -1,9 +1,8 @@
 """Log posterior of a model: which effects are at work, their coefficients integrated out.
 
-    y = X_always a + Σ_j X_j β_j + Σ_e Σ_j η_je X_j^(e) β_j + ε,   η_je ~ N(0, σ²),   ε ~ N(0, φ)
+    y = X_always a + Σ_j X_j β_j + ε        ε the flight's leftover (`leftover`)
 
-Every contribution may be wrong by its own factor 1 + η in each environment e. With B = [X_j β_j] at the mode (two
-rounds) these factors are integrated out, so that all follows from the environments' Gram matrices.
+Coefficients are normal within their physical bounds, so a model's log posterior follows from the normal equations.
 """
 
 from __future__ import annotations
@@ -12,28 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotorid.mismatch.posterior.problem import TINY, Problem
+from rotorid.mismatch.posterior.problem import Problem
 from rotorid.mismatch.regression import limited_bias
 
 Model = tuple[str, ...]
 """Keys of the effects at work, sorted."""
-ROUNDS = 2
-"""Rounds in which the contributions' own errors follow the mode."""
 RIDGE = 1e-9
 """Ridge, in units of the diagonal, where the correction for noisy regressors is left out."""
-
-
-@dataclass(frozen=True)
-class Weighted:
-    """Sums over all environments, less what the contributions' own errors explain."""
-
-    gram: np.ndarray
-    """(K, K)."""
-    cross: np.ndarray
-    """(K,)."""
-    square: float
-    log_determinant: float
-    """Σ_e log |I + σ² M_e / φ|: the price of these errors, in nats times two."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +41,6 @@ class Scored:
     columns: np.ndarray
     """(k,) of the model."""
     mode: Mode | None
-    weighted: Weighted
 
 
 @dataclass
@@ -76,18 +59,13 @@ class Posterior:
 
 
 def scored(problem: Problem, model: Model) -> Scored:
-    """A model's log posterior, mode and weighted sums."""
+    """A model's log posterior and mode."""
     columns = problem.columns(model)
-    sums = weighted(problem, np.zeros((len(problem.unit), 0)))
-    mode = mode_of(problem, columns, sums)
-    for _ in range(ROUNDS):
-        if mode is not None:
-            sums = weighted(problem, contributions(problem, model, columns, mode.beta))
-            mode = mode_of(problem, columns, sums)
+    mode = mode_of(problem, columns, problem.believed(model))
     if mode is None:
-        return Scored(-np.inf, columns, None, sums)
-    value = mode.log_evidence - 0.5 * sums.square / problem.power - 0.5 * sums.log_determinant
-    return Scored(value + log_prior(problem, model) - too_small(problem, model, columns, mode), columns, mode, sums)
+        return Scored(-np.inf, columns, None)
+    value = mode.log_evidence + log_prior(problem, model) - too_small(problem, model, columns, mode)
+    return Scored(value, columns, mode)
 
 
 def log_prior(problem: Problem, model: Model) -> float:
@@ -101,70 +79,42 @@ def places(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.array([at[c] for c in wanted], int)
 
 
-def contributions(problem: Problem, model: Model, columns: np.ndarray, beta: np.ndarray) -> np.ndarray:
-    """Coefficients of all columns (K, effects), one column for what each effect of a model contributes."""
-    out = np.zeros((len(problem.unit), len(model)))
-    for j, key in enumerate(model):
-        own = problem.columns_of[key]
-        out[own, j] = beta[places(columns, own)]
-    return out
-
-
-def weighted(problem: Problem, parts: np.ndarray) -> Weighted:
-    """Sums of all columns where each contribution in `parts` (K, J) may be wrong by a factor in every environment.
-
-    With M_e = BᵀG_eB and R_e = φI + σ²M_e: G̃ = Σ_e (G_e − σ² G_eB R_e⁻¹ BᵀG_e), and so on.
-    """
-    error = problem.prior.form_error
-    whole = float(problem.square.sum())
-    if not parts.shape[1] or not error:
-        return Weighted(problem.total_gram, problem.total_cross, whole, 0.0)
-    pulls = problem.gram @ parts
-    own = np.einsum("kj,ekl->ejl", parts, pulls)
-    noise = problem.power * np.eye(parts.shape[1]) + error**2 * own
-    inverse = np.linalg.inv(noise) * error**2
-    explained = problem.cross @ parts
-    turned = pulls @ inverse
-    return Weighted(
-        problem.total_gram - np.tensordot(turned, pulls, axes=([0, 2], [0, 2])),
-        problem.total_cross - np.einsum("ekj,ej->k", turned, explained),
-        whole - float(np.einsum("ej,ejl,el->", explained, inverse, explained)),
-        float(np.linalg.slogdet(noise / problem.power)[1].sum()),
-    )
-
-
-def mode_of(problem: Problem, columns: np.ndarray, sums: Weighted, exact: bool = True) -> Mode | None:
+def mode_of(
+    problem: Problem,
+    columns: np.ndarray,
+    believed: tuple[np.ndarray, np.ndarray, np.ndarray],
+    exact: bool = True,
+) -> Mode | None:
     """The mode of some columns within their bounds; None where the normal equations have none.
 
-    `exact` limits the noise of the regressors in every direction of these columns, else column by column: faster, to
-    rank moves by.
+    `believed` are one-sigma and bounds of every column (`Problem.believed`). `exact` limits the noise of the regressors
+    in every direction of these columns, else column by column: faster, to rank moves by.
     """
-    power, grid = problem.power, np.ix_(columns, columns)
-    gram, sd = sums.gram[grid], problem.prior_sd[columns]
-    # What a contribution's own error takes of a column it takes of its noise, too.
-    kept = np.clip(np.diag(gram) / np.maximum(np.diag(problem.total_gram)[columns], TINY), 0.0, 1.0)
-    bias = limited_bias(problem.total_gram[grid], problem.bias[grid]) if exact else problem.limited_bias[grid]
-    bias = bias * np.outer(np.sqrt(kept), np.sqrt(kept))
-    right = (sums.cross[columns] - problem.limited_bias_cross[columns] * kept) / power
-    found = factorised([gram - bias, gram + RIDGE * np.diag(np.diag(gram))], power, sd)
+    grid = np.ix_(columns, columns)
+    gram, (sd, low, high) = problem.gram[grid], (own[columns] for own in believed)
+    bias = limited_bias(gram, problem.bias[grid]) if exact else problem.limited_bias[grid]
+    right = problem.cross[columns] - problem.limited_bias_cross[columns]
+    found = factorised([gram - bias, gram + RIDGE * np.diag(np.diag(gram))], sd)
     if found is None:
         return None
     normal, triangle = found
     covariance = np.linalg.inv(normal * np.outer(sd, sd)) * np.outer(sd, sd)
-    beta = within_bounds(problem, columns, *with_apart(problem, columns, normal, right, sd), covariance)
+    beta = within_bounds(
+        *with_apart(problem, columns, normal, right, sd), low, high, sd, slack_of(problem, columns, covariance)
+    )
     if beta is None:
         return None
     value = right @ beta - 0.5 * beta @ normal @ beta - np.log(np.diag(triangle)).sum()
     return Mode(float(value), beta, covariance)
 
 
-def factorised(grams: list[np.ndarray], power: float, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def factorised(grams: list[np.ndarray], sd: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Normal matrix of the first Gram matrix that makes a positive one, and its triangle in units of the prior.
 
     The correction for noisy regressors may overshoot; the second is without it.
     """
     for gram in grams:
-        normal = gram / power + np.diag(1.0 / sd**2)
+        normal = gram + np.diag(1.0 / sd**2)
         try:
             return normal, np.linalg.cholesky(normal * np.outer(sd, sd))
         except np.linalg.LinAlgError:
@@ -181,21 +131,29 @@ def with_apart(
     if not len(at):
         return normal, right
     normal, right, own = normal.copy(), right.copy(), place[at]
-    normal[at] = problem.gram_apart[np.ix_(own, columns)] / problem.power
+    normal[at] = problem.gram_apart[np.ix_(own, columns)]
     normal[at, at] += 1.0 / sd[at] ** 2
-    right[at] = problem.cross_apart[own] / problem.power
+    right[at] = problem.cross_apart[own]
     return normal, right
 
 
+def slack_of(problem: Problem, columns: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """How far each coefficient may lie beyond its bounds (k,); a believed value not at all."""
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return np.where(problem.is_value[columns], 0.0, problem.prior.slack * errors)
+
+
 def within_bounds(
-    problem: Problem, columns: np.ndarray, normal: np.ndarray, right: np.ndarray, covariance: np.ndarray
+    normal: np.ndarray,
+    right: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    sd: np.ndarray,
+    slack: np.ndarray,
 ) -> np.ndarray | None:
     """Solution of normal equations within the bounds: the furthest out is held there, until none is out."""
-    low, high, sd = problem.low[columns], problem.high[columns], problem.prior_sd[columns]
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    slack = np.where(problem.is_value[columns], 0.0, problem.prior.slack * errors)
-    held, at = np.zeros(len(columns), bool), np.zeros(len(columns))
-    for _ in range(len(columns) + 1):
+    held, at = np.zeros(len(right), bool), np.zeros(len(right))
+    for _ in range(len(right) + 1):
         free, beta = ~held, at.copy()
         try:
             rest = right[free] - normal[np.ix_(free, held)] @ at[held]
@@ -214,7 +172,7 @@ def within_bounds(
 def too_small(problem: Problem, model: Model, columns: np.ndarray, mode: Mode) -> float:
     """Nats that forms cost which are negligible, or do not show what makes them that form."""
     prior, cost = problem.prior, 0.0
-    for key in model:
+    for key in (k for k in model if k in problem.effects):
         term, own = problem.terms[key], problem.columns_of[key]
         at, unit = places(columns, own), problem.unit[own]
         size = np.abs(mode.beta[at]) * unit
@@ -223,28 +181,3 @@ def too_small(problem: Problem, model: Model, columns: np.ndarray, mode: Mode) -
             cost += prior.small_nats
         cost += prior.small_nats * sum(size[i] <= prior.shown * error[i] for i in term.must_show)
     return cost
-
-
-def error_cost(problem: Problem, model: Model, columns: np.ndarray, beta: np.ndarray) -> float:
-    """About what the contributions' own errors cost, nats: each alone, to rank moves by."""
-    cost = 0.0
-    for key in model:
-        own = problem.columns_of[key]
-        part = beta[places(columns, own)]
-        energy = np.maximum((problem.gram[:, own[:, None], own] @ part) @ part, 0.0)
-        cost += 0.5 * float(np.log1p(problem.prior.form_error**2 * energy / problem.power).sum())
-    return cost
-
-
-def power_of_leftover(problem: Problem, model: Model) -> float:
-    """How many times more than white noise a model leaves: robust over model covariance of the environments' scores.
-
-    z_e = c_e − G_e β at the mode, less each environment's share of their sum: tr(G⁻¹ Σ z_e z_eᵀ)/k · E/(E − 1).
-    """
-    found = scored(problem, model)
-    columns = found.columns
-    left = problem.cross[:, columns] - problem.gram[:, columns[:, None], columns] @ found.mode.beta
-    left = left - left.sum(axis=0) * problem.share[:, None]
-    gram = problem.total_gram[np.ix_(columns, columns)] + 1e-6 * np.eye(len(columns))
-    ratio = np.einsum("ei,ei->", left, np.linalg.solve(gram, left.T).T) / len(columns)
-    return float(ratio / (1.0 - 1.0 / len(problem.square)))

@@ -1,6 +1,7 @@
 """The most probable model: one move at a time from a start, moves ranked at the present mode, the best scored exactly.
 
-Moves: an id more or less, another form of one; where none of these helps one id for another, or two for none.
+Moves: an id or a believed value that may be wrong more or less, another form of one; where none of these helps one
+for another, or two for none.
 """
 
 from __future__ import annotations
@@ -11,22 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.mismatch.posterior.evidence import Evidence
+from rotorid.mismatch.posterior.leftover import Spectrum, spectrum_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, problem_of
 from rotorid.mismatch.posterior.score import (
     Model,
     Posterior,
-    Scored,
-    error_cost,
     log_prior,
     mode_of,
-    power_of_leftover,
     scored,
 )
 
 MOST_SCORED = 8
 """Moves of a kind that are scored exactly."""
 MOST_MOVES = 60
+LEFTOVER_ROUNDS = 5
 LEAST_GAIN = 0.05
 """Nats by which a move must be better, so that the search ends."""
 WORST_RANKED = -5.0
@@ -47,17 +47,38 @@ class Found:
         return self.posterior.problem
 
 
-def decide(evidence: Evidence, prior: Prior) -> Found:
-    """The most probable model of a flight, the leftover's power taken from the flight itself.
+def decide(evidence: Evidence, prior: Prior, start: Iterable[str] = ()) -> Found:
+    """The most probable model of a flight with its leftover, which is learnt from the flight itself.
 
-    A first mode is found under a high power, from nothing and from what the engine selected; what it leaves says how
-    far the leftover is from white noise. Under that power the search goes on from this mode, and from the engine's.
+    The search starts from nothing and from the effects of `start`. What its best model leaves says how large the
+    leftover is, and with that the search goes on, until the leftover stays as it is. That is done twice, from no
+    leftover and from all being leftover, and the more probable end is taken.
     """
-    first = problem_of(evidence, prior.first_power, prior)
-    engine = tuple(sorted(key for key in evidence.active if key in first.effects))
-    mode = most_probable(first, [(), engine]).model
-    power = np.clip(power_of_leftover(first.with_power(prior.judged_power), mode), *prior.powers)
-    return most_probable(first.with_power(float(power)), [mode, engine])
+    spectrum, known = spectrum_of(evidence), tuple(sorted(start))
+    all_of_it = spectrum.variance_of_leftover(np.zeros(len(spectrum.unit)))
+    small, large = (settled(evidence, spectrum, prior, v, known) for v in (np.zeros(len(all_of_it)), all_of_it))
+    gain = joint(spectrum, small) - joint(spectrum, large)
+    return small if gain > prior.leftover_nats else large
+
+
+def joint(spectrum: Spectrum, found: Found) -> float:
+    """Log posterior of a model and its leftover together, nats, less a constant."""
+    return found.log_posterior + spectrum.evidence_of(found.problem.variance)
+
+
+def settled(evidence: Evidence, spectrum: Spectrum, prior: Prior, variance: np.ndarray, known: Model) -> Found:
+    """The most probable model and its leftover, from a `variance` (C,) of the leftover and the effects `known`."""
+    starts: dict[Model, None] = dict.fromkeys([(), known])
+    for _ in range(LEFTOVER_ROUNDS):
+        found = most_probable(problem_of(evidence, spectrum, variance, prior), starts)
+        at = scored(found.problem, found.model)
+        beta = np.zeros(len(spectrum.unit))
+        beta[at.columns] = at.mode.beta
+        before, variance = variance, spectrum.variance_of_leftover(beta)
+        starts = dict.fromkeys([found.model, *starts])
+        if np.array_equal(before, variance):
+            break
+    return found
 
 
 def most_probable(problem: Problem, starts: Iterable[Model]) -> Found:
@@ -72,36 +93,25 @@ def climbed(posterior: Posterior, start: Model) -> Model:
     """The model in which a search ends that starts from another; from nothing where that one has no mode."""
     model = tuple(sorted(start)) if np.isfinite(posterior(start)) else ()
     for _ in range(MOST_MOVES):
-        ranked = Ranking(posterior.problem, model)
-        better = best_of(posterior, ranked, single_moves(posterior.problem, model))
-        better = better or best_of(posterior, ranked, exchanges(posterior.problem, model))
+        better = best_of(posterior, model, single_moves(posterior.problem, model))
+        better = better or best_of(posterior, model, exchanges(posterior.problem, model))
         if better is None:
             break
         model = better
     return model
 
 
-class Ranking:
-    """About how much better than a model others are, with the contributions' errors as they are at its mode."""
-
-    def __init__(self, problem: Problem, model: Model) -> None:
-        self.problem = problem
-        self.at: Scored = scored(problem, model)
-        self.here = self.value(model)
-
-    def value(self, model: Model) -> float:
-        """About a model's log posterior, nats, less a constant; −∞ where it has no mode."""
-        columns = self.problem.columns(model)
-        mode = mode_of(self.problem, columns, self.at.weighted, exact=False)
-        if mode is None:
-            return -np.inf
-        return mode.log_evidence + log_prior(self.problem, model) - error_cost(self.problem, model, columns, mode.beta)
+def ranked(problem: Problem, model: Model) -> float:
+    """About a model's log posterior, nats, less a constant; −∞ where it has no mode."""
+    mode = mode_of(problem, problem.columns(model), problem.believed(model), exact=False)
+    return -np.inf if mode is None else mode.log_evidence + log_prior(problem, model)
 
 
-def best_of(posterior: Posterior, ranking: Ranking, moves: Sequence[Model]) -> Model | None:
+def best_of(posterior: Posterior, model: Model, moves: Sequence[Model]) -> Model | None:
     """The best of the most promising moves; None where none is better than the present model."""
-    gains = [ranking.value(move) - ranking.here for move in moves]
-    best, found = ranking.at.log_posterior, None
+    here = ranked(posterior.problem, model)
+    gains = [ranked(posterior.problem, move) - here for move in moves]
+    best, found = posterior(model), None
     for k in sorted(range(len(moves)), key=lambda k: (gains[k], k), reverse=True)[:MOST_SCORED]:
         if gains[k] < WORST_RANKED:
             break
@@ -112,9 +122,10 @@ def best_of(posterior: Posterior, ranking: Ranking, moves: Sequence[Model]) -> M
 
 def single_moves(problem: Problem, model: Model) -> list[Model]:
     """Models with one id more or less, or with another form of one."""
-    of_id = {problem.effects[key]: key for key in model}
+    choices = problem.choices
+    of_id = {choices[key]: key for key in model}
     out = []
-    for key, once in problem.effects.items():
+    for key, once in choices.items():
         if key not in model:
             out.append(tuple(sorted({*model, key} - {of_id.get(once)})))
     return out + [without(model, key) for key in model]
@@ -122,8 +133,9 @@ def single_moves(problem: Problem, model: Model) -> list[Model]:
 
 def exchanges(problem: Problem, model: Model) -> list[Model]:
     """Models with one id in another's place, or with two less."""
-    taken = {problem.effects[key] for key in model}
-    others = [key for key, once in problem.effects.items() if once not in taken]
+    choices = problem.choices
+    taken = {choices[key] for key in model}
+    others = [key for key, once in choices.items() if once not in taken]
     out = [tuple(sorted((*without(model, gone), key))) for gone in model for key in others]
     return out + [without(model, a, b) for i, a in enumerate(model) for b in model[i + 1 :]]
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.mismatch.findings import Estimate, Status
+from rotorid.mismatch.findings import CLAIMED, Estimate, Status
 from rotorid.mismatch.posterior.score import Model, Scored, places, scored
-from rotorid.mismatch.posterior.search import Found, Ranking, without
+from rotorid.mismatch.posterior.search import Found, ranked, without
 from rotorid.mismatch.unknowns import UNKNOWNS
 
 Z95 = 1.959963984540054
@@ -18,16 +19,22 @@ MOST_SUBSTITUTES = 6
 """Ids that are tried exactly in another's place, the most promising first."""
 WORST_SUBSTITUTE = -8.0
 """Nats, as ranked, from which one is not tried."""
+SURE, LIKELY, POSSIBLE = 0.99, 0.5, 0.05
+"""Probabilities from which an id (a class) is established (ambiguous), suggested, or looked at and not established."""
+MOST_MEMBERS = 4
+"""Ids of a class at most: more say no more than that something is off."""
 
 
 @dataclass(frozen=True)
 class Statement:
-    """What is said of one id of the most probable model."""
+    """What is said of one effect of the most probable model."""
 
+    key: str
+    """Key of its term."""
     id: str
     status: Status
     alternatives: tuple[str, ...]
-    """For `ambiguous`: the whole class, itself included; ids that do nearly as well in its place."""
+    """For `ambiguous`: the whole class, itself included; the fewest ids of which one is surely at work."""
     probability: float
     """Share of the models with at least one of the class at work, among all that were visited."""
     odds: float
@@ -37,30 +44,77 @@ class Statement:
     window: tuple[str, float, float] | None
     """(run, start_s, stop_s) of one in part of a run."""
 
+    @property
+    def objection(self) -> str:
+        """Why it is not established or one of a class; empty where it is."""
+        if self.status in CLAIMED:
+            return ""
+        if self.probability >= SURE:
+            return "it is too small to matter"
+        return f"its probability is {100 * self.probability:.0f} %"
+
 
 def statements_of(found: Found) -> tuple[Statement, ...]:
-    """A statement for each named id of the most probable model, the surest first."""
-    at, ranking = scored(found.problem, found.model), Ranking(found.problem, found.model)
-    named = [key for key in found.model if found.problem.terms[key].effect not in UNKNOWNS]
+    """A statement for each named effect of the most probable model, the surest first."""
+    at = scored(found.problem, found.model)
+    named = [key for key in found.model if found.problem.terms[key].effect not in {"", *UNKNOWNS}]
     # Everything is visited before shares are taken over what was visited.
-    seen = [(key, substitutes(found, ranking, key), odds_of(found, key)) for key in named]
-    return tuple(statement(found, at, *facts) for facts in sorted(seen, key=lambda facts: -facts[2]))
+    seen = [(key, substitutes(found, key), odds_of(found, key)) for key in named]
+    weights = weights_of(found)
+    stated = [statement(found, at, weights, key, others, odds) for key, others, odds in seen]
+    return tuple(sorted(stated, key=lambda s: -s.odds))
 
 
-def statement(found: Found, at: Scored, key: str, others: tuple[str, ...], odds: float) -> Statement:
-    """What is said of one term of the most probable model, given the ids that could stand in its place."""
-    prior, term = found.problem.prior, found.problem.terms[key]
-    said = odds > prior.said_nats and own_share(found, at, key) > prior.said_share
-    members = {term.effect, *others}
+def statement(
+    found: Found, at: Scored, weights: Mapping[Model, float], key: str, others: Sequence[str], odds: float
+) -> Statement:
+    """What is said of one effect of the most probable model, given the ids that could stand in its place."""
+    effect = found.problem.terms[key].effect
+    members = smallest_class(found, weights, effect, others)
+    alone, joint = (share_of(found, weights, own) for own in ({effect}, members))
+    if size_of(found, at, key) <= found.problem.prior.least_size:
+        status: Status = "not_established"  # sure or not, it is too small to matter
+    elif joint >= SURE:
+        status = "established" if len(members) == 1 else "ambiguous"
+    else:
+        status = "suggested" if alone >= LIKELY else "not_established"
     return Statement(
-        id=term.effect,
-        status=("ambiguous" if others else "established") if said else "suggested",
-        alternatives=tuple(sorted(members)) if said and others else (),
-        probability=share_of(found, members if said else {term.effect}),
+        key=key,
+        id=effect,
+        status=status,
+        alternatives=tuple(sorted(members)) if status == "ambiguous" else (),
+        probability=joint if status == "ambiguous" else alone,
         odds=odds,
         parameters=parameters(found, at, key),
-        window=term.window,
+        window=found.problem.terms[key].window,
     )
+
+
+def smallest_class(found: Found, weights: Mapping[Model, float], effect: str, others: Sequence[str]) -> set[str]:
+    """The fewest ids, an effect and some of `others`, of which one is surely at work; as sure as it gets."""
+    members, left = {effect}, set(others) - {effect}
+    while left and share_of(found, weights, members) < SURE and len(members) < MOST_MEMBERS:
+        best = max(sorted(left), key=lambda other: share_of(found, weights, {*members, other}))
+        members.add(best)
+        left.remove(best)
+    return members
+
+
+def weights_of(found: Found) -> dict[Model, float]:
+    """Probability of every visited model that is near the best."""
+    near = {m: v for m, v in found.posterior.visited.items() if v > found.log_posterior - CONSIDERED}
+    weight = {m: float(np.exp(v - found.log_posterior)) for m, v in near.items()}
+    total = sum(weight.values())
+    return {m: w / total for m, w in weight.items()}
+
+
+def by_id(found: Found) -> dict[str, float]:
+    """Probability of every id in some visited model."""
+    out: dict[str, float] = {}
+    for model, weight in weights_of(found).items():
+        for effect in {found.problem.terms[key].effect for key in model if key in found.problem.effects}:
+            out[effect] = out.get(effect, 0.0) + weight
+    return out
 
 
 def odds_of(found: Found, key: str) -> float:
@@ -68,12 +122,13 @@ def odds_of(found: Found, key: str) -> float:
     return found.log_posterior - found.posterior(without(found.model, key))
 
 
-def substitutes(found: Found, ranking: Ranking, key: str) -> tuple[str, ...]:
+def substitutes(found: Found, key: str) -> tuple[str, ...]:
     """Named ids with which in a term's place the model is nearly as probable."""
     problem, rest = found.problem, without(found.model, key)
-    taken = {problem.effects[k] for k in found.model}
+    taken = {problem.choices[k] for k in found.model}
     trials = [tuple(sorted((*rest, k))) for k, once in problem.effects.items() if once not in taken]
-    gains = {trial: ranking.value(trial) - ranking.here for trial in trials}
+    here = ranked(problem, found.model)
+    gains = {trial: ranked(problem, trial) - here for trial in trials}
     out = []
     for trial in sorted(trials, key=lambda t: -gains[t])[:MOST_SUBSTITUTES]:
         if gains[trial] <= WORST_SUBSTITUTE:
@@ -84,11 +139,9 @@ def substitutes(found: Found, ranking: Ranking, key: str) -> tuple[str, ...]:
     return tuple(sorted(set(out) - set(UNKNOWNS)))
 
 
-def share_of(found: Found, members: set[str]) -> float:
-    """Share of the visited models, by their posterior, that hold at least one of some ids."""
-    near = {m: v for m, v in found.posterior.visited.items() if v > found.log_posterior - CONSIDERED}
-    weight = {m: float(np.exp(v - found.log_posterior)) for m, v in near.items()}
-    return sum(w for m, w in weight.items() if holds(found, m, members)) / sum(weight.values())
+def share_of(found: Found, weights: Mapping[Model, float], members: set[str]) -> float:
+    """Probability that at least one of some ids is at work."""
+    return sum(w for m, w in weights.items() if holds(found, m, members))
 
 
 def holds(found: Found, model: Model, members: set[str]) -> bool:
@@ -96,11 +149,12 @@ def holds(found: Found, model: Model, members: set[str]) -> bool:
     return any(found.problem.terms[key].effect in members for key in model)
 
 
-def own_share(found: Found, at: Scored, key: str) -> float:
-    """Share of the leftover's squares that a term explains which the rest of the model could not take over."""
-    where = places(at.columns, found.problem.columns_of[key])
-    beta, covariance = at.mode.beta[where], at.mode.covariance[np.ix_(where, where)]
-    return float(beta @ np.linalg.solve(covariance, beta)) * found.problem.power / found.problem.rows
+def size_of(found: Found, at: Scored, key: str) -> float:
+    """Squares of what an effect contributes over those of the noise, in the channel where it does most."""
+    own = found.problem.columns_of[key]
+    beta = at.mode.beta[places(at.columns, own)]
+    squares = np.einsum("i,cij,j->c", beta, found.problem.channel_gram[:, own[:, None], own], beta)
+    return float(squares.max()) * len(squares) / found.problem.rows
 
 
 def parameters(found: Found, at: Scored, key: str) -> tuple[Estimate, ...]:

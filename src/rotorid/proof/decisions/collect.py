@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rotorid.mismatch.choosing import Choosing, chosen_by
 from rotorid.mismatch.decided import Decided
 from rotorid.mismatch.deliver import analysis_of, verdict_of
 from rotorid.mismatch.findings import Finding
@@ -41,6 +42,7 @@ def collect(
     make: Make,
     source_of: Callable[[Item], str],
     engine: str,
+    how: Choosing,
     progress: Callable[[str], None],
 ) -> list[str]:
     """Keep the evidence of every item in `folder`; names of the files of all of them, made now or before.
@@ -57,6 +59,8 @@ def collect(
         Hash of what a set is made from: another hash is another set.
     engine
         Hash of the code that judges.
+    how
+        Who chooses the effects while it judges: another one's evidence is other evidence, and `engine` says so.
     progress
         Told one line a set judged.
     """
@@ -74,7 +78,8 @@ def collect(
             progress(f"{name}: could not be made")
             continue
         start = time.perf_counter()
-        verdict, decided = judged(made.recordings)
+        with chosen_by(how):
+            verdict, decided = judged(made.recordings)
         kept = Kept(
             label=item.label,
             key=key,

@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
-from rotorid.mismatch.regression import Apart
 from rotorid.proof.decisions.label import Label
 from rotorid.writing import all_or_none
 
 SEALED = "sealed"
 SYMMETRIC = "gram"
 """The one array of which a half is kept: the products are symmetric."""
-ARRAYS = ("cross", "square", "run", "training", "precision", "bias_gram", "bias_cross", "limit")
+ARRAYS = ("channels", "cross", "square", "blocks", "bias_gram", "bias_cross", "apart_columns", "apart_channels")
 
 
 @dataclass(frozen=True)
@@ -122,8 +121,6 @@ def described(evidence: Evidence) -> dict[str, Any]:
     return {
         "terms": [asdict(t) for t in evidence.terms],
         "start": dict(evidence.start),
-        "block_s": evidence.block_s,
-        "apart": evidence.apart is not None,
         "active": list(evidence.active),
         "trail": list(evidence.trail),
         "not_established": dict(evidence.not_established),
@@ -132,33 +129,24 @@ def described(evidence: Evidence) -> dict[str, Any]:
 
 
 def arrays_of(evidence: Evidence) -> dict[str, np.ndarray]:
-    """The arrays of an evidence; of the symmetric products the upper half, blocks last (zeros compress together)."""
-    upper = np.triu_indices(evidence.gram.shape[1])
-    out = {SYMMETRIC: evidence.gram[:, upper[0], upper[1]].T, **{name: getattr(evidence, name) for name in ARRAYS}}
-    if evidence.apart is not None:
-        parts = ("columns", "gram", "cross", "bias_gram", "bias_cross")
-        out |= {f"apart_{name}": getattr(evidence.apart, name) for name in parts}
-    return out
+    """The arrays of an evidence; of the symmetric products the upper half, environments last (zeros compress)."""
+    upper = np.triu_indices(evidence.gram.shape[-1])
+    half = np.moveaxis(evidence.gram[:, :, upper[0], upper[1]], 1, 2)
+    return {SYMMETRIC: half, **{name: getattr(evidence, name) for name in ARRAYS}}
 
 
 def evidence_from(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Evidence:
     """The evidence of what `described` and `arrays_of` keep."""
-    size, half = len(arrays["precision"]), arrays[SYMMETRIC]
+    size, half = arrays["cross"].shape[-1], np.moveaxis(arrays[SYMMETRIC], 2, 1)
     upper = np.triu_indices(size)
-    gram = np.zeros((half.shape[1], size, size))
-    gram[:, upper[0], upper[1]] = half.T
-    gram[:, upper[1], upper[0]] = half.T
-    apart = None
-    if facts["apart"]:
-        parts = ("columns", "gram", "cross", "bias_gram", "bias_cross")
-        apart = Apart(**{name: arrays[f"apart_{name}"] for name in parts})
+    gram = np.zeros((*half.shape[:2], size, size))
+    gram[..., upper[0], upper[1]] = half
+    gram[..., upper[1], upper[0]] = half
     return Evidence(
         terms=tuple(_term(t) for t in facts["terms"]),
         start=facts["start"],
         gram=gram,
         **{name: arrays[name] for name in ARRAYS},
-        block_s=facts["block_s"],
-        apart=apart,
         active=tuple(facts["active"]),
         trail=tuple(facts["trail"]),
         not_established=facts["not_established"],
