@@ -1,8 +1,8 @@
 """The numbers of the decision, each with its unit and its reason.
 
-Cost of an id, leftover and least size were chosen on the bench for decisions (`snakemake decisions`) among a few, by what
-is new and lost in planted flights and wrong in drawn ones; the others are those of a first sketch. How many of the
-statements hold that they make is the bench's to measure: docs/proof/decisions.md.
+Cost of an id, leftover and least size were chosen among a few on the bench for decisions (`snakemake decisions`), by
+what is new and lost in planted flights and wrong in drawn ones; the others are those of a first sketch. How many of the
+statements hold that they make is for the bench to measure (docs/proof/README.md).
 """
 
 from __future__ import annotations

@@ -52,9 +52,10 @@ def decide(evidence: Evidence, prior: Prior, start: Iterable[str] = ()) -> Found
 
     The search starts from nothing and from the effects of `start`. What its best model leaves says how large the
     leftover is, and with that the search goes on, until the leftover stays as it is. That is done twice, from no
-    leftover and from all being leftover, and the more probable end is taken.
+    leftover and from all being leftover; where both ends are about as probable the larger leftover is believed.
     """
-    spectrum, known = spectrum_of(evidence), tuple(sorted(start))
+    there = {term.key for term in evidence.terms if term.kind == "effect"}
+    spectrum, known = spectrum_of(evidence), tuple(sorted(there & set(start)))
     all_of_it = spectrum.variance_of_leftover(np.zeros(len(spectrum.unit)))
     small, large = (settled(evidence, spectrum, prior, v, known) for v in (np.zeros(len(all_of_it)), all_of_it))
     gain = joint(spectrum, small) - joint(spectrum, large)

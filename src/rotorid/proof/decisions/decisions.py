@@ -43,7 +43,9 @@ def posterior(kept: Kept) -> Said:
     """Effects of force, moment and sensors by the posterior; the rest, and values, by the engine's selection."""
     if kept.evidence is None:
         return kept.verdict
-    stated = [as_effect(s, kept.selection["commanded"]) for s in statements_of(decide(kept.evidence, Prior()))]
+    found = statements_of(decide(kept.evidence, Prior(), kept.evidence.active))
+    # What is unlikely, or too small to matter, is not stated.
+    stated = [as_effect(s, kept.selection["commanded"]) for s in found if s.status != "not_established"]
     return said([*kept.selection["outside"], *stated], kept.selection["parameters"])
 
 
