@@ -93,7 +93,9 @@ def main(
         state["examples"][name] = {
             "verdict": verdict["verdict"].replace("_", " "),
             "sentence": verdict["sentence"],
-            "said_with_it": [*(doubt["sentence"] for doubt in verdict["doubts"]), *verdict["warnings"]],
+            # As on the page: what the verdict rests on and what is doubted come before it.
+            "said_before": [verdict["basis"]["sentence"], *(doubt["sentence"] for doubt in verdict["doubts"])],
+            "said_with_it": verdict["warnings"],
             "runs": len(recordings.runs),
             "seconds": float(sum(run.time_s[-1] - run.time_s[0] for run in recordings.runs)),
             "values": [
