@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from rotorid.mismatch.analyse import analyse, with_noise_held_out
+from rotorid.mismatch.choosing import KEPT, POSTERIOR, chosen_by
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.mismatch.deliver import verdict_of
 from rotorid.mismatch.evidence import evidence, ratio_of, weighed
@@ -59,8 +60,9 @@ def analysed(size_m_s2: float):
 
 def test_who_watches_is_told_what_the_fitted_runs_decide_and_nothing_of_the_others():
     told = []
-    for size in (0.0, 1.5):
-        analyse(disturbed(size), watch=told.append)
+    with chosen_by(KEPT):
+        for size in (0.0, 1.5):
+            analyse(disturbed(size), watch=told.append)
     plain, other = told
     assert "rotor_drag" in {f.id for f in plain.findings if f.status == "established"}
     assert "rotor_drag" not in {f.id for f in plain.outside}
@@ -68,6 +70,15 @@ def test_who_watches_is_told_what_the_fitted_runs_decide_and_nothing_of_the_othe
     a, b = evidence_of(plain.found), evidence_of(other.found)
     np.testing.assert_array_equal(a.gram, b.gram)
     assert a.active == b.active and any(key.startswith("rotor_drag/") for key in a.active)
+
+
+def test_the_posterior_in_the_place_of_the_search_finds_the_drag_and_says_how_sure_it_is():
+    told = []
+    with chosen_by(POSTERIOR):
+        analyse(disturbed(0.0), watch=told.append)
+    (drag,) = [f for f in told[0].findings if f.id == "rotor_drag"]
+    assert drag.status == "established" and drag.probability > 0.99
+    assert not [f.id for f in told[0].findings if f.status in ("established", "ambiguous") and f is not drag]
 
 
 def test_what_is_chosen_does_not_depend_on_the_runs_held_out():
