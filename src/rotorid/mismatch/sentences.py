@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from rotorid.mismatch.verdict import Channel, Location
 
 MOST_WORDS = 40
+NEARLY_ALL = 0.99
+"""Share that stays unexplained from which the causes named explain next to nothing."""
 MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
 WORTH_SAYING_P = 0.05
@@ -93,7 +95,7 @@ def headline(told: Told) -> str:
         texts = [capital(f"{where}; {_rest(told)}") for where in places]
         return next((text for text in texts if len(text.split()) <= MOST_WORDS), first_words(texts[-1]))
     better = _better_in_short(main, told.channels)
-    rest = "" if told.word == "explained" else f"; {100 * told.left:.0f} % stays unexplained"
+    rest = "" if told.word == "explained" else f"; {unexplained_words(told.left)}"
     still, short = _still_off(told, main), _still_off(told, main, metres=False)
     surely, where, in_metres, off, off_in_metres, plain = places
     for parts in (
@@ -111,6 +113,13 @@ def headline(told: Told) -> str:
         if len(text.split()) <= MOST_WORDS:
             return capital(text)
     return first_words(capital(f"{causes}{short or rest}."))
+
+
+def unexplained_words(share: float) -> str:
+    """What stays unexplained beside causes that were named, 0 to 1."""
+    if share >= NEARLY_ALL:
+        return f"that explains less than {100 * (1 - NEARLY_ALL):.0f} % of it"
+    return f"{100 * share:.0f} % stays unexplained"
 
 
 def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) -> Size | None:

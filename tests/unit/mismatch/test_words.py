@@ -3,7 +3,7 @@
 import pytest
 
 from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.sentences import _left_out
+from rotorid.mismatch.sentences import _left_out, unexplained_words
 from rotorid.mismatch.words import channel_words, listed, number, plus_minus, regime_words, sure
 
 
@@ -41,3 +41,11 @@ def test_a_fault_of_the_recording_was_not_left_out():
     said = "The rotor columns are in another order than vehicle.yaml: put in order."
     told = _left_out(Finding(id="rotor_order", status="established", sentence=said), None)
     assert told == f"Rotor columns in the wrong order: {said}"
+
+
+@pytest.mark.parametrize(
+    ("share", "words"), [(0.19, "19 % stays unexplained"), (0.996, "that explains less than 1 % of it")]
+)
+def test_of_causes_that_explain_next_to_nothing_it_is_said(share, words):
+    """`Ground effect was left out; 100 % stays unexplained` contradicts itself."""
+    assert unexplained_words(share) == words
