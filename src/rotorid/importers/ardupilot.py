@@ -2,10 +2,12 @@
 
 ArduPilot's frames are the contract's: body forward-right-down, world north-east-down. Read are `IMU` (or `ACC` and
 `GYR`), `XKQ`/`NKQ` or `ATT` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors' channels
-by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX`, `ESC` for rotor speeds, `BAT`, and a range
-finder that looks down. Attitude, velocity and position are the estimator's.
+by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX` (the throttle channel's where these are 0),
+`ESC` for rotor speeds, `BAT` (`CURR` where it is absent), and a range finder that looks down. Attitude, velocity and
+position are the estimator's.
 
-Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`.
+Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`,
+`MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from rotorid.recordings import columns as c
 from rotorid.wording import printable
 
 KINDS = (
-    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "RCOU", "ESC", "BAT", "BARO", "RFND", "EV", "PARM", "MSG",
+    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "RCOU", "ESC", "BAT", "CURR", "BARO", "RFND", "EV",
+    "PARM", "MSG",
 )  # fmt: skip
 MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
@@ -132,9 +135,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
     estimate = next((t for k in ("XKF1", "NKF1") if (t := _of_first(log.get(k), "C")) is not None), None)
     put(c.VELOCITY, estimate, ("VN", "VE", "VD"))
     put(c.POSITION, estimate, ("PN", "PE", "PD"))
-    battery = _of_first(log.get("BAT"))
-    put((c.BATTERY_VOLTAGE,), battery, ("Volt",))
-    put((c.BATTERY_CURRENT,), battery, ("Curr",))
+    parts += _battery(log, faults)
     below = log.get("RFND")
     if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
         put((c.HEIGHT,), below[(below["Stat"] == GOOD) & (below["Orient"] == DOWN)], ("Dist",))
@@ -166,14 +167,50 @@ def _throttles(log: Log, values: Mapping[str, float]):
         found = "no SERVOn_FUNCTION is a motor"
         faults.append(Fault("order", "throttle", found, "channels 1 to 4 taken for motors 1 to 4", 0))
     channels = tuple(by_motor[m] for m in sorted(by_motor))
-    low, high = (float(values.get(k, 0) or 0) for k in ("MOT_PWM_MIN", "MOT_PWM_MAX"))
-    if not 0 < low < high:
-        low, high = PULSE_US
-        found = "MOT_PWM_MIN and MOT_PWM_MAX are not stated"
-        faults.append(Fault("unit", "throttle", found, f"taken as {low:g} and {high:g} µs", len(outputs)))
+    low, high, more = _limits(values, len(outputs))
+    faults += more
     pulses = outputs[[f"C{n}" for n in channels]].to_numpy(float)
     throttle = np.where(pulses > 0, np.clip((pulses - low) / (high - low), 0, 1), np.nan)
     return (outputs[c.TIME].to_numpy(float), throttle), channels, faults
+
+
+def _limits(values: Mapping[str, float], pulses: int) -> tuple[float, float, list[Fault]]:
+    """Pulses (µs) of no and of full throttle, and a fault where the motors' own limits do not state them."""
+
+    def stated(low: str, high: str) -> bool:
+        return 0 < values.get(low, 0.0) < values.get(high, 0.0)
+
+    if stated("MOT_PWM_MIN", "MOT_PWM_MAX"):
+        return values["MOT_PWM_MIN"], values["MOT_PWM_MAX"], []
+    channel = int(values.get("RCMAP_THROTTLE", 3))
+    names = f"RC{channel}_MIN", f"RC{channel}_MAX"
+    found = "MOT_PWM_MIN and MOT_PWM_MAX are 0 or not stated"
+    if stated(*names):
+        low, high = (values[name] for name in names)
+        action = f"{' and '.join(names)} of the throttle channel hold, {low:g} and {high:g} µs"
+    else:
+        low, high = PULSE_US
+        action = f"taken as {low:g} and {high:g} µs"
+    return low, high, [Fault("unit", "throttle", found, action, pulses)]
+
+
+def _battery(log: Log, faults: list[Fault]) -> list[tuple]:
+    """Voltage (V) and current (A) of `BAT`, of `CURR` where there is none; what is 0 throughout is not measured.
+
+    `CURR` counts in hundredths where its format holds whole numbers (Copter 3.3 and before).
+    """
+    kind = "BAT" if log.get("BAT") is not None else "CURR"
+    table, parts = _of_first(log.get(kind)), []
+    for column, name in ((c.BATTERY_VOLTAGE, "Volt"), (c.BATTERY_CURRENT, "Curr")):
+        if table is None or name not in table:
+            continue
+        values = table[[name]].to_numpy()
+        values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
+        if (values == 0).all():
+            faults.append(Fault("stuck", column, f"{kind}.{name} is 0 throughout", "column left out", len(values)))
+            continue
+        parts.append(((column,), table[c.TIME].to_numpy(float), values))
+    return parts
 
 
 def _speeds(esc: pd.DataFrame | None, channels: tuple[int, ...], grid: np.ndarray, faults: list[Fault]) -> list[tuple]:

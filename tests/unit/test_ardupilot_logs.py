@@ -1,0 +1,101 @@
+"""ArduPilot logs of older firmware: tables made here, and two public logs compared with a plain reading of their
+messages."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.importers import ardupilot
+from rotorid.recordings import columns as c
+
+ROOT = Path(__file__).parents[2]
+_named = os.environ.get("ROTORID_PUBLIC_DATA")
+LOGS = ((ROOT / _named).resolve() if _named else ROOT / ".." / "shared" / "data") / "logs" / "ardupilot"
+THROTTLES = list(c.rotor_columns("throttle", 4))
+LIMITS = {"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0, "RC3_MIN": 1070.0, "RC3_MAX": 1989.0}
+
+
+def tables(values: dict[str, float], **more: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Messages of two seconds at 50 Hz, pulses of 1070 to 1989 µs, by kind."""
+    time_s = np.arange(100) / 50
+    still = {name: np.zeros(100) for name in ("GyrX", "GyrY", "GyrZ", "AccX", "AccY")}
+    pulses = {f"C{n}": np.linspace(1070, 1989, 100).round() for n in range(1, 5)}
+    log = {
+        "IMU": pd.DataFrame({c.TIME: time_s, **still, "AccZ": -9.81}),
+        "RCOU": pd.DataFrame({c.TIME: time_s, **pulses}),
+        "PARM": pd.DataFrame({"Name": list(values), "Value": list(values.values())}),
+    }
+    return log | {kind: table.assign(**{c.TIME: time_s}) for kind, table in more.items()}
+
+
+def public(name: str) -> Path:
+    pytest.importorskip("pymavlink")
+    if not (LOGS / name).is_file():
+        pytest.skip("the public logs are not on this machine")
+    return LOGS / name
+
+
+@pytest.mark.parametrize(
+    ("values", "channel"),
+    [
+        (LIMITS, "RC3"),
+        ({"RC3_MIN": 1070.0, "RC3_MAX": 1989.0}, "RC3"),
+        (LIMITS | {"RC3_MIN": 900.0, "RCMAP_THROTTLE": 2.0, "RC2_MIN": 1070.0, "RC2_MAX": 1989.0}, "RC2"),
+    ],
+)
+def test_limits_of_zero_are_those_of_the_throttle_channel(values: dict[str, float], channel: str) -> None:
+    table, faults, _ = ardupilot.convert(tables(values), "log")
+    assert table[THROTTLES].iloc[[0, -1]].to_numpy() == pytest.approx(np.repeat([[0.0], [1.0]], 4, axis=1))
+    (said,) = [f.sentence for f in faults if f.kind == "unit"]
+    assert f"{channel}_MIN and {channel}_MAX" in said and "1070 and 1989 µs" in said
+
+
+def test_limits_that_are_stated_nowhere_are_said_to_be_taken() -> None:
+    _, faults, _ = ardupilot.convert(tables({"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0}), "log")
+    assert any(f.kind == "unit" and "1000 and 2000 µs" in f.action for f in faults)
+
+
+@pytest.mark.parametrize(
+    ("volts", "amperes"), [(np.linspace(16.8, 15, 100), np.full(100, 12.5)), (np.arange(1680, 1580, -1), [1250] * 100)]
+)
+def test_curr_is_the_battery_where_there_is_no_bat(volts, amperes) -> None:
+    """Firmware up to 3.3 writes whole hundredths, later firmware volts and amperes."""
+    current = pd.DataFrame({"Volt": volts, "Curr": amperes})
+    table, _, _ = ardupilot.convert(tables(LIMITS, CURR=current), "log")
+    scale = 0.01 if np.asarray(volts).dtype.kind == "i" else 1.0
+    assert table[c.BATTERY_VOLTAGE].to_numpy() == pytest.approx(np.asarray(volts) * scale)
+    assert table[c.BATTERY_CURRENT].to_numpy() == pytest.approx(12.5)
+    of_bat = pd.DataFrame({"Volt": np.full(100, 11.1), "Curr": np.full(100, 3.0)})
+    table, _, _ = ardupilot.convert(tables(LIMITS, CURR=current, BAT=of_bat), "log")
+    assert table[c.BATTERY_VOLTAGE].to_numpy() == pytest.approx(11.1)
+
+
+def test_a_battery_of_zero_throughout_is_not_measured() -> None:
+    table, faults, _ = ardupilot.convert(tables(LIMITS, CURR=pd.DataFrame({"Volt": [0] * 100, "Curr": 0})), "log")
+    assert not {c.BATTERY_VOLTAGE, c.BATTERY_CURRENT} & set(table)
+    assert [f.column for f in faults if f.kind == "stuck"] == [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]
+
+
+def plain(path: Path, *kinds: str) -> dict[str, pd.DataFrame]:
+    """Rows of a log by pymavlink alone."""
+    from pymavlink import mavutil
+
+    log, rows = mavutil.mavlink_connection(str(path)), {kind: [] for kind in kinds}
+    while (message := log.recv_match(type=list(kinds))) is not None:
+        rows[message.get_type()].append(message.to_dict())
+    return {kind: pd.DataFrame(found) for kind, found in rows.items()}
+
+
+def test_copter_3_4_has_the_battery_and_the_limits_of_its_throttle_channel() -> None:
+    path = public("copter-3.4_22.BIN")
+    table, _, _ = ardupilot.convert(ardupilot.read_messages(path), path)
+    own = plain(path, "CURR", "RCOU")
+    assert table[c.BATTERY_VOLTAGE].dropna().median() == pytest.approx(own["CURR"]["Volt"].median(), abs=1e-3)
+    expected = (own["RCOU"][["C1", "C2", "C3", "C4"]].to_numpy(float) - 1070) / (1989 - 1070)
+    found = table[THROTTLES].dropna().to_numpy()
+    assert len(found) > 0.99 * len(expected)
+    assert found.mean(axis=0) == pytest.approx(expected.mean(axis=0), abs=2e-3)
+    assert c.BATTERY_CURRENT not in table
