@@ -99,3 +99,43 @@ def test_copter_3_4_has_the_battery_and_the_limits_of_its_throttle_channel() -> 
     assert len(found) > 0.99 * len(expected)
     assert found.mean(axis=0) == pytest.approx(expected.mean(axis=0), abs=2e-3)
     assert c.BATTERY_CURRENT not in table
+
+
+def test_copter_3_3_is_read_by_its_clock_in_milliseconds() -> None:
+    path = public("copter-3.3-dev_31.BIN")
+    log = ardupilot.read_messages(path)
+    own = plain(path, "IMU", "RCOU", "ATT")
+    assert len(log["IMU"]) == len(own["IMU"]) == 21322
+    assert log["IMU"][c.TIME].to_numpy() == pytest.approx(own["IMU"]["TimeMS"].to_numpy() * 1e-3)
+    runs, faults, order = ardupilot.read_ardupilot(path)
+    assert order == "ardupilot"
+    start = own["IMU"]["TimeMS"].iloc[0] * 1e-3
+    assert any("EKF1" in f.found and "AHRS_EKF_USE" in f.found for f in faults)
+    for run in runs.values():
+        assert {*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE, *c.QUATERNION, *THROTTLES} <= set(run)
+        assert not {*c.VELOCITY, *c.POSITION, c.BATTERY_VOLTAGE} & set(run)
+    # the longest run against the same seconds of the plain reading
+    cut = next(f for f in faults if f.kind == "cut" and f.run == max(runs, key=lambda name: len(runs[name])))
+    first, last = (float(part) for part in cut.action.removesuffix(" s kept").split(" to "))
+    imu = own["IMU"][(own["IMU"]["TimeMS"] * 1e-3 - start).between(first - 0.006, last + 0.006)]
+    run = runs[cut.run]
+    assert abs(len(run) - len(imu)) <= 2
+    assert run[list(c.SPECIFIC_FORCE)].mean().to_numpy() == pytest.approx(
+        imu[["AccX", "AccY", "AccZ"]].mean().to_numpy(), abs=0.01
+    )
+    outputs = own["RCOU"][(own["RCOU"]["TimeMS"] * 1e-3 - start).between(first, last)]
+    expected = (outputs[["Ch1", "Ch2", "Ch3", "Ch4"]].mean().to_numpy() - 991) / (2016 - 991)
+    assert run[THROTTLES].mean().to_numpy() == pytest.approx(expected, abs=2e-3)
+
+
+@pytest.mark.parametrize(("used", "read"), [(1.0, True), (0.0, False)])
+def test_the_first_ekf_is_read_where_it_flew_the_vehicle(used: float, read: bool) -> None:
+    estimate = pd.DataFrame({name: np.linspace(0, 1, 100) for name in ("VN", "VE", "VD", "PN", "PE", "PD")})
+    table, faults, _ = ardupilot.convert(tables(LIMITS | {"AHRS_EKF_USE": used}, EKF1=estimate), "log")
+    assert (set(c.VELOCITY) <= set(table)) == read
+    assert any(f.kind == "estimate" for f in faults) != read
+
+
+@pytest.mark.parametrize(("form", "order"), [(1.0, "ardupilot"), (0.0, "")])
+def test_the_order_of_older_firmware_goes_by_frame(form: float, order: str) -> None:
+    assert ardupilot.order_of({"FRAME": form})[0] == order

@@ -4,7 +4,8 @@ ArduPilot's frames are the contract's: body forward-right-down, world north-east
 `GYR`), `XKQ`/`NKQ` or `ATT` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors' channels
 by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX` (the throttle channel's where these are 0),
 `ESC` for rotor speeds, `BAT` (`CURR` where it is absent), and a range finder that looks down. Attitude, velocity and
-position are the estimator's.
+position are the estimator's. Older firmware (3.3-dev) counts time in `TimeMS` and numbers outputs as `Ch1`. Its events
+have no clock and take the time of the message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
 Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`,
 `MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0.
@@ -28,8 +29,8 @@ from rotorid.recordings import columns as c
 from rotorid.wording import printable
 
 KINDS = (
-    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "RCOU", "ESC", "BAT", "CURR", "BARO", "RFND", "EV",
-    "PARM", "MSG",
+    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "ESC", "BAT", "CURR", "BARO", "RFND",
+    "EV", "PARM", "MSG",
 )  # fmt: skip
 MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
@@ -41,6 +42,8 @@ GOOD, DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
 PULSE_US = (1000.0, 2000.0)
 RPM = 2 * np.pi / 60
+CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
+"""Fields of a message's clock, to the seconds that they count in."""
 
 Log = Mapping[str, pd.DataFrame]
 
@@ -49,10 +52,15 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     """Tables of the messages that are needed by kind, with `time_s`; InputError where the file is no DataFlash log."""
     reader = needs("pymavlink.DFReader", "ardupilot", path)
     rows: dict[str, list[dict]] = {}
+    latest_s = 0.0
     try:
         log = reader.DFReader_binary(str(path), zero_time_base=True)
         while (message := log.recv_match(type=list(KINDS))) is not None:
-            rows.setdefault(message.get_type(), []).append(message.to_dict())
+            kind, row = message.get_type(), message.to_dict()
+            stamp = next((row[name] * unit for name, unit in CLOCKS.items() if name in row), None)
+            if stamp is not None or kind == "EV":
+                latest_s = row[c.TIME] = latest_s if stamp is None else float(stamp)
+            rows.setdefault(kind, []).append(row)
     except MemoryError:
         raise
     except Exception as error:  # pymavlink lets whatever a broken file raises through
@@ -62,10 +70,10 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     tables = {}
     for kind, found in rows.items():
         table = pd.DataFrame(found)
-        if "TimeUS" in table:
-            table[c.TIME] = table["TimeUS"].astype(float) * 1e-6
-        elif kind not in ("PARM", "MSG"):
+        if c.TIME not in table and kind not in ("PARM", "MSG"):
             continue  # damaged: a message without its clock has no place
+        if kind == "RCOU":
+            table = table.rename(columns={f"Ch{n}": f"C{n}" for n in range(1, 17)})
         tables[kind] = table
     return tables
 
@@ -81,7 +89,7 @@ def parameters(log: Log) -> dict[str, float]:
 
 def order_of(values: Mapping[str, float]) -> tuple[str, list[Fault]]:
     """Key of the rotors' order by frame class and type, empty where it is not known."""
-    kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", 1))
+    kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", values.get("FRAME", 1)))
     if kind == 1 and form in ORDER_OF_FRAME:
         return ORDER_OF_FRAME[form], []
     found = f"FRAME_CLASS {kind}, FRAME_TYPE {form}: the order of its rotors is not known here"
@@ -133,6 +141,10 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         angles = np.radians(attitude[["Roll", "Pitch", "Yaw"]].to_numpy(float))
         parts.append((c.QUATERNION, attitude[c.TIME].to_numpy(float), quaternion_from_euler_frd(*angles.T)))
     estimate = next((t for k in ("XKF1", "NKF1") if (t := _of_first(log.get(k), "C")) is not None), None)
+    if estimate is None and (estimate := log.get("EKF1")) is not None and parameters(log).get("AHRS_EKF_USE") != 1:
+        found = "EKF1 did not fly the vehicle (AHRS_EKF_USE is not 1)"
+        faults.append(Fault("estimate", "velocity, position", found, "columns left out", len(estimate)))
+        estimate = None
     put(c.VELOCITY, estimate, ("VN", "VE", "VD"))
     put(c.POSITION, estimate, ("PN", "PE", "PD"))
     parts += _battery(log, faults)
