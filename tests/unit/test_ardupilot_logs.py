@@ -139,3 +139,59 @@ def test_the_first_ekf_is_read_where_it_flew_the_vehicle(used: float, read: bool
 @pytest.mark.parametrize(("form", "order"), [(1.0, "ardupilot"), (0.0, "")])
 def test_the_order_of_older_firmware_goes_by_frame(form: float, order: str) -> None:
     assert ardupilot.order_of({"FRAME": form})[0] == order
+
+
+def trusted() -> tuple[dict[str, pd.DataFrame], np.ndarray]:
+    """A log whose event calls all but a second flight: idle and spool-up to 12 s, flight to 32 s, idle to 40 s.
+
+    From 20 to 22 s the throttle is shut and the vehicle falls. Returned with the rows in the air, (n,).
+    """
+    time_s = np.arange(2000) / 50
+    throttle = np.interp(time_s, [0, 2, 10, 12, 12.2, 20, 20.1, 22, 22.1, 32, 32.4, 40], [0, 0.2, 0.2, 0.3] + [0.5] * 8)
+    falls = (time_s > 20) & (time_s < 22)
+    throttle[falls], throttle[time_s > 32.2] = 0.1, 0.15
+    rng = np.random.default_rng(1)
+    noise = {name: rng.normal(0, 0.1, 2000) for name in ("GyrX", "GyrY", "GyrZ", "AccX", "AccY")}
+    pulses = {f"C{n}": 1070 + 919 * throttle for n in range(1, 5)}
+    log = tables(LIMITS)
+    log["IMU"] = pd.DataFrame({c.TIME: time_s, **noise, "AccZ": np.where(falls, -2.0, -9.81)})
+    log["RCOU"] = pd.DataFrame({c.TIME: time_s, **pulses}).iloc[::5]
+    log["EV"] = pd.DataFrame({c.TIME: [1.0, 39.5], "Id": [28, 18]})
+    return log, (time_s > 12) & (time_s < 32.2)
+
+
+def test_ground_is_no_flight_although_the_event_says_so() -> None:
+    log, air = trusted()
+    _, faults, flying = ardupilot.convert(log, "log")
+    assert (flying != air).sum() <= 50, "within a second in all"
+    assert not flying[:570].any() and flying[610:1600].all() and not flying[1650:].any()
+    (said,) = [f for f in faults if f.kind == "on_ground"]
+    assert said.samples == pytest.approx(1925 - air.sum(), abs=50)
+    assert "of 38 s that the log calls flight" in said.found
+
+
+def test_without_accelerometer_or_outputs_the_event_holds() -> None:
+    for kind in ("RCOU", "IMU"):
+        log, _ = trusted()
+        if kind == "IMU":
+            log["IMU"] = log["IMU"].drop(columns=["AccX", "AccY", "AccZ"])
+        else:
+            del log[kind]
+        _, faults, flying = ardupilot.convert(log, "log")
+        assert flying.sum() == 1925
+        assert not any(f.kind == "on_ground" for f in faults)
+
+
+def test_the_public_logs_keep_what_is_in_the_air() -> None:
+    """Rows that are kept have the throttle of flight; idle, spool-up and the wait after a crash are gone."""
+    kept = {}
+    for name in ("copter-3.4_22.BIN", "copter-3.3-dev_31.BIN"):
+        runs, faults, _ = ardupilot.read_ardupilot(public(name))
+        assert any(f.kind == "on_ground" for f in faults)
+        for run in runs.values():
+            mean = run[THROTTLES].mean(axis=1).dropna()
+            assert mean.quantile(0.05) > 0.7 * mean.median()
+        kept[name] = [run[c.TIME].iloc[-1] for run in runs.values()]
+    # by eye on throttle, specific force and height: 98 to 121, 134 to 191 and 202 to 220 s of the log
+    assert kept["copter-3.4_22.BIN"] == pytest.approx([22 - 1.5, 56 - 1.5, 17 - 1.5], abs=2)
+    assert sum(kept["copter-3.3-dev_31.BIN"]) == pytest.approx(132 + 64 + 33 + 11 + 83 + 24, abs=15)

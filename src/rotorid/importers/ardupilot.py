@@ -7,6 +7,9 @@ by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX` (the thr
 position are the estimator's. Older firmware (3.3-dev) counts time in `TimeMS` and numbers outputs as `Ch1`. Its events
 have no clock and take the time of the message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
+The land detector calls idle, spool-up and the wait after landing flight: what the throttle and the specific force show
+to be on the ground is left out (`in_the_air.off_the_ground`).
+
 Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`,
 `MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0.
 """
@@ -160,7 +163,12 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         parts += speeds
         drive = in_the_air.on_grid(grid, *throttles)
     table = in_the_air.table_on(grid, parts)
-    return table, [*faults, *report_gaps(table)], _flying(log, grid, drive)
+    flying = _flying(log, grid, drive)
+    if drive is not None and set(c.SPECIFIC_FORCE) <= set(table):
+        force, stated = table[list(c.SPECIFIC_FORCE)].to_numpy(float), flying
+        flying = in_the_air.off_the_ground(stated, drive, force, grid)
+        faults += _ground(stated, flying, grid)
+    return table, [*faults, *report_gaps(table)], flying
 
 
 def _throttles(log: Log, values: Mapping[str, float]):
@@ -250,6 +258,19 @@ def _flying(log: Log, grid: np.ndarray, drive: np.ndarray | None) -> np.ndarray:
             index = np.searchsorted(times, grid, side="right") - 1
             return np.where(index >= 0, ups[np.maximum(index, 0)], False)
     return np.ones(len(grid), bool) if drive is None else in_the_air.driven(drive)
+
+
+def _ground(stated: np.ndarray, flying: np.ndarray, grid: np.ndarray) -> list[Fault]:
+    """What is on the ground of the flight that a log states; masks and times (s) of rows (n,)."""
+    lost = int((stated & ~flying).sum())
+    if not lost:
+        return []
+    lasts = np.minimum(np.diff(grid, append=grid[-1]), in_the_air.LONGEST_PAUSE_S)  # the clock stops between flights
+    found = (
+        f"{lasts[stated & ~flying].sum():.0f} s of {lasts[stated].sum():.0f} s that the log calls flight are on the "
+        f"ground (throttle below {in_the_air.NEAR_WEIGHT:g} of that of flight, specific force of 1 g)"
+    )
+    return [Fault("on_ground", c.TIME, found, "left out", lost)]
 
 
 def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:
