@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from rotorid.importers import ardupilot
+from rotorid.importers.in_the_air import off_the_ground
 from rotorid.recordings import columns as c
 
 ROOT = Path(__file__).parents[2]
@@ -195,3 +196,16 @@ def test_the_public_logs_keep_what_is_in_the_air() -> None:
     # by eye on throttle, specific force and height: 98 to 121, 134 to 191 and 202 to 220 s of the log
     assert kept["copter-3.4_22.BIN"] == pytest.approx([22 - 1.5, 56 - 1.5, 17 - 1.5], abs=2)
     assert sum(kept["copter-3.3-dev_31.BIN"]) == pytest.approx(132 + 64 + 33 + 11 + 83 + 24, abs=15)
+
+
+@pytest.mark.parametrize(("amplitude", "period_s"), [(0.1, 3.0), (0.4, 2.0), (0.4, 6.0), (0.8, 8.0)])
+@pytest.mark.parametrize("exponent", [0.5, 1.0])
+def test_a_flight_of_climbs_and_falls_is_kept_whole(amplitude: float, period_s: float, exponent: float) -> None:
+    time_s = np.arange(3000) / 50
+    thrust = 1 + amplitude * np.sin(2 * np.pi * time_s / period_s)  # over the weight
+    throttle = np.tile(0.5 * thrust[:, None] ** exponent, (1, 4))
+    force = np.random.default_rng(0).normal(0, 0.3, (3000, 3))
+    force[:, 2] -= 9.81 * thrust
+    air = off_the_ground(np.ones(3000, bool), throttle, force, time_s)
+    inside = (time_s > period_s) & (time_s < time_s[-1] - period_s)  # a low throttle at either end is cut as spool-up
+    assert air[inside].all()

@@ -27,7 +27,7 @@ NEAR_WEIGHT = 0.85
 """Share of the throttle of flight below which the rotors do not carry the weight."""
 LIFTS = 0.95
 """Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
-FALLING = 0.8
+FALLING = 0.9
 """Share of the usual specific force below which a vehicle falls: on the ground it stays at 1 g."""
 SMOOTHED_S = 1.0
 
