@@ -209,3 +209,12 @@ def test_a_flight_of_climbs_and_falls_is_kept_whole(amplitude: float, period_s: 
     air = off_the_ground(np.ones(3000, bool), throttle, force, time_s)
     inside = (time_s > period_s) & (time_s < time_s[-1] - period_s)  # a low throttle at either end is cut as spool-up
     assert air[inside].all()
+
+
+def test_damaged_events_and_batteries_are_passed_over() -> None:
+    log, _ = trusted()
+    log["EV"] = log["EV"].rename(columns={"Id": "I|"})
+    log["CURR"] = pd.DataFrame({c.TIME: [1.0, 2.0], "Volt": ["a", "b"], "Curr": ["c", "d"]})
+    table, _, flying = ardupilot.convert(log, "log")
+    assert c.BATTERY_VOLTAGE not in table
+    assert flying[700:900].all()

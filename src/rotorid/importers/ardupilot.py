@@ -225,6 +225,8 @@ def _battery(log: Log, faults: list[Fault]) -> list[tuple]:
         if table is None or name not in table:
             continue
         values = table[[name]].to_numpy()
+        if values.dtype.kind not in "iuf":
+            continue  # damaged: no numbers
         values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
         if (values == 0).all():
             faults.append(Fault("stuck", column, f"{kind}.{name} is 0 throughout", "column left out", len(values)))
@@ -251,7 +253,7 @@ def _speeds(esc: pd.DataFrame | None, channels: tuple[int, ...], grid: np.ndarra
 def _flying(log: Log, grid: np.ndarray, drive: np.ndarray | None) -> np.ndarray:
     """Rows in the air: by the land detector's events, else by the throttles."""
     events = log.get("EV")
-    if events is not None:
+    if events is not None and "Id" in events:
         events = events[events["Id"].isin((LANDED, FLYING))]
         if (events["Id"] == FLYING).any():
             times, ups = events[c.TIME].to_numpy(float), (events["Id"] == FLYING).to_numpy()
