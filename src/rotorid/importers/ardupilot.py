@@ -2,10 +2,16 @@
 
 ArduPilot's frames are the contract's: body forward-right-down, world north-east-down. Read are `IMU` (or `ACC` and
 `GYR`), `XKQ`/`NKQ` or `ATT` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors' channels
-by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX`, `ESC` for rotor speeds, `BAT`, and a range
-finder that looks down. Attitude, velocity and position are the estimator's.
+by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX` (the throttle channel's where these are 0),
+`ESC` for rotor speeds, `BAT` (`CURR` where it is absent), and a range finder that looks down. Attitude, velocity and
+position are the estimator's. Older firmware (3.3-dev) counts time in `TimeMS` and numbers outputs as `Ch1`. Its events
+have no clock and take the time of the message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
-Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`.
+The land detector calls idle, spool-up and the wait after landing flight: what the throttle and the specific force show
+to be on the ground is left out (`in_the_air.off_the_ground`).
+
+Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`,
+`MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0.
 """
 
 from __future__ import annotations
@@ -26,7 +32,8 @@ from rotorid.recordings import columns as c
 from rotorid.wording import printable
 
 KINDS = (
-    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "RCOU", "ESC", "BAT", "BARO", "RFND", "EV", "PARM", "MSG",
+    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "ESC", "BAT", "CURR", "BARO", "RFND",
+    "EV", "PARM", "MSG",
 )  # fmt: skip
 MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
@@ -38,6 +45,8 @@ GOOD, DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
 PULSE_US = (1000.0, 2000.0)
 RPM = 2 * np.pi / 60
+CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
+"""Fields of a message's clock, to the seconds that they count in."""
 
 Log = Mapping[str, pd.DataFrame]
 
@@ -46,10 +55,15 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     """Tables of the messages that are needed by kind, with `time_s`; InputError where the file is no DataFlash log."""
     reader = needs("pymavlink.DFReader", "ardupilot", path)
     rows: dict[str, list[dict]] = {}
+    latest_s = 0.0
     try:
         log = reader.DFReader_binary(str(path), zero_time_base=True)
         while (message := log.recv_match(type=list(KINDS))) is not None:
-            rows.setdefault(message.get_type(), []).append(message.to_dict())
+            kind, row = message.get_type(), message.to_dict()
+            stamp = next((row[name] * unit for name, unit in CLOCKS.items() if name in row), None)
+            if stamp is not None or kind == "EV":
+                latest_s = row[c.TIME] = latest_s if stamp is None else float(stamp)
+            rows.setdefault(kind, []).append(row)
     except MemoryError:
         raise
     except Exception as error:  # pymavlink lets whatever a broken file raises through
@@ -59,10 +73,10 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     tables = {}
     for kind, found in rows.items():
         table = pd.DataFrame(found)
-        if "TimeUS" in table:
-            table[c.TIME] = table["TimeUS"].astype(float) * 1e-6
-        elif kind not in ("PARM", "MSG"):
+        if c.TIME not in table and kind not in ("PARM", "MSG"):
             continue  # damaged: a message without its clock has no place
+        if kind == "RCOU":
+            table = table.rename(columns={f"Ch{n}": f"C{n}" for n in range(1, 17)})
         tables[kind] = table
     return tables
 
@@ -78,7 +92,7 @@ def parameters(log: Log) -> dict[str, float]:
 
 def order_of(values: Mapping[str, float]) -> tuple[str, list[Fault]]:
     """Key of the rotors' order by frame class and type, empty where it is not known."""
-    kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", 1))
+    kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", values.get("FRAME", 1)))
     if kind == 1 and form in ORDER_OF_FRAME:
         return ORDER_OF_FRAME[form], []
     found = f"FRAME_CLASS {kind}, FRAME_TYPE {form}: the order of its rotors is not known here"
@@ -130,11 +144,13 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         angles = np.radians(attitude[["Roll", "Pitch", "Yaw"]].to_numpy(float))
         parts.append((c.QUATERNION, attitude[c.TIME].to_numpy(float), quaternion_from_euler_frd(*angles.T)))
     estimate = next((t for k in ("XKF1", "NKF1") if (t := _of_first(log.get(k), "C")) is not None), None)
+    if estimate is None and (estimate := log.get("EKF1")) is not None and parameters(log).get("AHRS_EKF_USE") != 1:
+        found = "EKF1 did not fly the vehicle (AHRS_EKF_USE is not 1)"
+        faults.append(Fault("estimate", "velocity, position", found, "columns left out", len(estimate)))
+        estimate = None
     put(c.VELOCITY, estimate, ("VN", "VE", "VD"))
     put(c.POSITION, estimate, ("PN", "PE", "PD"))
-    battery = _of_first(log.get("BAT"))
-    put((c.BATTERY_VOLTAGE,), battery, ("Volt",))
-    put((c.BATTERY_CURRENT,), battery, ("Curr",))
+    parts += _battery(log, faults)
     below = log.get("RFND")
     if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
         put((c.HEIGHT,), below[(below["Stat"] == GOOD) & (below["Orient"] == DOWN)], ("Dist",))
@@ -147,7 +163,12 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         parts += speeds
         drive = in_the_air.on_grid(grid, *throttles)
     table = in_the_air.table_on(grid, parts)
-    return table, [*faults, *report_gaps(table)], _flying(log, grid, drive)
+    flying = _flying(log, grid, drive)
+    if drive is not None and set(c.SPECIFIC_FORCE) <= set(table):
+        force, stated = table[list(c.SPECIFIC_FORCE)].to_numpy(float), flying
+        flying = in_the_air.off_the_ground(stated, drive, force, grid)
+        faults += _ground(stated, flying, grid)
+    return table, [*faults, *report_gaps(table)], flying
 
 
 def _throttles(log: Log, values: Mapping[str, float]):
@@ -166,14 +187,52 @@ def _throttles(log: Log, values: Mapping[str, float]):
         found = "no SERVOn_FUNCTION is a motor"
         faults.append(Fault("order", "throttle", found, "channels 1 to 4 taken for motors 1 to 4", 0))
     channels = tuple(by_motor[m] for m in sorted(by_motor))
-    low, high = (float(values.get(k, 0) or 0) for k in ("MOT_PWM_MIN", "MOT_PWM_MAX"))
-    if not 0 < low < high:
-        low, high = PULSE_US
-        found = "MOT_PWM_MIN and MOT_PWM_MAX are not stated"
-        faults.append(Fault("unit", "throttle", found, f"taken as {low:g} and {high:g} µs", len(outputs)))
+    low, high, more = _limits(values, len(outputs))
+    faults += more
     pulses = outputs[[f"C{n}" for n in channels]].to_numpy(float)
     throttle = np.where(pulses > 0, np.clip((pulses - low) / (high - low), 0, 1), np.nan)
     return (outputs[c.TIME].to_numpy(float), throttle), channels, faults
+
+
+def _limits(values: Mapping[str, float], pulses: int) -> tuple[float, float, list[Fault]]:
+    """Pulses (µs) of no and of full throttle, and a fault where the motors' own limits do not state them."""
+
+    def stated(low: str, high: str) -> bool:
+        return 0 < values.get(low, 0.0) < values.get(high, 0.0)
+
+    if stated("MOT_PWM_MIN", "MOT_PWM_MAX"):
+        return values["MOT_PWM_MIN"], values["MOT_PWM_MAX"], []
+    channel = int(values.get("RCMAP_THROTTLE", 3))
+    names = f"RC{channel}_MIN", f"RC{channel}_MAX"
+    found = "MOT_PWM_MIN and MOT_PWM_MAX are 0 or not stated"
+    if stated(*names):
+        low, high = (values[name] for name in names)
+        action = f"{' and '.join(names)} of the throttle channel hold, {low:g} and {high:g} µs"
+    else:
+        low, high = PULSE_US
+        action = f"taken as {low:g} and {high:g} µs"
+    return low, high, [Fault("unit", "throttle", found, action, pulses)]
+
+
+def _battery(log: Log, faults: list[Fault]) -> list[tuple]:
+    """Voltage (V) and current (A) of `BAT`, of `CURR` where there is none; what is 0 throughout is not measured.
+
+    `CURR` counts in hundredths where its format holds whole numbers (Copter 3.3 and before).
+    """
+    kind = "BAT" if log.get("BAT") is not None else "CURR"
+    table, parts = _of_first(log.get(kind)), []
+    for column, name in ((c.BATTERY_VOLTAGE, "Volt"), (c.BATTERY_CURRENT, "Curr")):
+        if table is None or name not in table:
+            continue
+        values = table[[name]].to_numpy()
+        if values.dtype.kind not in "iuf":
+            continue  # damaged: no numbers
+        values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
+        if (values == 0).all():
+            faults.append(Fault("stuck", column, f"{kind}.{name} is 0 throughout", "column left out", len(values)))
+            continue
+        parts.append(((column,), table[c.TIME].to_numpy(float), values))
+    return parts
 
 
 def _speeds(esc: pd.DataFrame | None, channels: tuple[int, ...], grid: np.ndarray, faults: list[Fault]) -> list[tuple]:
@@ -194,13 +253,26 @@ def _speeds(esc: pd.DataFrame | None, channels: tuple[int, ...], grid: np.ndarra
 def _flying(log: Log, grid: np.ndarray, drive: np.ndarray | None) -> np.ndarray:
     """Rows in the air: by the land detector's events, else by the throttles."""
     events = log.get("EV")
-    if events is not None:
+    if events is not None and "Id" in events:
         events = events[events["Id"].isin((LANDED, FLYING))]
         if (events["Id"] == FLYING).any():
             times, ups = events[c.TIME].to_numpy(float), (events["Id"] == FLYING).to_numpy()
             index = np.searchsorted(times, grid, side="right") - 1
             return np.where(index >= 0, ups[np.maximum(index, 0)], False)
     return np.ones(len(grid), bool) if drive is None else in_the_air.driven(drive)
+
+
+def _ground(stated: np.ndarray, flying: np.ndarray, grid: np.ndarray) -> list[Fault]:
+    """What is on the ground of the flight that a log states; masks and times (s) of rows (n,)."""
+    lost = int((stated & ~flying).sum())
+    if not lost:
+        return []
+    lasts = np.minimum(np.diff(grid, append=grid[-1]), in_the_air.LONGEST_PAUSE_S)  # the clock stops between flights
+    found = (
+        f"{lasts[stated & ~flying].sum():.0f} s of {lasts[stated].sum():.0f} s that the log calls flight are on the "
+        f"ground (throttle below {in_the_air.NEAR_WEIGHT:g} of that of flight, specific force of 1 g)"
+    )
+    return [Fault("on_ground", c.TIME, found, "left out", lost)]
 
 
 def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:

@@ -23,6 +23,13 @@ LONGEST_PAUSE_S = 1.0
 """A dip of the throttle shorter than this does not end a flight."""
 DRIVEN = 0.05
 """Mean throttle below which nothing flies."""
+NEAR_WEIGHT = 0.85
+"""Share of the throttle of flight below which the rotors do not carry the weight."""
+LIFTS = 0.95
+"""Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
+FALLING = 0.9
+"""Share of the usual specific force below which a vehicle falls: on the ground it stays at 1 g."""
+SMOOTHED_S = 1.0
 
 
 def on_grid(grid_s: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -57,6 +64,48 @@ def driven(drive: np.ndarray) -> np.ndarray:
     mean = mean.interpolate(limit_direction="both").to_numpy()
     full = float(np.nanquantile(mean, 0.9)) if np.isfinite(mean).any() else 0.0
     return mean > 0.5 * full if full > DRIVEN else np.zeros(len(drive), bool)
+
+
+def off_the_ground(flying: np.ndarray, drive: np.ndarray, force: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+    """Rows of a mask (n,) of flight, as a log states it, in which thrust carries the vehicle or it falls.
+
+    On the ground the rotors turn below the throttle of flight while the specific force stays at 1 g. The throttle of
+    flight is the median of the rows above half of what is mostly given. A log of the ground alone shows no throttle of
+    flight and is not recognised.
+
+    Parameters
+    ----------
+    flying
+        What the log calls flight, (n,).
+    drive
+        Throttles (n, k), share of the range; NaN where there is no value.
+    force
+        Specific force (n, 3), m/s².
+    time_s
+        Clock of the rows (n,), s.
+    """
+    rows = max(int(SMOOTHED_S / max(float(np.median(np.diff(time_s))), 1e-4)), 1)
+
+    def smooth(values: np.ndarray) -> np.ndarray:
+        known = pd.Series(values).interpolate(limit_direction="both")
+        return known.rolling(rows, center=True, min_periods=1).median().to_numpy()
+
+    throttle = smooth(pd.DataFrame(drive).mean(axis=1).to_numpy())
+    pull = smooth(np.linalg.norm(force, axis=1))
+    given = throttle[flying & np.isfinite(throttle)]
+    full = float(np.quantile(given, 0.9)) if len(given) else 0.0
+    if full <= DRIVEN or not np.isfinite(pull).any():
+        return flying
+    of_flight = np.median(given[given > 0.5 * full])
+    carried = (throttle >= NEAR_WEIGHT * of_flight) | (pull < FALLING * np.nanmedian(pull[flying]))
+    carried = flying & without_pauses(carried, time_s)
+    lifts, out = throttle >= LIFTS * of_flight, np.zeros(len(flying), bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], carried.astype(int), [0]])))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        up = np.flatnonzero(lifts[start:stop])
+        if len(up):
+            out[start + up[0] : start + up[-1] + 1] = True
+    return out
 
 
 def without_pauses(up: np.ndarray, time_s: np.ndarray) -> np.ndarray:

@@ -41,6 +41,7 @@ FAULT_NAMES = {
     "no_command": "no command logged",
     "no_clock": "no clock",
     "second_sensor": "second sensor",
+    "estimate": "estimate that did not fly the vehicle",
 }
 HOW_TO_HAVE = {
     "folder": "ROTORID_PUBLIC_DATA names a folder and files are taken from there alone, so put the missing ones where "
