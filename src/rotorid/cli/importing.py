@@ -33,9 +33,12 @@ class Made:
 
 
 def import_logs(
-    logs: Annotated[list[Path], typer.Argument(help="Logs of one vehicle: PX4 .ulg, Crazyflie uSD, CSV, Parquet, …")],
+    logs: Annotated[list[Path], typer.Argument(help="Logs of one vehicle: PX4 .ulg, ROS bag (file or folder), CSV, …")],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder of the set; default: the first log's name.")
+        Path | None,
+        typer.Option(
+            "--out", "-o", help="Folder of the set; default: the first log's name (of a bag's folder NAME-set)."
+        ),
     ] = None,
     mass_kg: MassKg = None,
     like: Like = None,
@@ -61,7 +64,7 @@ def import_logs(
         if write_mapping is not None:
             _write_mapping(logs, write_mapping)
             return
-        made = make_set(logs, out or Path(_stem(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
+        made = make_set(logs, out or Path(set_name(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
         typer.echo(f"{made.folder}: {_runs(made.folder)}")
         tell(made)
         typer.echo(f"Next: look through {made.folder / 'vehicle.yaml'}, then `rotorid verdict {made.folder}`")
@@ -116,8 +119,11 @@ def tell(made: Made) -> None:
             typer.echo(f"  - {remark}")
 
 
-def _stem(path: Path) -> str:
-    return path.name.split(".")[0] or "flights"
+def set_name(log: Path) -> str:
+    """The name of a set after its first log: `flight` of flight.ulg, `flight-set` of the bag in the folder flight."""
+    if log.is_dir():
+        return f"{log.resolve().name.split('.')[0] or 'flights'}-set"
+    return log.name.split(".")[0] or "flights"
 
 
 def _runs(folder: Path) -> str:

@@ -61,9 +61,11 @@ def verdict(
     `rotorid verdict flights --ci --max-unexplained 20% --no-doubts`
     """
     with one_sentence():
+        from rotorid.importers.logfile import is_bag
+
         start, limit = time.monotonic(), share_of(max_unexplained)
-        is_set = len(paths) == 1 and paths[0].is_dir()
-        name = paths[0].resolve().name if is_set else paths[0].name.split(".")[0]
+        is_set = len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0])
+        name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
         target = out or Path(f"{name}-verdict")
         if is_set:
             folder = paths[0]
