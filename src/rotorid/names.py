@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from pathlib import Path
 
 ALIKE = 0.7
 """Share of letters in common (difflib's ratio) from which one name is proposed for another."""
@@ -30,6 +31,17 @@ def listed(names: Iterable[str], most: int = 4) -> str:
     if len(names) > most:
         return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else "none"
+
+
+def neighbour(path: Path) -> str:
+    """`; did you mean flights?` by what lies beside a path that is missing, or nothing."""
+    path = Path(path)
+    try:
+        there = sorted(p.name for p in path.parent.iterdir() if p.name.isprintable() and not p.name.startswith("."))
+    except OSError:
+        return ""
+    found = nearest(path.name, there)
+    return f"; did you mean {path.with_name(found)}?" if found else ""
 
 
 def hint(name: str, known: Iterable[str]) -> str:

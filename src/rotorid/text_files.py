@@ -16,6 +16,7 @@ from yaml.resolver import Resolver
 
 from rotorid.bounds import DEEPEST_YAML, LARGEST_YAML, MOST_YAML_VALUES
 from rotorid.errors import InputError
+from rotorid.names import neighbour
 from rotorid.wording import printable
 
 try:
@@ -54,7 +55,7 @@ def check_file(path: Path) -> int:
     except FileNotFoundError:
         if path.is_symlink():
             raise InputError(f"{path}: is a link to {os.readlink(path)}, where no file is") from None
-        raise InputError(f"{path}: file is missing") from None
+        raise InputError(f"{path}: file is missing{neighbour(path)}") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be opened ({error.strerror or error})") from None
     if stat.S_ISDIR(state.st_mode):

@@ -1,6 +1,7 @@
 """Logs of Betaflight, ArduPilot, ROS and MCAP: small files of one known flight, written here byte by byte or by the
 formats' own writers, come back in the contract's axes and units."""
 
+import json
 import struct
 from pathlib import Path
 
@@ -306,6 +307,43 @@ def test_ros(tmp_path: Path, kind: str) -> None:
     assert found.format == "ros"
     (run,) = found.runs.values()
     check_against(run, flown(), (*BODY, *STATE, *SPEEDS), 1e-4)
+
+
+@pytest.mark.parametrize("kind", ["mcap", "folder"])
+def test_the_folder_of_a_bag_becomes_a_set(tmp_path: Path, monkeypatch, kind: str) -> None:
+    """Of MCAP and SQLite alike; by default the set does not land among the bag's files."""
+    pytest.importorskip("rosbags")
+    from rotorid.recordings import read_set
+
+    write_bag(tmp_path / "flight", kind, flown())
+    before = sorted((tmp_path / "flight").iterdir())
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["import", "flight", "--like", "five-inch", "--mass-kg", "0.7"])
+    assert done.exit_code == 0, done.output
+    assert sorted((tmp_path / "flight").iterdir()) == before
+    (run,) = read_set(tmp_path / "flight-set").runs
+    check_against(run.table, flown(), (*BODY, *STATE, *SPEEDS), 1e-4)
+    listed = json.loads((tmp_path / "flight-set" / "import_report.json").read_text())["files"]
+    assert sorted(listed) == [f"flight/{p.name}" for p in before]
+
+
+def test_verdict_takes_the_folder_of_a_bag_for_a_log(tmp_path: Path, monkeypatch) -> None:
+    pytest.importorskip("rosbags")
+    write_bag(tmp_path / "flight", "folder", flown())
+    made = tmp_path / "answer" / "flight" / "vehicle.yaml"
+    words = [
+        "verdict",
+        str(tmp_path / "flight"),
+        "--like",
+        "five-inch",
+        "--mass-kg",
+        "0.7",
+        "-o",
+        str(tmp_path / "answer"),
+    ]
+    monkeypatch.setattr("rotorid.cli.verdicts.deliver_set", lambda *_: (_ for _ in ()).throw(InputError("made")))
+    done = CliRunner().invoke(app, words)
+    assert done.output.endswith("rotorid: made\n") and made.is_file(), done.output
 
 
 # All of them --------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from rotorid.cli import checking, effects, exporting, importing, planning, simul
 
 app = typer.Typer(
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     help="From a flight log to what your model leaves out.",

@@ -9,6 +9,17 @@ from typing import Annotated
 import typer
 
 from rotorid.cli.console import INTERRUPTED, one_sentence
+from rotorid.errors import InputError
+
+
+def check_no_log(path: Path) -> None:
+    """InputError for a log, whether a file or the folder of a bag: a recording set is made of it first."""
+    from rotorid.importers.logfile import format_of, is_bag
+
+    if path.is_file() and (path.parent / "vehicle.yaml").is_file():
+        raise InputError(f"{path}: is a file of a recording set; check the set: `rotorid check {path.parent}`")
+    if is_bag(path) or path.is_file() and format_of(path):
+        raise InputError(f"{path}: is a log, not a recording set; make a set of it first: `rotorid import {path}`")
 
 
 def check(
@@ -27,6 +38,8 @@ def check(
     from rotorid.recordings.files import run_paths
     from rotorid.recordings.manifest import write_manifest
 
+    with one_sentence():
+        check_no_log(folder)
     is_set = (folder / "vehicle.yaml").is_file()
     folders = [folder] if is_set else [folder / name for name in list_sets(folder)] or [folder]
     failed = False

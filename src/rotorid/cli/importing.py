@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -33,9 +34,12 @@ class Made:
 
 
 def import_logs(
-    logs: Annotated[list[Path], typer.Argument(help="Logs of one vehicle: PX4 .ulg, Crazyflie uSD, CSV, Parquet, …")],
+    logs: Annotated[list[Path], typer.Argument(help="Logs of one vehicle: PX4 .ulg, ROS bag (file or folder), CSV, …")],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder of the set; default: the first log's name.")
+        Path | None,
+        typer.Option(
+            "--out", "-o", help="Folder of the set; default: the first log's name (of a bag's folder NAME-set)."
+        ),
     ] = None,
     mass_kg: MassKg = None,
     like: Like = None,
@@ -45,6 +49,7 @@ def import_logs(
         Path | None, typer.Option(help="Look at a CSV or Parquet file, write what its columns seem to be, and stop.")
     ] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Write runs as CSV in place of Parquet.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")] = False,
 ) -> None:
     """Turn logs of one vehicle into a recording set: a folder with a run a flight and a `vehicle.yaml`.
 
@@ -59,15 +64,39 @@ def import_logs(
     """
     with one_sentence():
         if write_mapping is not None:
-            _write_mapping(logs, write_mapping)
+            _write_mapping(logs, write_mapping, as_json)
             return
-        made = make_set(logs, out or Path(_stem(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
-        typer.echo(f"{made.folder}: {_runs(made.folder)}")
+        made = make_set(logs, out or Path(set_name(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
+        from rotorid.recordings.sufficient import LEAST_SINGLE_S
+
+        durations, refused = _contents(made.folder)
+        if as_json:
+            typer.echo(json.dumps(_as_dict(made, durations, refused), indent=1, ensure_ascii=False))
+            return
+        word = "run" if len(durations) == 1 else "runs"
+        typer.echo(f"{made.folder}: {len(durations)} {word}, {sum(durations.values()):.0f} s, {', '.join(durations)}")
         tell(made)
-        typer.echo(f"Next: look through {made.folder / 'vehicle.yaml'}, then `rotorid verdict {made.folder}`")
+        if refused:
+            typer.echo(f"`rotorid verdict {made.folder}` will refuse the set: {refused}")
+            if len(durations) == 1 and max(durations.values()) < LEAST_SINGLE_S:
+                typer.echo(f"Next: add another flight of this vehicle: `rotorid import LOG -o {made.folder}`")
+        else:
+            typer.echo(f"Next: look through {made.folder / 'vehicle.yaml'}, then `rotorid verdict {made.folder}`")
 
 
-def _write_mapping(logs: list[Path], target: Path) -> None:
+def _as_dict(made: Made, durations: dict[str, float], refused: str) -> dict:
+    """What `--json` prints: the set, its runs with their lengths, s, and the sentences that the text has."""
+    return {
+        "set": str(made.folder),
+        "runs": [{"name": name, "duration_s": round(seconds, 6)} for name, seconds in durations.items()],
+        "found": list(made.faults),
+        "proposed": list(made.remarks),
+        "kept_vehicle": made.kept_vehicle,
+        "verdict_refuses": refused or None,
+    }
+
+
+def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
     from rotorid.importers.logfile import format_of
     from rotorid.importers.mapping import as_text, guess, read_columns
 
@@ -77,6 +106,10 @@ def _write_mapping(logs: list[Path], target: Path) -> None:
         raise InputError(f"{logs[0]}: its columns are known, no mapping is needed")
     mapping, doubts = guess(read_columns(logs[0]))
     target.write_text(as_text(mapping, doubts, logs[0].name), encoding="utf-8")
+    if as_json:
+        found = {"mapping": str(target), "channels": list(mapping.channels), "doubts": list(doubts)}
+        typer.echo(json.dumps(found, indent=1, ensure_ascii=False))
+        return
     typer.echo(f"{target}: {len(mapping.channels)} channels recognised ({', '.join(mapping.channels)})")
     for doubt in doubts:
         typer.echo(f"  - {doubt}")
@@ -116,15 +149,26 @@ def tell(made: Made) -> None:
             typer.echo(f"  - {remark}")
 
 
-def _stem(path: Path) -> str:
-    return path.name.split(".")[0] or "flights"
+def set_name(log: Path) -> str:
+    """The name of a set after its first log: `flight` of flight.ulg, `flight-set` of the bag in the folder flight."""
+    if log.is_dir():
+        return f"{log.resolve().name.split('.')[0] or 'flights'}-set"
+    return log.name.split(".")[0] or "flights"
 
 
-def _runs(folder: Path) -> str:
+def _contents(folder: Path) -> tuple[dict[str, float], str]:
+    """To the runs of a set their lengths, s, and why `rotorid verdict` would refuse the set; empty where it would not.
+
+    The very look that the verdict has first: a single flight must be long enough to hold out a part of it.
+    """
     from rotorid.recordings import read_set
     from rotorid.recordings.check import check_run
+    from rotorid.recordings.sufficient import sufficient
 
-    checks = [check_run(run) for run in read_set(folder).runs]
-    total = sum(run.duration_s for run in checks)
-    word = "run" if len(checks) == 1 else "runs"
-    return f"{len(checks)} {word}, {total:.0f} s, {', '.join(run.name for run in checks)}"
+    recordings = read_set(folder)
+    durations = {check.name: check.duration_s for check in map(check_run, recordings.runs)}
+    try:
+        sufficient(recordings)
+    except InputError as error:
+        return durations, str(error)
+    return durations, ""

@@ -11,6 +11,7 @@ import typer
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
+from rotorid.names import neighbour
 
 
 def plan(
@@ -113,7 +114,7 @@ def read_verdict(path: Path) -> tuple[Path, dict]:
     """Folder and content of a verdict."""
     file = path / "verdict.json" if path.is_dir() else path
     if not file.is_file():
-        raise InputError(f"{file}: no such file; expected the verdict.json of `rotorid verdict`")
+        raise InputError(f"{file}: no such file; expected the verdict.json of `rotorid verdict`{neighbour(path)}")
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError):

@@ -61,12 +61,17 @@ def verdict(
     `rotorid verdict flights --ci --max-unexplained 20% --no-doubts`
     """
     with one_sentence():
+        from rotorid.importers.logfile import is_bag
+
         start, limit = time.monotonic(), share_of(max_unexplained)
-        is_set = len(paths) == 1 and paths[0].is_dir()
-        name = paths[0].resolve().name if is_set else paths[0].name.split(".")[0]
+        is_set = len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0])
+        name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
         target = out or Path(f"{name}-verdict")
         if is_set:
             folder = paths[0]
+            ignored = {"--mass-kg": mass_kg, "--like": like, "--vehicle": vehicle, "--mapping": mapping}
+            if given := [name for name, value in ignored.items() if value is not None]:
+                typer.echo(_unused(given, folder), err=True)
             if not (folder / "vehicle.yaml").is_file():
                 raise InputError(_no_vehicle(folder))
         else:
@@ -146,6 +151,15 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
 
             write_table(residuals_of(analysis), target / "series.parquet")
         return verdict
+
+
+def _unused(given: list[str], folder: Path) -> str:
+    """That options which describe the vehicle of a log play no part where a recording set is judged."""
+    play = "plays" if len(given) == 1 else "play"
+    return (
+        f"rotorid: {' and '.join(given)} {play} no part: {folder} is a recording set, whose vehicle is that of "
+        f"{folder / 'vehicle.yaml'}"
+    )
 
 
 def _no_vehicle(folder: Path) -> str:

@@ -8,6 +8,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from rotorid.errors import InputError
+from rotorid.names import hint
 from rotorid.text_files import read_yaml, with_exponents
 
 Range = tuple[float, float]
@@ -140,7 +141,7 @@ def read_limits(path: Path | None, kind: type[T] = Limits) -> T:
         name = ".".join(str(part) for part in first["loc"])
         if first["type"] == "extra_forbidden":
             known = ", ".join(kind.model_fields)
-            raise InputError(f"{path}: {name} is no limit; known are {known}") from None
+            raise InputError(f"{path}: {name} is no limit; known are {known}{hint(name, kind.model_fields)}") from None
         said = first["msg"].removeprefix("Value error, ")
         said = said[0].lower() + said[1:]
         raise InputError(f"{path}: {name + ': ' if name else ''}{said}") from None

@@ -48,15 +48,27 @@ class Imported:
     kind: str = "flight"
 
 
+def is_bag(path: Path) -> bool:
+    """Whether a path is the folder of a ROS 2 bag (`metadata.yaml` beside its .db3 or .mcap), and no recording set."""
+    return (path / "metadata.yaml").is_file() and not (path / "vehicle.yaml").is_file()
+
+
+def files_of(path: Path) -> dict[str, Path]:
+    """The files of a log by name: itself, or all that lie in the folder of a bag."""
+    if not path.is_dir():
+        return {path.name: path}
+    return {f"{path.resolve().name}/{p.name}": p for p in sorted(path.iterdir()) if p.is_file()}
+
+
 def format_of(path: Path) -> str:
     """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
 
     InputError for what is none of them.
     """
     if path.is_dir():
-        if (path / "metadata.yaml").is_file():
+        if is_bag(path):
             return "ros"
-        raise InputError(f"{path}: expected a log, found a folder")
+        raise InputError(f"{path}: expected a log, found a folder (that of a ROS 2 bag has a metadata.yaml)")
     check_file(path)
     with open(path, "rb") as file:
         head = file.read(4096)

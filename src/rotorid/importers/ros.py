@@ -173,8 +173,8 @@ def convert(series: dict[str, list[Series]], faults: list[Fault], where: object)
 
 
 def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
-    """Every flight of a bag or MCAP file by name, in contract columns, and what was found."""
+    """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, and what was found."""
     series, faults = read_series(path)
     table, flying = convert(series, faults, path)
-    runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path)
+    runs, cuts = in_the_air.flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
     return runs, [*faults, *report_gaps(table), *cuts]

@@ -14,7 +14,7 @@ from rotorid import templates
 from rotorid.bounds import MOST_RUNS
 from rotorid.errors import InputError
 from rotorid.importers.adding import add_to_set
-from rotorid.importers.logfile import TEMPLATES, read_log
+from rotorid.importers.logfile import TEMPLATES, files_of, read_log
 from rotorid.importers.mapping import Mapping
 from rotorid.importers.propose import propose
 from rotorid.importers.report import Fault, ImportReport
@@ -114,7 +114,8 @@ def set_of_logs(
     Parameters
     ----------
     logs
-        Files that `rotorid.importers.logfile` knows, all of one kind (flights, or runs of a stand).
+        Files, and folders of ROS 2 bags, that `rotorid.importers.logfile` knows, all of one kind (flights, or runs of a
+        stand).
     name
         What the set is called.
     mass_kg, like
@@ -174,7 +175,7 @@ def set_of_logs(
         (*remarks, *left_out),
         tuple(dict.fromkeys(f for i in found for f in i.faults)),
         found[0].axes,
-        {path.name: sha256(path) for path in logs},
+        {name: sha256(file) for path in logs for name, file in files_of(path).items()},
         kept,
     )
 

@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.effects.contract import Form
+from rotorid.effects.scale import rotor_radius_m
 from rotorid.effects.steady_wind import through_drag
 from rotorid.mismatch import rules
 from rotorid.mismatch.choosing import choosing
@@ -391,7 +392,8 @@ def speed_path(
             [1 / np.square(np.minimum(t.prior_sd, sure if t.kind == "value" else np.inf)) for t in terms]
         )
         if "moment" in groups:
-            arm_m = float(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).max())
+            # A vehicle of one central rotor has no arm; its rotor's radius says how wide it is.
+            arm_m = float(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).max()) or rotor_radius_m(vehicle)
             precision = np.append(precision, np.full(3, (STEADY_ARM * arm_m) ** -2.0))
         keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from rotorid.bounds import MOST_CELLS, MOST_RUNS
 from rotorid.errors import InputError
-from rotorid.names import hint
+from rotorid.names import hint, neighbour
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import check_belief
 from rotorid.recordings.manifest import check_manifest
@@ -196,7 +196,7 @@ def read_set(folder: Path) -> RecordingSet:
     if not folder.name.isprintable():
         raise InputError(f"{printable(folder)}: the folder's name holds a line break or control character")
     if not folder.is_dir():
-        raise InputError(f"{folder}: no such recording set (folder)")
+        raise InputError(f"{folder}: no such recording set (folder){neighbour(folder)}")
     vehicle = read_vehicle(folder / VEHICLE)
     check_belief(vehicle, str(folder / VEHICLE))
     paths = run_paths(folder)

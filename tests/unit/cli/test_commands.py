@@ -1,6 +1,8 @@
 """The commands as a person types them: what they write, what they say of bad input, and their exit codes."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -14,6 +16,7 @@ from typer.testing import CliRunner
 from rotorid import templates
 from rotorid.cli import app
 from rotorid.cli.simulating import fly
+from rotorid.errors import InputError
 from rotorid.mismatch.deliver import deliver
 from rotorid.recordings import read_set, read_vehicle
 
@@ -313,3 +316,81 @@ def test_names_of_times_and_commands_are_recognised_and_a_lacking_time_is_told()
         assert mapping.channels["rotor_command"].unit == "rpm" and mapping.channels["rotor_speed"].unit == "rad/s"
     _, doubts = guess(pd.DataFrame(names))
     assert doubts[0].startswith("time: no column recognised")
+
+
+def test_help_by_its_short_name_and_by_python(tmp_path: Path) -> None:
+    for words in (["-h"], ["verdict", "-h"], ["import", "-h"]):
+        done = run(*words)
+        assert done.exit_code == 0 and "Usage: " in done.output, done.output
+    done = subprocess.run([sys.executable, "-m", "rotorid", "-h"], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0 and "Usage: rotorid " in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    "words", [("verdict", "flihgts"), ("import", "flihgts"), ("check", "flihgts"), ("plan", "flihgts")]
+)
+def test_a_misspelt_path_gets_a_suggestion(tmp_path: Path, monkeypatch, words) -> None:
+    (tmp_path / "flights").mkdir()
+    monkeypatch.chdir(tmp_path)
+    done = run(*words)
+    assert done.exit_code == 1 and done.output.endswith("; did you mean flights?\n"), done.output
+    assert len(done.output.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"), [(["verdit"], "verdict"), (["verdict", "x", "--mas-kg", "1"], "--mass-kg")]
+)
+def test_a_misspelt_command_or_option_gets_a_suggestion(words, meant) -> None:
+    done = run(*words)
+    assert done.exit_code == 2 and meant in done.output
+
+
+def test_a_verdict_says_which_options_play_no_part_for_a_set(flights: Path, tmp_path: Path, monkeypatch) -> None:
+    def stop(*_):
+        raise InputError("judged")
+
+    monkeypatch.setattr("rotorid.cli.verdicts.deliver_set", stop)
+    done = run("verdict", flights, "-o", tmp_path / "out", "--mass-kg", "3", "--like", "x500")
+    assert "--mass-kg and --like play no part" in done.stderr and str(flights / "vehicle.yaml") in done.stderr
+    assert run("verdict", flights, "-o", tmp_path / "out").stderr == "rotorid: judged\n"
+
+
+def test_check_of_a_log_says_import_first(tmp_path: Path, flights: Path) -> None:
+    log, bag = tmp_path / "flight.csv", tmp_path / "bag"
+    log.write_text("a,b\n1,2\n")
+    bag.mkdir()
+    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
+    for path in (log, bag):
+        done = run("check", path)
+        assert done.exit_code == 1 and done.output == (
+            f"rotorid: {path}: is a log, not a recording set; make a set of it first: `rotorid import {path}`\n"
+        )
+    assert f"check the set: `rotorid check {flights}`" in run("check", flights / "vehicle.yaml").output
+
+
+def test_import_says_what_the_verdict_would_refuse(tmp_path: Path, flights: Path) -> None:
+    """One flight of 6 s is too short to hold out a part of it; a second one settles it."""
+    for number, one in enumerate(read_set(flights).runs, 1):
+        one.table.to_csv(tmp_path / f"flight_{number}.csv", index=False)
+    out = tmp_path / "set"
+    done = run("import", tmp_path / "flight_1.csv", "-o", out, "--like", "thesis", "--mass-kg", "0.652")
+    assert done.exit_code == 0, done.output
+    *_, refused, following = done.output.splitlines()
+    assert refused.startswith(f"`rotorid verdict {out}` will refuse the set: ") and "at least 9 s" in refused
+    assert following == f"Next: add another flight of this vehicle: `rotorid import LOG -o {out}`"
+    judged = run("verdict", out, "-o", tmp_path / "answer", "-q")
+    assert judged.exit_code == 1 and judged.output == f"rotorid: {refused.split('refuse the set: ')[1]}\n"
+    done = run("import", tmp_path / "flight_2.csv", "-o", out)
+    assert done.exit_code == 0 and f"then `rotorid verdict {out}`" in done.output.splitlines()[-1], done.output
+
+
+def test_import_as_json(tmp_path: Path, flights: Path) -> None:
+    path, mapping = own_csv(tmp_path, flights), tmp_path / "mapping.yaml"
+    proposed = json.loads(run("import", path, "--write-mapping", mapping, "--json").stdout)
+    assert proposed["mapping"] == str(mapping) and "specific_force" in proposed["channels"]
+    words = ("--mapping", mapping, "--like", "thesis", "--mass-kg", "0.652", "-o", tmp_path / "set")
+    said = json.loads(run("import", path, *words, "--json").stdout)
+    assert list(said) == ["set", "runs", "found", "proposed", "kept_vehicle", "verdict_refuses"]
+    assert said["set"] == str(tmp_path / "set") and not said["kept_vehicle"] and said["proposed"]
+    assert [r["name"] for r in said["runs"]] == ["own"] and said["runs"][0]["duration_s"] == pytest.approx(6.0, abs=0.1)
+    assert "at least 9 s" in said["verdict_refuses"]

@@ -32,6 +32,7 @@ def test_a_file_is_read_and_what_it_leaves_out_is_as_usual(tmp_path: Path) -> No
     ("text", "said"),
     [
         ("speed: 3\n", "speed is no limit"),
+        ("duratoin_s: 3\n", "; did you mean duration_s?"),
         ("speed_m_s: -1\n", "speed_m_s"),
         ("speed_m_s: fast\n", "speed_m_s"),
         ("x_m: [2, -2]\n", "lower number first"),

@@ -71,7 +71,8 @@ def delivered_value(improved: Vehicle, believed: Vehicle, key: str) -> float:
     """A value of the improved vehicle; of an arm and a reading's gain the factor on what was believed."""
     if key == "arm":
         was, now = (v.rotor_positions_m()[:, :2] for v in (believed, improved))
-        return float(np.linalg.norm(now) / np.linalg.norm(was))
+        believed_m = float(np.linalg.norm(was))
+        return float(np.linalg.norm(now)) / believed_m if believed_m > 0 else 1.0
     if key.startswith("gain"):
         gains = improved.reading_gain or (1.0, 1.0, 1.0)
         return float(gains["xyz".index(key[-1])] if key[-2:] in ("_x", "_y", "_z") else gains[0])

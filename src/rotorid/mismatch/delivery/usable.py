@@ -79,12 +79,19 @@ def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
 
 
 def full_thrust_n(vehicle: Vehicle) -> float | None:
-    """Upward force at rest in still air with full command, effects included, N; None without a limit of the speed."""
+    """Upward force at rest in still air with full command, effects included, N.
+
+    None without a limit of the speed, and for rotors that cannot set thrust and moments independently (one central
+    rotor, whose vanes or flaps are not recorded): `cannot_fly` says so of them.
+    """
     if vehicle.rotor_speed_limits_rad_s is None:
         return None
     flown = flyable(vehicle)[0]
     asked = np.array([BEYOND_ALL * vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0])
-    return float(wrench_at_rest(flown, command_path(flown), asked, HIGH_ABOVE_GROUND_M)[0])
+    try:
+        return float(wrench_at_rest(flown, command_path(flown), asked, HIGH_ABOVE_GROUND_M)[0])
+    except InputError:
+        return None
 
 
 def cannot_fly(vehicle: Vehicle) -> str:
