@@ -30,7 +30,7 @@ this leaves half of its phase margin of about 70 degrees."""
 MEAN_TILT_COSINE = 0.96
 """Of the swings, roughly."""
 SECONDS, FLIGHTS, SEED = 20.0, 2, 1
-"""The flights that `rotorid simulate` makes unless told otherwise, and that a vehicle must stand to be delivered."""
+"""The flights that `rotorid simulate` makes by default, and that a vehicle must stand to be delivered."""
 YAW_SHARE = 0.6
 """Of what each rotor may turn faster or slower than in hover, by its square: what the yaw may ask for.
 

@@ -97,10 +97,10 @@ def off_the_ground(flying: np.ndarray, drive: np.ndarray, force: np.ndarray, tim
     if full <= DRIVEN or not np.isfinite(pull).any():
         return flying
     of_flight = np.median(given[given > 0.5 * full])
-    carried = (throttle >= NEAR_WEIGHT * of_flight) | (pull < FALLING * np.nanmedian(pull[flying]))
-    carried = flying & without_pauses(carried, time_s)
+    flown = (throttle >= NEAR_WEIGHT * of_flight) | (pull < FALLING * np.nanmedian(pull[flying]))
+    flown = flying & without_pauses(flown, time_s)
     lifts, out = throttle >= LIFTS * of_flight, np.zeros(len(flying), bool)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], carried.astype(int), [0]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flown.astype(int), [0]])))
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         up = np.flatnonzero(lifts[start:stop])
         if len(up):

@@ -118,8 +118,8 @@ class Apart:
     bias_gram: np.ndarray
     """(m, K), as in `Regression`."""
     bias_cross: np.ndarray
-    told_by: np.ndarray
-    """(channels,) numbers of the channels."""
+    channels: np.ndarray
+    """Numbers of those channels."""
 
     def before(self, kept: int) -> Apart:
         """The same without the columns from `kept` on."""
@@ -835,7 +835,7 @@ def build(
     """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
 
     `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap. The channels
-    `told_by` alone estimate the terms `apart` (`Apart`).
+    `told_by` alone estimate the terms `apart` (`Apart`). `by_channel` keeps the products channel by channel, too.
     """
     start, at = {}, 0
     for term in terms:

@@ -39,9 +39,6 @@ def evidence(environments=5, seed=0):
         apart_columns=np.array([2]),
         apart_channels=np.array([7]),
         active=("drag/plain",),
-        trail=("+ drag/plain",),
-        not_established={"gust": "too small"},
-        values={"mass": (0.1, 0.01)},
     )
 
 

@@ -18,8 +18,6 @@ from rotorid.mismatch.unknowns import UNKNOWNS
 class PosteriorSearch:
     """The most probable model of a regression, and what is to be stated of its effects."""
 
-    refused: dict[str, str] = {}
-
     def __init__(self, regression: Regression, ask: Questions, prior: Prior = Prior()):  # noqa: B008
         self.regression = regression
         self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
@@ -57,7 +55,7 @@ class PosteriorSearch:
         """Whether values alone explain as much is part of the decision itself."""
 
     def beside(self, active: Sequence[str]) -> Fit | None:
-        """The model with the most probable effect beside those `active` that is not among them; None without one.
+        """The model with the most probable effect in addition to those `active`; None without one.
 
         As long as it may be there, what is stated may be off by what it would change.
         """

@@ -7,7 +7,7 @@ saw them; it needs no recording and no code of an effect, so it can be kept in a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,12 +100,6 @@ class Evidence:
     """Numbers of those channels."""
     active: tuple[str, ...] = ()
     """Keys of the effects that the engine selected."""
-    trail: tuple[str, ...] = ()
-    """Steps of its search."""
-    not_established: Mapping[str, str] = field(default_factory=dict)
-    """Ids that it looked at and dropped, with the reason."""
-    values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Believed values that it calls wrong: relative change and one-sigma."""
 
 
 def term_of(term: Term) -> EvidenceTerm:
@@ -138,14 +132,7 @@ def term_of(term: Term) -> EvidenceTerm:
 
 def evidence_of(found: Fitted) -> Evidence:
     """What the last search on a flight saw, and what it chose."""
-    selection = found.model.selection
-    return replace(
-        evidence_from(found.model.search.regression),
-        active=tuple(selection.active),
-        trail=tuple(selection.trail),
-        not_established={k: str(v) for k, v in selection.not_established.items()},
-        values={k: (float(a), float(b)) for k, (a, b) in found.values.items()},
-    )
+    return replace(evidence_from(found.model.search.regression), active=tuple(found.model.selection.active))
 
 
 def evidence_from(regression: Regression) -> Evidence:
@@ -163,5 +150,5 @@ def evidence_from(regression: Regression) -> Evidence:
         bias_gram=kept.bias_gram * share,
         bias_cross=kept.bias_cross * share,
         apart_columns=np.zeros(0, int) if apart is None else apart.columns,
-        apart_channels=np.zeros(0, int) if apart is None else apart.told_by,
+        apart_channels=np.zeros(0, int) if apart is None else apart.channels,
     )

@@ -1,4 +1,4 @@
-"""The leftover of a flight: what no model of the catalogue explains, and how it is told from an effect.
+"""The leftover of a flight: what no model of the catalogue explains, and how it differs from an effect.
 
 What is left of a real flight is not white. It looks like physics that is nearly right: a thrust that is a little off in
 one turn and not in the next. So it is a sum of the catalogue's own columns with coefficients that are new in every

@@ -116,7 +116,7 @@ def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, pri
     energy = np.maximum(np.diag(seen.gram), TINY)
     root = np.sqrt(np.minimum(1.0, prior.attenuation * energy / np.maximum(np.diag(bias), TINY)))
     rows = spectrum.rows
-    place, gram_apart, cross_apart = scaled_apart(evidence, np.ones(len(evidence.channels)), unit)
+    place, gram_apart, cross_apart = scaled_apart(evidence, unit)
     sd, low, high, is_value = believed(evidence.terms, trusts_of(evidence.terms), columns_of, unit, rows, prior)
     effects = {t.key: t.key if t.run else t.effect for t in evidence.terms if t.kind == "effect"}
     trusts = trusts_of(evidence.terms)
@@ -152,17 +152,15 @@ def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, pri
     )
 
 
-def scaled_apart(
-    evidence: Evidence, weights: np.ndarray, unit: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def scaled_apart(evidence: Evidence, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place of the columns that some channels alone estimate, and those channels' products, scaled."""
-    own = evidence.apart_columns
+    columns = evidence.apart_columns
     place = np.full(len(unit), -1)
-    place[own] = np.arange(len(own))
-    told = np.isin(evidence.channels, evidence.apart_channels) * weights
-    gram = np.tensordot(told, evidence.gram.sum(axis=1) - evidence.bias_gram, 1)
-    cross = told @ (evidence.cross.sum(axis=1) - evidence.bias_cross)
-    return place, (gram * np.outer(unit, unit))[own], (cross * unit)[own]
+    place[columns] = np.arange(len(columns))
+    own = np.isin(evidence.channels, evidence.apart_channels)
+    gram = (evidence.gram.sum(axis=1) - evidence.bias_gram)[own].sum(axis=0)
+    cross = (evidence.cross.sum(axis=1) - evidence.bias_cross)[own].sum(axis=0)
+    return place, (gram * np.outer(unit, unit))[columns], (cross * unit)[columns]
 
 
 def log_priors(effects: Mapping[str, str], terms: Mapping[str, EvidenceTerm], prior: Prior) -> dict[str, float]:

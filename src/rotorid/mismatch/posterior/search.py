@@ -27,6 +27,7 @@ MOST_SCORED = 8
 """Moves of a kind that are scored exactly."""
 MOST_MOVES = 60
 LEFTOVER_ROUNDS = 5
+"""Rounds of model and leftover at most, should the two go on in a circle."""
 LEAST_GAIN = 0.05
 """Nats by which a move must be better, so that the search ends."""
 WORST_RANKED = -5.0

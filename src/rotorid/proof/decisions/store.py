@@ -122,9 +122,6 @@ def described(evidence: Evidence) -> dict[str, Any]:
         "terms": [asdict(t) for t in evidence.terms],
         "start": dict(evidence.start),
         "active": list(evidence.active),
-        "trail": list(evidence.trail),
-        "not_established": dict(evidence.not_established),
-        "values": {k: list(v) for k, v in evidence.values.items()},
     }
 
 
@@ -148,9 +145,6 @@ def evidence_from(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) ->
         gram=gram,
         **{name: arrays[name] for name in ARRAYS},
         active=tuple(facts["active"]),
-        trail=tuple(facts["trail"]),
-        not_established=facts["not_established"],
-        values={k: tuple(v) for k, v in facts["values"].items()},
     )
 
 
