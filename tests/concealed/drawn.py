@@ -25,7 +25,7 @@ SIMULATORS = {
     "bench/rig": rig.BENCH,
     "stand/rig": rig.STAND,
 }
-NAME = re.compile(r"(multibody|continuous|bench/rig|stand/rig)/(\w+)/(development|\d{4}-\d\d-\d\d)/(\d{3})")
+NAME = re.compile(r"(multibody|continuous|bench/rig|stand/rig)/(\w+)/(development|\d{4}-\d\d-\d\d|[0-9a-f]{8})/(\d{3})")
 
 
 def seed_of(date: str, family: str, number: int) -> int:

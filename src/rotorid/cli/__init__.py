@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import checking, effects, exporting, importing, planning, simulating, starting, verdicts
+from rotorid.cli import checking, comparing, effects, exporting, importing, planning, simulating, starting, verdicts
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -45,6 +45,7 @@ def main(
 
 
 app.command("verdict")(verdicts.verdict)
+app.command("compare")(comparing.compare)
 app.command("plan")(planning.plan)
 app.command("together")(planning.together)
 app.command("import")(importing.import_logs)

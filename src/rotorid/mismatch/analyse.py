@@ -15,6 +15,7 @@ from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_
 from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
+from rotorid.mismatch.absent import absent
 from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.decided import Decided, Watch, unwatched
@@ -36,6 +37,7 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.payload_windows import loads, on_board
+from rotorid.mismatch.posterior.limits import Limit
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.refitted import refitted, values_alone
 from rotorid.mismatch.regime import regime_variables
@@ -116,7 +118,9 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float, watc
     if found.commanded:
         told = told_of_commands(findings, told)
     findings = together(findings)
-    choice = Choice(recordings, split, found, told, scale, tuple(findings), tuple(remarks))
+    stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
+    limits = tuple(limit for limit in absent(model) if limit.id not in stated_ids)
+    choice = Choice(recordings, split, found, told, scale, tuple(findings), limits, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
     stated = {**contract_values(prepared.vehicle, told), **scale}
@@ -143,6 +147,8 @@ class Choice:
     scale: dict[str, tuple[float, float, float, float]]
     """A full speed that nobody stated, by its contract name."""
     findings: tuple[Finding, ...]
+    absent: tuple[Limit, ...]
+    """Ids that were tested and not found, and how large they may be."""
     remarks: tuple[str, ...]
 
     def vehicle(self, moved: Values, stated: Values) -> Vehicle:
@@ -200,6 +206,7 @@ def account(
         findings=tuple(findings),
         values={**contract_values(prepared.vehicle, stated), **choice.scale},
         not_testable=not_testable(prepared, found.chain, findings),
+        absent=choice.absent,
         traces=traces,
         between_sensors=between,
         without=without_each(found, seen, values, fit, findings, (*traces, *between)),

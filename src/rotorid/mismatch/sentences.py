@@ -20,17 +20,21 @@ from rotorid.mismatch.words import (
     number,
     on_the_ground,
     parameter_words,
+    percent_words,
     plus_minus,
     regime_words,
     sure,
 )
 
 if TYPE_CHECKING:
+    from rotorid.mismatch.posterior.limits import Limit
     from rotorid.mismatch.verdict import Channel, Location
 
 MOST_WORDS = 40
 NEARLY_ALL = 0.99
 """Share that stays unexplained from which the causes named explain next to nothing."""
+MOST_LIMITS = 3
+"""Effects that were not found and are named with their limit; more are counted."""
 MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
 WORTH_SAYING_P = 0.05
@@ -168,8 +172,20 @@ def details(told: Told) -> list[str]:
             capital(_rest(told))
             + (f" {capital(analysis.unexplained_description)}." if analysis.unexplained_description else "")
         )
-    out += _run_forward(told.forward)
+    out += [_not_found(analysis.absent), *_run_forward(told.forward)]
     return [text for text in out if text]
+
+
+def _not_found(limits: Sequence[Limit]) -> str:
+    """What was tested and not found, and how large it may be at most with 95 % probability."""
+    sized = [(effect_words(x.id), percent_words(x.share)) for x in limits if x.share > 0]
+    if not sized:
+        return ""
+    first, rest = sized[:MOST_LIMITS], sized[MOST_LIMITS:]
+    named = [f"{name} (at most {share} of the weight)" for name, share in first]
+    if rest:
+        named.append(f"{len(rest)} others (at most {rest[0][1]})" if len(rest) > 1 else f"{rest[0][0]} ({rest[0][1]})")
+    return f"Not found: {listed(named)}."
 
 
 def _causes(told: Told) -> str:

@@ -189,10 +189,12 @@ class Absent(Part):
     """An id that was tested and not found, and how large it may be all the same."""
 
     id: str
-    symbol: str
-    at_most: Magnitude
+    symbol: str = Field(description="Of the parameter that does most; empty of a form whose size has none of its own.")
+    at_most: Magnitude = Field(description="Of the parameter's magnitude, with 95 % probability.")
     unit: str
-    share_of_weight: Magnitude
+    share_of_weight: Magnitude = Field(
+        description="Root mean square force over the weight, moment over the weight at the rotors' mean distance."
+    )
 
 
 class DoubtOfSet(Part):
@@ -319,7 +321,10 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             effect_verdict(f, shares.get(f.id), analysis.effect_sizes.get(f.id))
             for f in by_share(analysis.findings, shares)
         ),
-        absent=(),
+        absent=tuple(
+            Absent(id=a.id, symbol=a.symbol, at_most=a.at_most, unit=a.unit, share_of_weight=a.share or None)
+            for a in analysis.absent
+        ),
         parameters={
             name: WrongValue(believed=believed, refitted=refitted, interval_95=(low, high))
             for name, (believed, refitted, low, high) in analysis.values.items()

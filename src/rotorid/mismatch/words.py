@@ -182,6 +182,11 @@ def plus_minus(value: float, low: float | None, high: float | None) -> str:
     return f"{value / scale:.{decimals}f}{tail} ± {half / scale:.{decimals}f}{tail}"
 
 
+def percent_words(share: float) -> str:
+    """A share as a percentage of two digits: `0.84 %`; below a thousandth of a percent `less than 0.001 %`."""
+    return "less than 0.001 %" if share < 1e-5 else f"{100 * share:.2g} %"
+
+
 def sure(p_value: float) -> str:
     """How sure a p-value makes one: never more than 99.9 %, which no model of noise deserves."""
     if p_value < 1e-3:

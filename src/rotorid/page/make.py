@@ -22,6 +22,7 @@ from rotorid.mismatch.delivery.parts import form_of
 from rotorid.mismatch.findings import Analysis, Finding
 from rotorid.mismatch.tiles import errors_of, tiles
 from rotorid.mismatch.verdict import (
+    Absent,
     BelievedValue,
     Channel,
     EffectVerdict,
@@ -38,6 +39,7 @@ from rotorid.mismatch.words import (
     listed,
     number,
     parameter_words,
+    percent_words,
     plus_minus,
     regime_words,
     sure,
@@ -57,6 +59,8 @@ MOST_RUNS_IN_STRIP = 8
 STRIP_CELLS = 400
 NARROWEST = 0.03
 """Interval over plausible range below which the range is zoomed in."""
+LIMIT_DECADES = 5.0
+"""Decades below the weight that the bars of the limits show."""
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -77,7 +81,7 @@ def make_page(
     environment = Environment(autoescape=True, trim_blocks=False)
     environment.globals.update(figure=figure_html, ranges=ranges_html)
     shown, more = shown_locations(verdict.locations)
-    known = {e.id for e in verdict.effects} | {n.id for n in verdict.not_testable}
+    known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
     silent = [effect_words(i) for i in catalogue() if i not in known]
     data = page_data(analysis, verdict, main)
     data["regimes"]["first"] = first_variable(verdict, main, data["regimes"]["variables"])
@@ -120,6 +124,7 @@ def make_page(
         rest=rest_text(verdict),
         ruled_out=[ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
         silent=listed(silent),
+        limits=[limit_row(a) for a in verdict.absent],
         not_testable=[{"name": capital(effect_words(n.id)), "reason": n.reason} for n in verdict.not_testable],
         next=next_text(verdict, analysis.recordings),
         ledger=[ledger_row(row) for row in ledger],
@@ -150,6 +155,23 @@ def embedded(data: Mapping) -> Markup:
 def by_share(effects: Sequence[EffectVerdict]) -> list[EffectVerdict]:
     """The effects with the largest share of the gain first; in their order where no share is stated."""
     return sorted(effects, key=lambda e: -(getattr(e, "share", None) or 0.0))
+
+
+def limit_row(limit: Absent) -> dict[str, str]:
+    """A row of the table of what was not found; `bar` is a share of the scale from 0.001 % to 100 % of the weight."""
+    share = limit.share_of_weight
+    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / LIMIT_DECADES, 0.0, 1.0))
+    size = Markup("")
+    if limit.at_most is not None:
+        size = Markup("|{}| ≤ {}").format(
+            subscripts(limit.symbol), pretty(f"{number(limit.at_most)} {limit.unit}".strip())
+        )
+    return {
+        "name": capital(effect_words(limit.id)),
+        "size": size,
+        "share": "" if not share else pretty(percent_words(share)),
+        "bar": f"{100 * decades:.0f}",
+    }
 
 
 def finding_of(effect: EffectVerdict, analysis: Analysis) -> Finding:

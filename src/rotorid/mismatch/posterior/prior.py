@@ -41,6 +41,9 @@ class Prior:
     least_size: float = 0.03
     """Squares of a contribution over those of the noise above which it matters: less changes an error by one and a half
     percent at most."""
+    form_error: float = 0.15
+    """Share of an effect's contribution that its form is wrong by: what is less than that of another one in the same
+    channel may be what is wrong with that one's form."""
     open_nats: float = 5.0
     """Nats that a model with another id in its place may be worse for that id to be looked at."""
     beside_nats: float = 3.0

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rotorid.mismatch.posterior.leftover import Spectrum
 from rotorid.mismatch.posterior.problem import Problem
 from rotorid.mismatch.regression import limited_bias
 
@@ -56,6 +57,13 @@ class Posterior:
         if key not in self.visited:
             self.visited[key] = scored(self.problem, key).log_posterior
         return self.visited[key]
+
+    def leftover_of(self, model: Model, spectrum: Spectrum) -> np.ndarray:
+        """The variance of each channel's leftover, (C,), that makes what a model leaves most probable."""
+        at, beta = scored(self.problem, model), np.zeros(len(spectrum.unit))
+        if at.mode is not None:
+            beta[at.columns] = at.mode.beta
+        return spectrum.variance_of_leftover(beta)
 
 
 def scored(problem: Problem, model: Model) -> Scored:

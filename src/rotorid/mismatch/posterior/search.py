@@ -20,7 +20,6 @@ from rotorid.mismatch.posterior.score import (
     Posterior,
     log_prior,
     mode_of,
-    scored,
 )
 
 MOST_SCORED = 8
@@ -73,10 +72,7 @@ def settled(evidence: Evidence, spectrum: Spectrum, prior: Prior, variance: np.n
     starts: dict[Model, None] = dict.fromkeys([(), known])
     for _ in range(LEFTOVER_ROUNDS):
         found = most_probable(problem_of(evidence, spectrum, variance, prior), starts)
-        at = scored(found.problem, found.model)
-        beta = np.zeros(len(spectrum.unit))
-        beta[at.columns] = at.mode.beta
-        before, variance = variance, spectrum.variance_of_leftover(beta)
+        before, variance = variance, found.posterior.leftover_of(found.model, spectrum)
         starts = dict.fromkeys([found.model, *starts])
         if np.array_equal(before, variance):
             break

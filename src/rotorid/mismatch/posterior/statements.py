@@ -50,7 +50,7 @@ class Statement:
         if self.status in CLAIMED:
             return ""
         if self.probability >= SURE:
-            return "it is too small to matter"
+            return "it is too small to matter, by itself or beside a larger effect"
         return f"its probability is {100 * self.probability:.0f} %"
 
 
@@ -72,7 +72,7 @@ def statement(
     effect = found.problem.terms[key].effect
     members = smallest_class(found, weights, effect, others)
     alone, joint = (share_of(found, weights, own) for own in ({effect}, members))
-    if size_of(found, at, key) <= found.problem.prior.least_size:
+    if not matters(found, at, key):
         status: Status = "not_established"  # sure or not, it is too small to matter
     elif joint >= SURE:
         status = "established" if len(members) == 1 else "ambiguous"
@@ -149,12 +149,23 @@ def holds(found: Found, model: Model, members: set[str]) -> bool:
     return any(found.problem.terms[key].effect in members for key in model)
 
 
-def size_of(found: Found, at: Scored, key: str) -> float:
-    """Squares of what an effect contributes over those of the noise, in the channel where it does most."""
+def matters(found: Found, at: Scored, key: str) -> bool:
+    """Whether an effect does something of its own in some channel.
+
+    That is more than a share of the noise, and more than what the form of a larger effect there is wrong by.
+    """
+    prior = found.problem.prior
+    own = squares_of(found, at, key)
+    others = [squares_of(found, at, other) for other in found.model if other in found.problem.effects and other != key]
+    known_to = prior.form_error**2 * np.max(others, axis=0, initial=0.0)
+    return bool(np.any((own * len(own) > prior.least_size * found.problem.rows) & (own > known_to)))
+
+
+def squares_of(found: Found, at: Scored, key: str) -> np.ndarray:
+    """Whitened squares of what an effect contributes to each channel, (C,)."""
     own = found.problem.columns_of[key]
     beta = at.mode.beta[places(at.columns, own)]
-    squares = np.einsum("i,cij,j->c", beta, found.problem.channel_gram[:, own[:, None], own], beta)
-    return float(squares.max()) * len(squares) / found.problem.rows
+    return np.einsum("i,cij,j->c", beta, found.problem.channel_gram[:, own[:, None], own], beta)
 
 
 def parameters(found: Found, at: Scored, key: str) -> tuple[Estimate, ...]:

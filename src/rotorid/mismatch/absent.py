@@ -1,0 +1,76 @@
+"""What was tested and not found in a flight, and how large it may be all the same.
+
+A size is a share of the weight: root mean square force over the weight, and moment over the weight at the rotors' mean
+distance from the centre of mass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotorid.mismatch.posterior.evidence import evidence_from
+from rotorid.mismatch.posterior.leftover import spectrum_of
+from rotorid.mismatch.posterior.limits import Limit, limits_of
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import problem_of
+from rotorid.mismatch.posterior.score import Posterior
+from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.prepare import training_rule
+from rotorid.mismatch.regression import build
+from rotorid.mismatch.rows import Term
+from rotorid.mismatch.two_sensors import compared_alone
+from rotorid.mismatch.wrench import WrenchModel, block_seconds
+from rotorid.recordings import Vehicle
+
+ROUNDS = 3
+"""Rounds in which the leftover is learnt from what the model leaves."""
+
+
+def absent(model: WrenchModel) -> tuple[Limit, ...]:
+    """Upper limits of the ids that the fitted runs were tested for and that are not at work, the largest first."""
+    effects = [t for t in model.regression.terms if t.kind == "effect"]
+    return limits_of(chosen_already(model), squares_of(model, effects))
+
+
+def chosen_already(model: WrenchModel) -> Found:
+    """The posterior at the model that was chosen, with the leftover that this model leaves."""
+    rate_hz = model.prepared.thinner.rate_hz
+    regression = build(
+        model.rows,
+        model.terms,
+        model.regression.filters,
+        training_rule(model.prepared.split, model.segments),
+        block_seconds(model.rows, rate_hz),
+        rate_hz,
+        model.contributions.noisy,
+        *compared_alone(model.terms, model.rows),
+        by_channel=True,
+    ).without_winds()
+    evidence, prior = evidence_from(regression), Prior()
+    spectrum, active = spectrum_of(evidence), tuple(sorted(model.selection.active))
+    variance = spectrum.variance_of_leftover(np.zeros(len(spectrum.unit)))
+    for _ in range(ROUNDS):
+        posterior = Posterior(problem_of(evidence, spectrum, variance, prior))
+        variance = posterior.leftover_of(active, spectrum)
+    return Found(posterior, active, posterior(active))
+
+
+def squares_of(model: WrenchModel, terms: Sequence[Term]) -> dict[str, np.ndarray]:
+    """To the key of each term what its columns amount to (k, k), as mean squares of shares of the weight."""
+    scale = scales(model.prepared.vehicle)
+    out = {t.key: np.zeros((t.size, t.size)) for t in terms}
+    count = sum(len(r.y) for r in model.rows)
+    for rows in model.rows:
+        for term in terms:
+            x = np.nan_to_num(rows.x[:, :6, model.regression.columns([term.key])]) / scale[:, None]
+            out[term.key] += np.einsum("nci,ncj->ij", x, x) / count
+    return out
+
+
+def scales(vehicle: Vehicle) -> np.ndarray:
+    """The weight, N, and the weight at the rotors' mean distance, N m, of each channel of force and moment, (6,)."""
+    weight_n = vehicle.mass_kg * vehicle.gravity_m_s2
+    arm_m = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).mean())
+    return np.repeat([weight_n, weight_n * arm_m if arm_m > 0 else np.inf], 3)

@@ -1,0 +1,100 @@
+"""What changed between two sets of flights: statements, and limits of all that did not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.mismatch.changes.joint import joint_of
+from rotorid.mismatch.changes.problem import problem_of_changes
+from rotorid.mismatch.decide import relative_change
+from rotorid.mismatch.findings import Estimate, Finding, Status
+from rotorid.mismatch.posterior.limits import Limit, limits_of
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.search import most_probable
+from rotorid.mismatch.posterior.statements import Statement, statements_of
+from rotorid.mismatch.rows import PARAMETER_NAMES
+from rotorid.mismatch.values import believed_value
+from rotorid.recordings import RecordingSet, Vehicle
+
+KEYS = {name: key for key, name in PARAMETER_NAMES.items()}
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something that the second set has otherwise than the first."""
+
+    id: str
+    """Of an effect or of a mistake in the recordings, or the contract's name of a value."""
+    status: Status
+    alternatives: tuple[str, ...]
+    """The whole class, itself included, where the recordings cannot tell which of them changed."""
+    probability: float | None
+    """That it, or one of its class, changed; None of a mistake, which is found before."""
+    parameters: tuple[Estimate, ...]
+    """By how much; of a value relative."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What changed between two sets of flights of one vehicle."""
+
+    base: str
+    new: str
+    changes: tuple[Change, ...]
+    """The surest first."""
+    limits: tuple[Limit, ...]
+    """By how much everything else may have changed at most, with 95 % probability; of a value relative."""
+
+
+def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Comparison:  # noqa: B008
+    """What changed from the first set of flights to the second."""
+    joint = joint_of(base, new)
+    found = most_probable(problem_of_changes(joint.base, joint.new, prior), [()])
+    vehicles = base.vehicle, new.vehicle
+    changes = [
+        Change(s.id, s.status, s.alternatives, s.probability, changes_of(s, *vehicles))
+        for s in statements_of(found)
+        if s.status != "not_established"
+    ]
+    changed = {i for c in changes for i in (c.id, *c.alternatives)}
+    squares = joint.squares | {f"{PARAMETER_NAMES[key]}/changed": own for key, own in joint.value_squares.items()}
+    return Comparison(
+        base=base.name,
+        new=new.name,
+        changes=(*mistakes_that_differ(joint.mistakes_of_base, joint.mistakes_of_new), *changes),
+        limits=tuple(limit for limit in limits_of(found, squares) if limit.id not in changed),
+    )
+
+
+def changes_of(statement: Statement, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
+    """By how much a statement's parameters changed: those of a value relative to what the second vehicle.yaml says."""
+    key = KEYS.get(statement.id)
+    if key is None:
+        return statement.parameters
+    scale = believed_over(key, base, new)
+    ends = ("value", "low", "high")
+    return tuple(
+        replace(p, **{end: scale * relative_change(key, getattr(p, end), 0.0)[0] for end in ends})
+        for p in statement.parameters
+    )
+
+
+def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
+    """The first vehicle's number over the second's, of a value whose column is in units of the first.
+
+    The column of a mass or an inertia is the force or moment itself, whatever was believed.
+    """
+    if key == "arm":
+        size = [float(np.linalg.norm(v.rotor_positions_m()[:, :2])) for v in (base, new)]
+        return size[0] / size[1] if size[1] > 0 else 1.0
+    if key in ("thrust", "torque"):
+        return believed_value(base, key) / believed_value(new, key)
+    return 1.0
+
+
+def mistakes_that_differ(base: tuple[Finding, ...], new: tuple[Finding, ...]) -> tuple[Change, ...]:
+    """Mistakes in the recordings of the second set that the first has not."""
+    known = {f.id for f in base}
+    return tuple(Change(f.id, f.status, f.alternatives, None, f.parameters) for f in new if f.id not in known)

@@ -1,0 +1,138 @@
+"""Two sets of flights on the same columns: the sums of products of each, ready to be weighed against each other.
+
+Model, sensors' noise, whitening and the chain from command to rotor speed are the first set's. What they are wrong by
+is the same in both sets, and cancels where the second is set against the first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.errors import InputError
+from rotorid.mismatch.absent import squares_of
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.fitted import Fitted, fitted
+from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
+from rotorid.mismatch.prepare import assemble_rows, prepare, prepare_like
+from rotorid.mismatch.regression import build
+from rotorid.mismatch.report_runs import as_flown, comparable
+from rotorid.mismatch.rows import Rows
+from rotorid.mismatch.wrench import WrenchModel, block_seconds, model_filters
+from rotorid.recordings import RecordingSet
+
+FORCES = (0, 1, 2)
+"""Channels of the forces."""
+INERTIA_OF = {3: "inertia_xx", 4: "inertia_yy", 5: "inertia_zz"}
+"""Channel of each moment to the inertia that it turns."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Two sets on the same columns."""
+
+    base: Evidence
+    new: Evidence
+    mistakes_of_base: tuple[Finding, ...]
+    mistakes_of_new: tuple[Finding, ...]
+    """Mistakes in the recordings of each set, which were undone before."""
+    squares: dict[str, np.ndarray]
+    """To the key of each effect what its columns amount to in the second set (`absent.squares_of`)."""
+    value_squares: dict[str, np.ndarray]
+    """The same to the key of each believed value."""
+
+
+def joint_of(base: RecordingSet, new: RecordingSet, cutoff_hz: float = 20.0) -> Joint:
+    """Two sets of flights on the same columns.
+
+    Each is held against its own vehicle.yaml: what was changed on purpose and is written there is no change.
+    """
+    base, mistakes_of_base, _ = find_mistakes(replace(base, held_out=()))
+    new, mistakes_of_new, _ = find_mistakes(replace(new, held_out=()))
+    found = fitted(prepare(base, cutoff_hz))
+    model = found.model
+    terms = [t for t in model.terms if not t.run]
+    segments = stretches_of(found, new)
+    if not segments:
+        raise InputError(
+            f"set {new.name}: no stretch has all that {base.name} was fitted by; expected the same columns in both"
+        )
+    keys = [t.key for t in terms]
+    first = as_seen(assemble_rows(model.prepared, terms, model.segments, model.effects), model, keys)
+    second = against_own(assemble_rows(model.prepared, terms, segments, model.effects), model, segments, new)
+    second = as_seen(second, model, keys)
+    known = known_effects(model, keys)
+    base_evidence, new_evidence = (evidence_of_rows(rows, terms, model) for rows in (first, second))
+    held = replace(model, rows=second, regression=new_evidence[1])
+    squares = (squares_of(held, [t for t in terms if t.kind == kind]) for kind in ("effect", "value"))
+    evidence = (with_known_effects(own, known) for own in (base_evidence[0], new_evidence[0]))
+    return Joint(*evidence, mistakes_of_base, mistakes_of_new, *squares)
+
+
+def known_effects(model: WrenchModel, keys: list[str]) -> np.ndarray:
+    """Coefficients (K,) of the effects that the first set's model holds, on the columns of `keys`."""
+    columns, fit = model.regression.columns(keys), model.selection.fit
+    active = set(model.regression.columns(model.selection.active))
+    found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True) if c in active}
+    return np.array([found.get(c, 0.0) for c in columns])
+
+
+def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
+    """Evidence in which another mass or inertia turns all that is known of force and moment into motion.
+
+    Its columns hold the rotors' part alone; a vehicle that is heavier is moved less by its drag, too.
+    """
+    gram, cross = evidence.gram.copy(), evidence.cross.copy()
+    for place, channel in enumerate(evidence.channels):
+        key = "mass" if channel in FORCES else INERTIA_OF.get(int(channel))
+        if key is None or key not in evidence.start:
+            continue
+        turn = np.eye(len(known))
+        turn[:, evidence.start[key]] -= known
+        gram[place] = np.einsum("ki,ekl,lj->eij", turn, gram[place], turn, optimize=True)
+        cross[place] = cross[place] @ turn
+    return replace(evidence, gram=gram, cross=cross)
+
+
+def against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], new: RecordingSet) -> list[Rows]:
+    """Rows of the second set with what its own vehicle leaves of every channel.
+
+    The columns stay those of the first set's vehicle: columns that differ between the sets could be combined into
+    differences that no vehicle has.
+    """
+    if new.vehicle == model.prepared.vehicle:
+        return rows
+    own = assemble_rows(replace(model.prepared, vehicle=new.vehicle), [], segments)
+    return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
+
+
+def stretches_of(found: Fitted, new: RecordingSet) -> list[Segment]:
+    """Stretches of another set with the rotors turning as the first set's chain makes of their commands."""
+    prepared = replace(found.prepared, vehicle=new.vehicle)
+    own, _ = prepare_like(prepared, new)
+    return as_flown([s for s in own if comparable(s, found.model)], found)
+
+
+def as_seen(rows: list[Rows], model: WrenchModel, keys: list[str]) -> list[Rows]:
+    """Rows in which a column says something only in channels where it does in the model's own rows."""
+    columns = model.regression.columns(keys)
+    seen = np.any([np.any(r.x[:, :, columns] != 0.0, axis=0) for r in model.rows], axis=0)
+    return [replace(r, x=r.x * seen) for r in rows]
+
+
+def evidence_of_rows(rows: list[Rows], terms, model: WrenchModel):
+    """The sums of products of some rows, whitened as the model's, and the regression that holds them."""
+    rate_hz = model.prepared.thinner.rate_hz
+    regression = build(
+        rows,
+        terms,
+        model_filters(model),
+        lambda run, time_s: True,
+        block_seconds(rows, rate_hz),
+        rate_hz,
+        by_channel=True,
+    )
+    return evidence_from(regression), regression

@@ -1,0 +1,94 @@
+"""What changed between two sets, in sentences and as JSON."""
+
+from __future__ import annotations
+
+from rotorid.mismatch.changes.compare import Change, Comparison
+from rotorid.mismatch.findings import Estimate
+from rotorid.mismatch.posterior.limits import Limit
+from rotorid.mismatch.rows import PARAMETER_NAMES
+from rotorid.mismatch.words import capital, effect_words, listed, number, parameter_words, percent_words
+
+VALUES = frozenset(PARAMETER_NAMES.values())
+MOST_LIMITS = 4
+"""Things that did not change and are named with their limit; more are counted."""
+
+
+def sentences(found: Comparison) -> list[str]:
+    """One sentence a change, the surest first, and one on what did not change."""
+    out = [change_words(c) for c in found.changes]
+    if not out:
+        out.append(f"Nothing changed from {found.base} to {found.new} as far as these recordings can tell.")
+    return [*out, *([unchanged_words(found.limits)] if found.limits else [])]
+
+
+def change_words(change: Change) -> str:
+    """`The mass changed: +8.3 ± 0.9 % (99.9 %).`"""
+    names = listed([name_words(i) for i in change.alternatives or (change.id,)], "or")
+    sizes = [size_words(p) for p in change.parameters if p.low * p.high > 0]
+    of = f" of {name_words(change.id)}" if change.alternatives and sizes else ""
+    size = f": {listed(sizes)}{of}" if sizes else ""
+    surely = "" if change.probability is None else f" (probability {percent(change.probability)})"
+    verb = "may have changed" if change.status == "suggested" else "changed"
+    return f"{capital(names)} {verb}{size}{surely}."
+
+
+def percent(probability: float) -> str:
+    """A probability as a percentage, 99.9 at most."""
+    return f"{min(99.9, 100 * probability):.3g} %"
+
+
+def name_words(name: str) -> str:
+    """An effect, or a value by its contract name, in words."""
+    return f"the {parameter_words(name)[0]}" if name in VALUES else effect_words(name)
+
+
+def size_words(estimate: Estimate) -> str:
+    """A change with its 95 % interval: of a value in percent of it."""
+    half = 0.5 * (estimate.high - estimate.low)
+    if estimate.symbol in VALUES:
+        return f"{100 * estimate.value:+.1f} ± {100 * half:.1f} %"
+    return f"{estimate.symbol} by {number(estimate.value)} ± {number(half)} {estimate.unit}".rstrip()
+
+
+def unchanged_words(limits: tuple[Limit, ...]) -> str:
+    """What did not change: believed values with their limits, then the effects that may have changed most."""
+    values = [
+        f"{name_words(x.id)} by at most {percent_words(x.at_most)}" for x in limits if x.id in VALUES and x.at_most
+    ]
+    others = [x for x in limits if x.id not in VALUES and x.share > 0]
+    named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of the weight" for x in others[:MOST_LIMITS]]
+    if len(others) > MOST_LIMITS:
+        named.append(f"{len(others) - MOST_LIMITS} others by less")
+    return f"Not changed, with 95 % probability: {listed([*values, *named])}."
+
+
+def as_json(found: Comparison) -> dict:
+    """The comparison as `changes.json` holds it."""
+    return {
+        "base": found.base,
+        "new": found.new,
+        "sentences": sentences(found),
+        "changes": [
+            {
+                "id": c.id,
+                "status": c.status,
+                "alternatives": list(c.alternatives),
+                "probability": c.probability,
+                "parameters": [
+                    {"symbol": p.symbol, "change": p.value, "unit": p.unit, "interval_95": [p.low, p.high]}
+                    for p in c.parameters
+                ],
+            }
+            for c in found.changes
+        ],
+        "unchanged": [
+            {
+                "id": x.id,
+                "symbol": x.symbol,
+                "at_most": x.at_most,
+                "unit": x.unit,
+                "share_of_weight": x.share or None,
+            }
+            for x in found.limits
+        ],
+    }
