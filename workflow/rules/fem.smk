@@ -81,3 +81,64 @@ rule follow_signal_chain:
         "results/logs/follow_signal_chain.log",
     script:
         "../scripts/follow_signal_chain.py"
+
+
+rule chapter_fem:
+    """Figures and tables of the chapter on finite elements."""
+    message:
+        "Chapter fem: figures and tables"
+    input:
+        notebook="notebooks/fem.ipynb",
+        bench=rules.solve_bench.output.bench,
+        loads=rules.solve_bench.output.loads,
+        study=rules.solve_bench.output.meshes,
+        surface=rules.solve_bench.output.surface,
+        benches=rules.vary_bench_sizes.output.benches,
+        judged=rules.vary_bench_sizes.output.statements,
+        checked=rules.verify_elasticity.output.verification,
+        chain=rules.follow_signal_chain.output.chain,
+        variants=rules.follow_signal_chain.output.variants,
+        calibration=rules.calibrate_load_cells.output.coefficients,
+    output:
+        deformation=report(
+            "results/report/fem/deformation.svg",
+            category="Finite elements",
+            caption="../report/captions/fem.rst",
+            labels={"figure": "deformation"},
+        ),
+        stress=report(
+            "results/report/fem/stress.svg",
+            category="Finite elements",
+            caption="../report/captions/fem.rst",
+            labels={"figure": "stress"},
+        ),
+        lines=report(
+            "results/report/fem/lines.svg",
+            category="Finite elements",
+            caption="../report/captions/fem.rst",
+            labels={"figure": "against the load"},
+        ),
+        ratios=report(
+            "results/report/fem/ratios.svg",
+            category="Finite elements",
+            caption="../report/captions/fem.rst",
+            labels={"figure": "over the assumed sizes"},
+        ),
+        sensitivity=report(
+            "results/report/fem/sensitivity.svg",
+            category="Finite elements",
+            caption="../report/captions/fem.rst",
+            labels={"figure": "sensitivity of a cell"},
+        ),
+        verification="results/report/fem/verification.csv",
+        meshes="results/report/fem/meshes.csv",
+        parts="results/report/fem/parts.csv",
+        statements="results/report/fem/statements.csv",
+        chain_steps="results/report/fem/chain_steps.csv",
+    params:
+        code=code_of_chapter("fem"),
+    log:
+        "results/logs/chapter_fem/run.log",
+        notebook="results/logs/chapter_fem/fem.ipynb",
+    script:
+        "../scripts/run_notebook.py"

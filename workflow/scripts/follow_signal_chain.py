@@ -26,10 +26,10 @@ def main(sizes: str, moduli: str, calibration: str, mesh: str, chain: str, varia
     measured = np.array([bridge.from_printed_slope(cell["a1_gf_per_10uv"]) for cell in cells])
     slopes = [cell["a1_gf_per_10uv"] for cell in cells]
     volts, mean = table["volts_per_n"], float(measured.mean())
-    needed = studies.ligament_for(assumed.sizes, modulus, mean, level.chain)
-    electric = assumed.sizes.excitation_v * assumed.sizes.gauge_factor
+    needed = studies.ligament_for(assumed.sizes, modulus, mean, level.sizes)
     result = {
         "computed": table.drop(columns=["size", "end", "value"]).iloc[0].to_dict(),
+        "steps": studies.steps(table.iloc[0], mean, assumed.sizes),
         "excitation_v": assumed.sizes.excitation_v,
         "gauge_factor": assumed.sizes.gauge_factor,
         "ligament_mm": assumed.sizes.cell_ligament_m * 1e3,
@@ -39,8 +39,6 @@ def main(sizes: str, moduli: str, calibration: str, mesh: str, chain: str, varia
         "full_load_share_of_range": float(volts[0] * studies.RATED_N / (2 * wire.REFERENCE_V / wire.GAIN)),
         "measured_slope_gf_per_10uv": [min(slopes), max(slopes)],
         "measured_volts_per_n": [float(measured.min()), float(measured.max())],
-        "measured_counts_per_n": bridge.counts_per_newton(mean),
-        "measured_strain_per_n": mean / electric,
         "measured_rated_mv_per_v": 1e3 * mean * studies.RATED_N / assumed.sizes.excitation_v,
         "factor": float(volts[0] / mean),
         "factor_range": [float(volts.min() / mean), float(volts.max() / mean)],

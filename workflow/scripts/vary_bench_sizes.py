@@ -28,6 +28,7 @@ def main(sizes: str, moduli: str, geometry: str, mesh: str, draws: int, seed: in
     )
     table.to_csv(benches, index=False, float_format="%.6g")
     result = {
+        "fineness": studies.LEVELS[mesh].sizes,
         "benches": len(table),
         "drawn": int((table["end"] == "drawn").sum()),
         "even": statements.EVEN,

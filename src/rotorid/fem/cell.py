@@ -29,7 +29,7 @@ def profile(sizes: Sizes, fineness: float) -> Flat:
         raise InputError("the load cell's holes do not fit into its bar with these sizes")
     angles = np.r_[
         np.linspace(first, np.pi / 2, count(4, fineness) + 1),
-        np.linspace(np.pi / 2, CORNER, count(2, fineness) + 1)[1:],
+        np.linspace(np.pi / 2, CORNER, count(3, fineness) + 1)[1:],
     ]
     arc = np.c_[reach + radius * np.cos(angles), radius * np.sin(angles)]
     # Straight above the hole's axis the lines between hole and surface stand upright: that is the narrow section.
@@ -52,7 +52,7 @@ def profile(sizes: Sizes, fineness: float) -> Flat:
 def mesh(sizes: Sizes, fineness: float) -> Tets:
     """The bar in its own frame."""
     flat = profile(sizes, fineness)
-    across = np.linspace(-0.5, 0.5, count(2, fineness) + 1) * sizes.cell_side_m
+    across = np.linspace(-0.5, 0.5, count(1, fineness) + 2) * sizes.cell_side_m
     layers = np.stack([np.c_[flat.points_m, np.full(len(flat.points_m), z)] for z in across])
     return stacked(layers, flat.triangles)
 

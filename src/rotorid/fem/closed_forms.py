@@ -23,6 +23,7 @@ class Checked:
 
     case: str
     quantity: str
+    """With its unit."""
     fineness: float
     nodes: int
     computed: float
@@ -57,10 +58,10 @@ def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, fo
     shear = 1.2 * force_n * length_m / (BEAM.lame_pa[1] * side_m**2)
     deflection = force_n * length_m**3 / (3 * BEAM.modulus_pa * inertia) + shear
     return [
-        Checked("cantilever", "deflection_m", fineness, len(nodes), float(moved.reshape(3, -1)[2, tip]), deflection),
+        Checked("cantilever", "deflection (m)", fineness, len(nodes), float(moved.reshape(3, -1)[2, tip]), deflection),
         Checked(
             "cantilever",
-            "stress_pa",
+            "stress (Pa)",
             fineness,
             len(nodes),
             float(stress[middle]),
@@ -98,8 +99,8 @@ def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1
     return [
         Checked("plate with a hole", name, fineness, len(nodes), float(component[at].mean()), factor * pull_pa)
         for name, component, at, factor in (
-            ("stress_across_pa", stress[0, 0], above, 3.0),
-            ("stress_along_pa", stress[1, 1], beside, -1.0),
+            ("stress across (Pa)", stress[0, 0], above, 3.0),
+            ("stress along (Pa)", stress[1, 1], beside, -1.0),
         )
     ]
 

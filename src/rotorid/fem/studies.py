@@ -44,8 +44,8 @@ class Levels:
 
 
 LEVELS = {
-    "coarse": Levels(study=(1.0, 1.5, 2.0), sizes=1.0, chain=1.5),
-    "full": Levels(study=(1.0, 1.5, 2.0, 3.0), sizes=1.5, chain=2.0),
+    "coarse": Levels(study=(1.0, 1.5, 2.0), sizes=1.0, chain=2.0),
+    "full": Levels(study=(1.0, 1.5, 2.0, 3.0), sizes=1.5, chain=3.0),
 }
 """By the setting `fem`."""
 
@@ -204,6 +204,19 @@ def _chain(sizes: Sizes, strain_per_n: float) -> dict[str, float]:
     }
 
 
+def steps(computed: Mapping[str, float], volts_per_n: float, sizes: Sizes) -> list[dict[str, str | float]]:
+    """The chain step by step: as computed, and backwards from a calibrated sensitivity [V/N]."""
+    measured = _chain(sizes, volts_per_n / (sizes.excitation_v * sizes.gauge_factor))
+    names = {
+        "strain_per_n": "strain (1/N)",
+        "volts_per_n": "bridge (V/N)",
+        "counts_per_n": "converter (counts/N)",
+        "slope_gf_per_10uv": "slope as in table 2.8 (gf per 10 µV)",
+        "rated_mv_per_v": "at the rated load (mV/V)",
+    }
+    return [{"step": name, "computed": float(computed[key]), "measured": measured[key]} for key, name in names.items()]
+
+
 def ligament_for(sizes: Sizes, moduli_pa: Mapping[str, float], volts_per_n: float, fineness: float) -> float:
     """Thickness of the ligament [m] with which a cell has this sensitivity.
 
@@ -241,10 +254,10 @@ def ranges(table: pd.DataFrame) -> dict[str, list[float]]:
 
 
 def strongest(table: pd.DataFrame, most: int = 3) -> dict[str, list[str]]:
-    """The sizes that move each ratio most from their least to their largest."""
+    """The sizes that move each ratio, and the place of the plate's largest displacement, most."""
     alone = table[table["end"].isin(["low", "high"])]
     found = {}
-    for name in [column for column in table if column.startswith("ratio_")]:
+    for name in [*(column for column in table if column.startswith("ratio_")), "plate_middle_pla"]:
         ends = alone.groupby("size")[name].agg(["min", "max"])
         moved = ends["max"].clip(lower=table[name].iloc[0]) - ends["min"].clip(upper=table[name].iloc[0])
         found[name] = [str(size) for size in moved.nlargest(most).index]

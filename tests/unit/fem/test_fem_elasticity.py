@@ -102,8 +102,8 @@ def test_a_column_that_folds_is_refused() -> None:
 @pytest.mark.parametrize(
     ("case", "finest"),
     [
-        (closed_forms.cantilever, {"deflection_m": 0.0005, "stress_pa": 0.005}),
-        (closed_forms.plate_with_hole, {"stress_across_pa": 0.005, "stress_along_pa": 0.04}),
+        (closed_forms.cantilever, {"deflection (m)": 0.0005, "stress (Pa)": 0.005}),
+        (closed_forms.plate_with_hole, {"stress across (Pa)": 0.005, "stress along (Pa)": 0.04}),
     ],
 )
 def test_closed_forms_are_met_ever_better(case, finest) -> None:
