@@ -100,6 +100,12 @@ rule chapter_fem:
         variants=rules.follow_signal_chain.output.variants,
         calibration=rules.calibrate_load_cells.output.coefficients,
     output:
+        model=report(
+            "results/report/fem/model.svg",
+            category="Finite elements",
+            caption="../report/captions/fem.rst",
+            labels={"figure": "the model"},
+        ),
         deformation=report(
             "results/report/fem/deformation.svg",
             category="Finite elements",

@@ -11,11 +11,15 @@ from rotorid.plots import style
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 NAMES = {"aluminium": "Al-6061", "pla": "PLA"}
 COLOURS = {"aluminium": style.BLUE, "pla": style.RED}
 LEGS = 3
+PARTS = ("upper cell", "lower cell", "A", "B", "C", "D")
+LIGHT = np.array([0.36, -0.48, 0.8])
+"""Direction from which the parts are lit."""
 TICKS_UV_N = (20, 50, 100, 200, 500)
 RATIOS = {
     "ratio_deformation": "deformation",
@@ -24,7 +28,7 @@ RATIOS = {
 }
 
 
-def whole_bench(surface: pd.DataFrame, column: str, factor: float, label: str) -> Figure:
+def whole_bench(surface: pd.DataFrame, column: str, factor: float, label: str, gamma: float = 1.0) -> Figure:
     """The whole bench, once a material, coloured by what a load does to it; each material has a scale of its own.
 
     Parameters
@@ -37,33 +41,72 @@ def whole_bench(surface: pd.DataFrame, column: str, factor: float, label: str) -
         From the column's value to what is shown.
     label
         Quantity and unit.
+    gamma
+        Power of the scale of colours; below 1 small values are told apart.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    from matplotlib.colors import PowerNorm
 
     fig, axes = style.figure(2.8, 1, 2, subplot_kw={"projection": "3d"})
-    corners = 1e3 * np.stack([surface[[f"x_{k}_m", f"y_{k}_m", f"z_{k}_m"]].to_numpy() for k in (1, 2, 3)], axis=1)
-    legs = np.concatenate([corners @ _turn(2 * np.pi / LEGS * leg).T for leg in range(LEGS)])
-    # From above in a right-handed view: y to the left, z upwards.
-    legs = legs * np.array([1.0, -1.0, -1.0])
+    legs = _legs_mm(surface)
     colours = colormaps["viridis"]
     for axis, (end, name) in zip(axes, NAMES.items(), strict=True):
         values = np.tile(surface[f"{column}_{end}"].to_numpy() * factor, LEGS)
-        scale = Normalize(0, values.max())
-        axis.add_collection3d(
-            Poly3DCollection(legs, facecolors=colours(scale(values)), linewidths=0, antialiased=False, rasterized=True)
-        )
-        reach = np.abs(legs[..., :2]).max()
-        axis.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(legs[..., 2].min(), legs[..., 2].max()))
-        axis.set_box_aspect((2 * reach, 2 * reach, np.ptp(legs[..., 2])), zoom=1.6)
-        axis.view_init(elev=28, azim=-62)
-        axis.set_axis_off()
+        scale = PowerNorm(gamma, 0, values.max())
+        _put(axis, legs, colours(scale(values)))
         axis.set_title(name)
         bar = ScalarMappable(scale, colours)
         fig.colorbar(bar, ax=axis, shrink=0.75, pad=0.0, label=label, orientation="horizontal")
     return fig
+
+
+def parts(surface: pd.DataFrame) -> Figure:
+    """What the model is made of: the whole bench, and one leg with its third of plate D, a colour a part."""
+    from matplotlib.colors import to_rgb
+    from matplotlib.patches import Patch
+
+    fig, axes = style.figure(2.9, 1, 2, subplot_kw={"projection": "3d"})
+    legs = _legs_mm(surface)
+    colours = dict(zip(PARTS, style.CYCLE, strict=False))
+    triangles = surface["part"].to_numpy()
+    for axis, number in zip(axes, (LEGS, 1), strict=True):
+        shown = legs[: number * len(triangles)]
+        normal = np.cross(shown[:, 1] - shown[:, 0], shown[:, 2] - shown[:, 0])
+        light = 0.55 + 0.45 * np.abs(normal @ LIGHT) / np.linalg.norm(normal, axis=1)
+        plain = np.array([to_rgb(colours[name]) for name in np.tile(triangles, number)])
+        _put(axis, shown, plain * light[:, None], legs, zoom=1.3)
+    axes[0].set_title("the bench")
+    axes[1].set_title("what is solved")
+    handles = [
+        Patch(color=colour, label=name if "cell" in name else f"piece {name}") for name, colour in colours.items()
+    ]
+    fig.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return fig
+
+
+def _legs_mm(surface: pd.DataFrame) -> np.ndarray:
+    """Triangles of all legs [mm], shape (k, 3, 3), seen from above in a right-handed view: y to the left, z upwards."""
+    corners = np.stack([surface[[f"x_{k}_m", f"y_{k}_m", f"z_{k}_m"]].to_numpy() for k in (1, 2, 3)], axis=1)
+    legs = np.concatenate([1e3 * corners @ _turn(2 * np.pi / LEGS * leg).T for leg in range(LEGS)])
+    return legs * np.array([1.0, -1.0, -1.0])
+
+
+def _put(
+    axis: Axes, triangles: np.ndarray, colours: np.ndarray, within: np.ndarray | None = None, zoom: float = 1.6
+) -> None:
+    """Draw triangles in space, in a frame that holds those of `within`."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    axis.add_collection3d(
+        Poly3DCollection(triangles, facecolors=colours, linewidths=0, antialiased=False, rasterized=True)
+    )
+    frame = triangles if within is None else within
+    reach, low, high = np.abs(frame[..., :2]).max(), frame[..., 2].min(), frame[..., 2].max()
+    axis.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(low, high))
+    axis.set_box_aspect((2 * reach, 2 * reach, high - low), zoom=zoom)
+    axis.view_init(elev=28, azim=-62)
+    axis.set_axis_off()
 
 
 def _turn(angle: float) -> np.ndarray:
