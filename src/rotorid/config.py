@@ -191,7 +191,7 @@ class FemSettings(Section):
     """Finite elements of the load-cell bench."""
 
     mesh: Literal["coarse", "full"] = Field(
-        description="How fine the meshes are: coarse takes some 15 s, full some minutes [coarse or full]."
+        description="How fine the meshes are: coarse takes some 20 s, full some minutes [coarse or full]."
     )
     draws: int = Field(ge=0, le=10_000, description="Benches with all assumed sizes drawn at once [1].")
     seed: int = Field(ge=0, description="Seed of these draws [1].")

@@ -161,10 +161,14 @@ class Body:
 
     def gradients(self, displacement_m: np.ndarray) -> np.ndarray:
         """∂u_a/∂x_b at the nodes of each tetrahedron, shape (3, 3, m, 10), from displacements, shape (3 n,)."""
-        at_nodes = self.basis.elem.doflocs.T
-        basis = Basis(self.mesh, ElementTetP2(), quadrature=(at_nodes, np.full(at_nodes.shape[1], 0.1)))
         parts = displacement_m.reshape(3, -1)
-        return np.array([np.asarray(basis.interpolate(component).grad) for component in parts])
+        return np.array([np.asarray(self._at_nodes.interpolate(component).grad) for component in parts])
+
+    @cached_property
+    def _at_nodes(self) -> Basis:
+        """The same shape functions, looked at in the nodes; its weights are of no use."""
+        places = self.basis.elem.doflocs.T
+        return Basis(self.mesh, ElementTetP2(), quadrature=(places, np.full(places.shape[1], 0.1)))
 
     def stress(self, displacement_m: np.ndarray, materials: Mapping[str, Material]) -> np.ndarray:
         """Stress at the nodes [Pa], shape (3, 3, n): mean over the tetrahedra that meet there."""

@@ -90,10 +90,14 @@ class Bench:
         height = -self.leg.seat_m
         return self.body.mesh.facets_satisfying(lambda x: np.abs(x[2] - height) < 1e-9, boundaries_only=True)
 
+    @cached_property
+    def load(self) -> np.ndarray:
+        """Nodal forces [N], shape (3 n,), of this leg's share of 1 N downwards on the seat."""
+        return self.body.traction(self.seat, DOWN / LEGS)
+
     def solve(self, of: Mapping[str, Material]) -> Solved:
         """Displacements and equivalent stresses of a bench of these materials (`cells`, `pieces`)."""
-        load = self.body.traction(self.seat, DOWN / LEGS)
-        moved = elasticity.solve(self.body.stiffness(of), self.binding, load[:, None])[:, 0]
+        moved = elasticity.solve(self.body.stiffness(of), self.binding, self.load[:, None])[:, 0]
         stress = elasticity.von_mises(self.body.stress(moved, of))
         return Solved(moved.reshape(3, -1).T, stress)
 
