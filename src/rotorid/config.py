@@ -187,6 +187,16 @@ class BenchSettings(Section):
     reference_noise_n: float = Field(ge=0, le=10, description="Believed one-sigma noise of the reference sensor [N].")
 
 
+class FemSettings(Section):
+    """Finite elements of the load-cell bench."""
+
+    mesh: Literal["coarse", "full"] = Field(
+        description="How fine the meshes are: coarse takes some 20 s, full some minutes [coarse or full]."
+    )
+    draws: int = Field(ge=0, le=10_000, description="Benches with all assumed sizes drawn at once [1].")
+    seed: int = Field(ge=0, description="Seed of these draws [1].")
+
+
 class StandSettings(Section):
     """The vehicle on the six-axis sensor."""
 
@@ -424,6 +434,7 @@ class Config(Section):
     raw: Text = Field(description="Folder of the raw logs, with sessions.tsv [path].")
     filter: Filters = Field(description="Filters of the bench's instruments.")
     bench: BenchSettings = Field(description="The load-cell bench.")
+    fem: FemSettings = Field(description="Finite elements of the load-cell bench.")
     stand: StandSettings = Field(description="The vehicle on the six-axis sensor.")
     rotor: RotorSettings = Field(description="Thrust coefficients from stand runs.")
     residuals: Residuals = Field(description="Rigid-body residuals of the NeuroBEM flights.")

@@ -42,6 +42,7 @@ def typed(text: str) -> list[str]:
 # Numbers that say how something was made or what the thesis states, and that no file of a result holds.
 STATED = {
     "bench": {"1", "3", "5"},  # names of cells
+    "fem": {"1", "2", "3", "4", "5", "6"},  # names of cells
     "instruments": {"1", "2", "3", "4", "5", "6", "45"},  # names of cells; their inclination
     "loadcell": {"1"},  # the largest correlation coefficient there is
     "stand": {"15", "30", "48", "0"},  # tilts and number of the thesis's experiments; a believed offset of nothing
