@@ -46,6 +46,8 @@ class Imported:
     axes: str
     known: Known = Known("")
     kind: str = "flight"
+    speed_unit: str = "rad/s"
+    """Unit in which the log states rotor speeds."""
 
 
 def is_bag(path: Path) -> bool:
@@ -118,15 +120,15 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)
         axes = "body forward-left-up, turned by half a turn about x into FRD"
-        return Imported(kind, runs, tuple(faults), axes, Known("betaflight"))
+        return Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm")
     if kind == "ardupilot":
         runs, faults, order = ardupilot.read_ardupilot(path)
         axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
-        return Imported(kind, runs, tuple(faults), axes, Known(order))
+        return Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm")
     if kind == "ros":
-        runs, faults = ros.read_ros(path)
+        runs, faults, unit = ros.read_ros(path)
         axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
-        return Imported(kind, runs, tuple(faults), axes)
+        return Imported(kind, runs, tuple(faults), axes, speed_unit=unit)
     if kind == "neurobem":
         table, faults = neurobem.read_neurobem(path)
         return Imported(kind, {path.stem: table}, tuple(faults), "NeuroBEM's, turned into FRD and NED")
@@ -135,7 +137,9 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
         axes = "thrust along -z of the body"
         return Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
     table, faults, axes = read_by_mapping(path, mapping)
-    return Imported(kind, {_stem(path): table}, tuple(faults), axes)
+    speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
+    unit = (speeds.unit if speeds else "") or "rad/s"
+    return Imported(kind, {_stem(path): table}, tuple(faults), axes, speed_unit=unit)
 
 
 def _stem(path: Path) -> str:
@@ -170,7 +174,7 @@ def _px4(path: Path) -> Imported:
     if not runs:
         raise InputError(f"{path}: next to no samples of its {len(flights)} flights are there")
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
-    return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known)
+    return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known, speed_unit="rpm")
 
 
 def _why_no_flight(converted: px4_ulog.Converted, time_s: np.ndarray) -> str:
@@ -190,4 +194,4 @@ def _why_no_flight(converted: px4_ulog.Converted, time_s: np.ndarray) -> str:
 def _crazyflie(path: Path) -> Imported:
     runs, faults = crazyflie.flights(path)
     axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
-    return Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"))
+    return Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")
