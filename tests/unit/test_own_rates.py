@@ -106,6 +106,15 @@ def test_a_hole_of_several_periods_stays_one_and_what_is_even_stays_as_it_is(flo
         sufficient(replace(flown, runs=(replace(flown.runs[0], table=bursts),)))
 
 
+def test_a_sensor_of_next_to_no_readings_is_left_alone(flown: RecordingSet) -> None:
+    holed = with_holes(flown, 0.5, False)
+    table = holed.runs[1].table.copy()
+    table.loc[table.index > 30, list(c.VELOCITY)] = np.nan
+    made = on_own_rates(replace(holed, runs=(holed.runs[0], replace(holed.runs[1], table=table))))
+    assert made.runs[1].table[list(c.VELOCITY)].equals(table[list(c.VELOCITY)])
+    assert not made.runs[0].table[list(c.VELOCITY)].equals(holed.runs[0].table[list(c.VELOCITY)])
+
+
 def test_signs_of_quaternions_with_empty_cells_stay_on_one_side() -> None:
     rng = np.random.default_rng(2)
     angle = np.linspace(0, 8, 400)

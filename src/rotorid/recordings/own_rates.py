@@ -51,7 +51,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     kinds = ("rotor_speed", "rotor_command", "throttle")
     rotors = [c.rotor_columns(kind, recordings.vehicle.rotor_count) for kind in kinds]
     sensors = (*rotors, c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, (c.HEIGHT,))
-    there = {names: [run for run in recordings.runs if names and run.has(*names)] for names in sensors}
+    there = {names: [run for run in recordings.runs if is_read(run, names)] for names in sensors}
     scattered = [names for names, runs in there.items() if any(is_scattered(run, names) for run in runs)]
     if not any(cut_by_chance(run, names) for names in scattered for run in there[names]):
         return recordings
@@ -60,7 +60,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     for run in recordings.runs:
         new = {}
         for names, period in periods.items():
-            if run in there[names]:
+            if is_read(run, names):
                 values = evenly(run, names, period, jumps=names in rotors)
                 new |= dict(zip(names, values.T, strict=True))
         runs.append(replace(run, table=run.table.assign(**new)))
@@ -89,10 +89,15 @@ def noise_gain(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -
     return float(np.sqrt(np.nanvar(made) * between / step))
 
 
+def is_read(run: Run, names: tuple[str, ...]) -> bool:
+    """Whether each column of a sensor has enough readings to tell how they come."""
+    return bool(names) and all(np.isfinite(run.column(name)).sum() > LEAST_READINGS for name in names)
+
+
 def _steps_s(run: Run, names: tuple[str, ...]) -> list[np.ndarray]:
     """Steps between the readings of each column, s, without holes."""
     steps = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
-    return [s[s <= LONGEST_USUAL * np.median(s)] if len(s) else s for s in steps]
+    return [s[s <= LONGEST_USUAL * np.median(s)] for s in steps]
 
 
 def _whole_steps_s(run: Run, names: tuple[str, ...]) -> np.ndarray:
@@ -103,8 +108,6 @@ def _whole_steps_s(run: Run, names: tuple[str, ...]) -> np.ndarray:
 def cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a rule in usual steps cuts a sensor where no column of it has a hole of several of its own periods."""
     steps = _steps_s(run, names)
-    if min(map(len, steps)) < LEAST_READINGS:
-        return False
     whole = _whole_steps_s(run, names)
     cuts = int((whole > HOLE_PERIODS * np.median(whole)).sum()) if len(whole) else len(run.time_s)
     every = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
@@ -115,15 +118,13 @@ def cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
 def is_scattered(run: Run, names: tuple[str, ...]) -> bool:
     """Whether the readings of a sensor come unevenly, or its columns not in the same rows."""
     steps = _steps_s(run, names)
-    if min(map(len, steps)) < LEAST_READINGS:
-        return False
     uneven = max(float((s > LONG_STEP * np.median(s)).mean()) for s in steps)
     return uneven > SCATTERED or len(_whole_steps_s(run, names)) < (1 - SCATTERED) * min(map(len, steps))
 
 
 def own_period_s(run: Run, names: tuple[str, ...]) -> float:
     """The step that covers nearly all steps between readings that come at random, s: what such a sensor resolves."""
-    return max(max(float(np.quantile(s, COVERED)), float(s.mean())) for s in _steps_s(run, names) if len(s))
+    return max(max(float(np.quantile(s, COVERED)), float(s.mean())) for s in _steps_s(run, names))
 
 
 def evenly(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -> np.ndarray:
