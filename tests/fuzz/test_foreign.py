@@ -15,8 +15,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rotorid.importers.guessing.guess import guess
 from rotorid.importers.logfile import read_log
-from rotorid.importers.mapping import guess, read_columns
+from rotorid.importers.mapping import read_columns
 from tests.fuzz.foreign import SOUND, look, sound
 
 NEEDS = {"log.bbl": "orangebox", "log.bin": "pymavlink", "log.bag": "rosbags", "log.mcap": "rosbags"}
@@ -31,7 +32,7 @@ def test_the_sound_ones_are_read(name: str, tmp_path: Path) -> None:
     pytest.importorskip(NEEDS.get(name, "rotorid"))
     path = tmp_path / name
     path.write_bytes(sound(name))
-    mapping = guess(read_columns(path))[0] if name == "other.csv" else None
+    mapping = guess(read_columns(path)).mapping if name == "other.csv" else None
     assert all(len(table) > 3 for table in read_log(path, mapping).runs.values())
 
 

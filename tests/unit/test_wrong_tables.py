@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from rotorid.cli import app
 from rotorid.errors import InputError
-from rotorid.importers.mapping import Mapping, guess, read_by_mapping, read_columns
+from rotorid.importers.guessing.guess import guess
+from rotorid.importers.mapping import Mapping, read_by_mapping, read_columns
 from rotorid.recordings import read_set
 from tests.unit.wrong_inputs import LINES, RUN, SPEEDS, WIDTH, table
 
@@ -97,9 +98,9 @@ def test_text_that_no_channel_names_is_no_fault_and_the_proposal_says_what_it_le
     table().assign(mode="HOVER", armed=True).to_csv(path, index=False)
     found, _, _ = read_by_mapping(path, MAPPING)
     assert found["angular_velocity_x_rad_s"].notna().all()
-    mapping, doubts = guess(read_columns(path))
-    assert "mode" not in mapping.keep and "armed" in mapping.keep
-    assert any(re.search(r"column mode: .*'HOVER'", doubt) for doubt in doubts)
+    found = guess(read_columns(path))
+    assert "mode" not in found.mapping.keep and "armed" in found.mapping.keep
+    assert any(re.search(r"column mode: .*'HOVER'", sentence) for sentence in found.left_out)
 
 
 def test_a_parquet_is_read_by_the_same_rules(tmp_path: Path) -> None:

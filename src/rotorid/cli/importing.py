@@ -97,23 +97,37 @@ def _as_dict(made: Made, durations: dict[str, float], refused: str) -> dict:
 
 
 def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
+    from rotorid.importers.guessing.guess import guess
+    from rotorid.importers.guessing.text import as_text
     from rotorid.importers.logfile import format_of
-    from rotorid.importers.mapping import as_text, guess, read_columns
+    from rotorid.importers.mapping import read_columns
 
     if target.exists():
         raise InputError(f"{target} is there already; choose another name")
     if format_of(logs[0]) not in ("csv", "parquet"):
         raise InputError(f"{logs[0]}: its columns are known, no mapping is needed")
-    mapping, doubts = guess(read_columns(logs[0]))
-    target.write_text(as_text(mapping, doubts, logs[0].name), encoding="utf-8")
+    found = guess(read_columns(logs[0]))
+    target.write_text(as_text(found, logs[0].name), encoding="utf-8")
+    channels = found.mapping.channels
     if as_json:
-        found = {"mapping": str(target), "channels": list(mapping.channels), "doubts": list(doubts)}
-        typer.echo(json.dumps(found, indent=1, ensure_ascii=False))
+        said = {
+            "mapping": str(target),
+            "channels": list(channels),
+            "evidence": found.evidence,
+            "open": found.open,
+            "left_out": list(found.left_out),
+        }
+        typer.echo(json.dumps(said, indent=1, ensure_ascii=False))
         return
-    typer.echo(f"{target}: {len(mapping.channels)} channels recognised ({', '.join(mapping.channels)})")
-    for doubt in doubts:
-        typer.echo(f"  - {doubt}")
-    typer.echo(f"Next: look through it, then `rotorid import {logs[0]} --mapping {target} --like NAME --mass-kg KG`")
+    typer.echo(f"{target}: {len(channels)} channels recognised ({', '.join(channels)})")
+    for name, why in found.evidence.items():
+        typer.echo(f"  - {name}: {why}")
+    for sentence in found.left_out:
+        typer.echo(f"  - {sentence}")
+    for name, question in found.open.items():
+        typer.echo(f"  ? {name}: {question}")
+    first = f"answer what is open ('?') in it ({', '.join(found.open)})" if found.open else "look through it"
+    typer.echo(f"Next: {first}, then `rotorid import {logs[0]} --mapping {target} --like NAME --mass-kg KG`")
 
 
 def make_set(

@@ -7,8 +7,8 @@ by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX` (the thr
 position are the estimator's. Older firmware (3.3-dev) counts time in `TimeMS` and numbers outputs as `Ch1`. Its events
 have no clock and take the time of the message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
-The land detector calls idle, spool-up and the wait after landing flight: what the throttle and the specific force show
-to be on the ground is left out (`in_the_air.off_the_ground`).
+The land detector calls idle, spool-up and the wait after landing flight: what is on the ground by the detector of all
+importers (`in_the_air.airborne`) is left out.
 
 Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`,
 `MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0.
@@ -156,19 +156,12 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         put((c.HEIGHT,), below[(below["Stat"] == GOOD) & (below["Orient"] == DOWN)], ("Dist",))
     throttles, channels, more = _throttles(log, parameters(log))
     faults += more
-    drive = None
     if throttles is not None:
         parts.append((c.rotor_columns("throttle", len(channels)), *throttles))
-        speeds = _speeds(log.get("ESC"), channels, grid, faults)
-        parts += speeds
-        drive = in_the_air.on_grid(grid, *throttles)
+        parts += _speeds(log.get("ESC"), channels, grid, faults)
     table = in_the_air.table_on(grid, parts)
-    flying = _flying(log, grid, drive)
-    if drive is not None and set(c.SPECIFIC_FORCE) <= set(table):
-        force, stated = table[list(c.SPECIFIC_FORCE)].to_numpy(float), flying
-        flying = in_the_air.off_the_ground(stated, drive, force, grid)
-        faults += _ground(stated, flying, grid)
-    return table, [*faults, *report_gaps(table)], flying
+    flying, ground = in_the_air.airborne(table, _flying(log, grid))
+    return table, [*faults, *ground, *report_gaps(table)], flying
 
 
 def _throttles(log: Log, values: Mapping[str, float]):
@@ -250,8 +243,8 @@ def _speeds(esc: pd.DataFrame | None, channels: tuple[int, ...], grid: np.ndarra
     return found
 
 
-def _flying(log: Log, grid: np.ndarray, drive: np.ndarray | None) -> np.ndarray:
-    """Rows in the air: by the land detector's events, else by the throttles."""
+def _flying(log: Log, grid: np.ndarray) -> np.ndarray | None:
+    """Rows in the air by the land detector's events; None where there are none."""
     events = log.get("EV")
     if events is not None and "Id" in events:
         events = events[events["Id"].isin((LANDED, FLYING))]
@@ -259,20 +252,7 @@ def _flying(log: Log, grid: np.ndarray, drive: np.ndarray | None) -> np.ndarray:
             times, ups = events[c.TIME].to_numpy(float), (events["Id"] == FLYING).to_numpy()
             index = np.searchsorted(times, grid, side="right") - 1
             return np.where(index >= 0, ups[np.maximum(index, 0)], False)
-    return np.ones(len(grid), bool) if drive is None else in_the_air.driven(drive)
-
-
-def _ground(stated: np.ndarray, flying: np.ndarray, grid: np.ndarray) -> list[Fault]:
-    """What is on the ground of the flight that a log states; masks and times (s) of rows (n,)."""
-    lost = int((stated & ~flying).sum())
-    if not lost:
-        return []
-    lasts = np.minimum(np.diff(grid, append=grid[-1]), in_the_air.LONGEST_PAUSE_S)  # the clock stops between flights
-    found = (
-        f"{lasts[stated & ~flying].sum():.0f} s of {lasts[stated].sum():.0f} s that the log calls flight are on the "
-        f"ground (throttle below {in_the_air.NEAR_WEIGHT:g} of that of flight, specific force of 1 g)"
-    )
-    return [Fault("on_ground", c.TIME, found, "left out", lost)]
+    return None
 
 
 def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:

@@ -142,7 +142,7 @@ def convert(
         if field in raw and _version(headers) >= FIRST_IN_HUNDREDTHS and raw[field].max() > 0:
             table[column] = raw[field].to_numpy(float) / 100
     faults += report_gaps(table)
-    runs, cuts = in_the_air.flights(table, in_the_air.driven(throttle), name, where)
+    runs, cuts = in_the_air.flights(table, in_the_air.airborne(table)[0], name, where)
     return runs, [*faults, *cuts]
 
 

@@ -8,6 +8,7 @@ multiples of 9.81 m/s², motors fractions of 65,536.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from rotorid.errors import InputError
 from rotorid.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
 from rotorid.importers.crazyflie_usd import read_usd_log
 from rotorid.importers.frames import continuous, half_turn_about_x, quaternion_to_frd_ned
+from rotorid.importers.in_the_air import airborne, stretches_of
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
 
@@ -104,12 +106,22 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
 
 
 def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0) -> list[tuple[float, float]]:
-    """Start and stop of every flight in a log: motors above 30 % and, where known, 0.1 m off the ground."""
+    """Start and stop of every flight in a log: motors above 30 % and, where known, 0.1 m off the ground.
+
+    The public recordings are cut so, with a second at each end, wherever a log begins or ends.
+    """
     flying = table[THROTTLES].mean(axis=1).to_numpy() > 0.3
     if "position_z_m" in table:
         flying &= -table["position_z_m"].to_numpy() > 0.1
     time = table[c.TIME].to_numpy()
     return [(a + margin_s, b - margin_s) for a, b in true_stretches(flying, time, shortest_s)]
+
+
+def flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
+    """Start and stop of every flight of a log by the detector of all importers, take-off and landing left out."""
+    height = {} if "position_z_m" not in table else {c.HEIGHT: -table["position_z_m"]}
+    flying, _ = airborne(table.assign(**height))
+    return stretches_of(table[c.TIME].to_numpy(float), flying)
 
 
 def sensor_faults(table: pd.DataFrame) -> list[Fault]:
@@ -148,11 +160,14 @@ def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.D
 
 
 def flights(
-    path: Path, prefix: str | None = None, stretches: list[tuple[float, float]] | None = None
+    path: Path,
+    prefix: str | None = None,
+    stretches: list[tuple[float, float]] | None = None,
+    detect: Callable[[pd.DataFrame], list[tuple[float, float]]] = flown_stretches,
 ) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
     """Every flight of a uSD log by name (`prefix`, default the file's), and the faults of log and flights.
 
-    `stretches` (start and stop, s) in place of what is found to be in the air. InputError where the log holds no
+    `stretches` (start and stop, s) in place of what `detect` finds to be in the air. InputError where the log holds no
     event `fixedFrequency` or the vehicle never flies.
     """
     path = Path(path)
@@ -164,7 +179,7 @@ def flights(
     missing = [name for name in THROTTLES if name not in table]
     if missing and not stretches:
         raise InputError(f"{path}: motor.m1 to motor.m4 are not logged, so that nothing tells when the vehicle flies")
-    stretches = stretches or in_the_air(table)
+    stretches = stretches or detect(table)
     if not stretches:
         raise InputError(f"{path}: the vehicle never flies for 4 s in this log")
     runs: dict[str, pd.DataFrame] = {}

@@ -33,6 +33,8 @@ class Known:
     torque_over_thrust_m: float | None = None
     where: str = ""
     """Where the log states the rotors, in words."""
+    directions: tuple[Rotor, ...] | None = None
+    """Rotors whose places hold directions alone: the log's geometry was never set."""
 
 
 def quad_x(order: str, x_m: float, y_m: float) -> tuple[Rotor, ...]:
@@ -45,6 +47,7 @@ def quad_x(order: str, x_m: float, y_m: float) -> tuple[Rotor, ...]:
 def px4_vehicle(parameters: Mapping[str, float], rotors: int) -> tuple[Known, list[Fault]]:
     """Places, turning senses and torque ratio of PX4's control allocation (`CA_ROTOR*`), where a log holds them.
 
+    Places of ±1 m are what a generic airframe has until somebody sets them: they are directions, not distances.
     A positive `CA_ROTORi_KM` is a rotor that turns counter-clockwise seen from above.
     """
     keys = [[f"CA_ROTOR{i}_{k}" for k in ("PX", "PY", "PZ", "KM")] for i in range(rotors)]
@@ -62,4 +65,7 @@ def px4_vehicle(parameters: Mapping[str, float], rotors: int) -> tuple[Known, li
         Rotor(x_m=round(x, 6), y_m=round(y, 6), z_m=round(z, 6), spin="ccw" if k > 0 else "cw") for x, y, z, k in values
     )
     ratio = sum(abs(k) for *_, k in values) / rotors
-    return Known("px4", rotor, round(ratio, 6) or None, "CA_ROTOR* of the log's parameters"), faults
+    where = "CA_ROTOR* of the log's parameters"
+    if all(abs(v) in (0.0, 1.0) for x, y, *_ in values for v in (x, y)):
+        return Known("px4", None, round(ratio, 6) or None, where, directions=rotor), faults
+    return Known("px4", rotor, round(ratio, 6) or None, where), faults

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from rotorid.bounds import LARGEST_FILE
 from rotorid.errors import InputError
-from rotorid.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
-from rotorid.importers.clean import true_stretches
+from rotorid.importers import ardupilot, betaflight, crazyflie, in_the_air, neurobem, px4_ulog, rcbenchmark, ros
 from rotorid.importers.known import Known, px4_vehicle
 from rotorid.importers.mapping import Mapping, read_by_mapping
 from rotorid.importers.readers import limited, silent
@@ -19,10 +17,6 @@ from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
 from rotorid.text_files import check_file
 from rotorid.wording import printable
-
-SHORTEST_FLIGHT_S = 4.0
-AFTER_TAKE_OFF_S = 1.0
-BEFORE_LANDING_S = 0.5
 
 GZIP = b"\x1f\x8b"
 BY_FIRST_BYTES = (
@@ -46,6 +40,8 @@ class Imported:
     axes: str
     known: Known = Known("")
     kind: str = "flight"
+    speed_unit: str = "rad/s"
+    """Unit in which the log states rotor speeds."""
 
 
 def is_bag(path: Path) -> bool:
@@ -118,15 +114,15 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)
         axes = "body forward-left-up, turned by half a turn about x into FRD"
-        return Imported(kind, runs, tuple(faults), axes, Known("betaflight"))
+        return Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm")
     if kind == "ardupilot":
         runs, faults, order = ardupilot.read_ardupilot(path)
         axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
-        return Imported(kind, runs, tuple(faults), axes, Known(order))
+        return Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm")
     if kind == "ros":
-        runs, faults = ros.read_ros(path)
+        runs, faults, unit = ros.read_ros(path)
         axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
-        return Imported(kind, runs, tuple(faults), axes)
+        return Imported(kind, runs, tuple(faults), axes, speed_unit=unit)
     if kind == "neurobem":
         table, faults = neurobem.read_neurobem(path)
         return Imported(kind, {path.stem: table}, tuple(faults), "NeuroBEM's, turned into FRD and NED")
@@ -135,7 +131,18 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
         axes = "thrust along -z of the body"
         return Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
     table, faults, axes = read_by_mapping(path, mapping)
-    return Imported(kind, {_stem(path): table}, tuple(faults), axes)
+    runs, cuts = _in_the_air(table, _stem(path), path)
+    speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
+    unit = (speeds.unit if speeds else "") or "rad/s"
+    return Imported(kind, runs, (*faults, *cuts), axes, speed_unit=unit)
+
+
+def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    """The flights of a table in contract columns; the table as it is where all of it is in the air, or of a stand."""
+    if set(table) & {*c.FORCE, *c.MOMENT}:
+        return {name: table}, []
+    flying, _ = in_the_air.airborne(table)
+    return ({name: table}, []) if flying.all() else in_the_air.flights(table, flying, name, path)
 
 
 def _stem(path: Path) -> str:
@@ -149,45 +156,13 @@ def _px4(path: Path) -> Imported:
         converted = px4_ulog.convert(log, rotors)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    time_s = converted.table[c.TIME].to_numpy(float)
-    margin = AFTER_TAKE_OFF_S + BEFORE_LANDING_S
-    flights = true_stretches(converted.flying, time_s, SHORTEST_FLIGHT_S + margin)
-    if not flights:
-        raise InputError(f"{path}: {_why_no_flight(converted, time_s)}")
     known, faults = px4_vehicle(log.parameters, rotors)
-    runs, cuts = {}, []
-    for number, (start, stop) in enumerate(flights, 1):
-        name = path.stem if len(flights) == 1 else f"{path.stem}_{number}"
-        first, last = start + AFTER_TAKE_OFF_S, stop - BEFORE_LANDING_S
-        inside = (time_s >= first) & (time_s <= last)
-        if inside.sum() < 2:
-            continue
-        table = converted.table[inside].reset_index(drop=True)
-        table[c.TIME] -= table[c.TIME].iloc[0]
-        runs[name] = table.dropna(axis=1, how="all")
-        found = f"in the air from {start:.2f} to {stop:.2f} s of {time_s[-1]:.0f} s"
-        cuts.append(Fault("cut", c.TIME, found, f"{first:.2f} to {last:.2f} s kept", int((~inside).sum()), name))
-    if not runs:
-        raise InputError(f"{path}: next to no samples of its {len(flights)} flights are there")
+    runs, cuts = in_the_air.flights(converted.table, converted.flying, path.stem, path)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
-    return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known)
-
-
-def _why_no_flight(converted: px4_ulog.Converted, time_s: np.ndarray) -> str:
-    """Why nothing of a log is kept, in words."""
-    longest = max((b - a for a, b in true_stretches(converted.flying, time_s, 0.0)), default=0.0)
-    if longest > 0:
-        return (
-            f"the longest stretch in the air is {longest:.1f} s, at least {SHORTEST_FLIGHT_S:g} s beyond take-off and "
-            "landing are needed"
-        )
-    throttles = [n for n in converted.table.columns if n.startswith("throttle_")]
-    if throttles and not (converted.table[throttles] > 0.05).any().any():
-        return f"the vehicle never flies in this log of {time_s[-1]:.0f} s: no motor is ever driven"
-    return f"the vehicle is never armed and in the air in this log of {time_s[-1]:.0f} s"
+    return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known, speed_unit="rpm")
 
 
 def _crazyflie(path: Path) -> Imported:
     runs, faults = crazyflie.flights(path)
     axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
-    return Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"))
+    return Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")

@@ -139,6 +139,17 @@ def _rotors(known: Known, template: Vehicle, template_name: str, remarks: list[s
     if known.rotors is not None:
         return known.rotors, known.where
     first = template.rotors[0]
+    if known.directions is not None:
+        scale = _arm(template.rotors) / _arm(known.directions)
+        remarks.append(
+            f"the rotors' order and turning senses are {known.where}, which states directions alone (±1 m is unset); "
+            f"their distances are those of template {template_name}: measure them"
+        )
+        rotors = tuple(
+            r.model_copy(update={"x_m": round(r.x_m * scale, 6), "y_m": round(r.y_m * scale, 6)})
+            for r in known.directions
+        )
+        return rotors, f"PROPOSED: directions by {known.where}, distances of template {template_name}"
     if known.autopilot in ORDERS and template.rotor_count == 4:
         remarks.append(
             f"the rotors' order and turning senses are those of {known.autopilot}, their places of "
@@ -148,6 +159,11 @@ def _rotors(known: Known, template: Vehicle, template_name: str, remarks: list[s
         return rotors, f"PROPOSED: order of {known.autopilot}, places of template {template_name}"
     remarks.append(f"the rotors' places, order and turning senses are those of template {template_name}")
     return template.rotors, f"PROPOSED: template {template_name}; check order and turning senses"
+
+
+def _arm(rotors) -> float:
+    """Mean distance of rotors from the centre, m."""
+    return float(np.mean([np.hypot(r.x_m, r.y_m) for r in rotors]))
 
 
 def _place_words(rotors) -> list[str]:
@@ -185,17 +201,20 @@ def _thrust(tables, mass: float, limit: float | None, template: Vehicle, count: 
 
 
 def thrust_coefficient(
-    tables: Sequence[pd.DataFrame], mass_kg: float, rotors: int, full_speed_rad_s: float | None = None
+    tables: Sequence[pd.DataFrame],
+    mass_kg: float,
+    rotors: int,
+    full_speed_rad_s: float | None = None,
+    kind: str = "rotor_speed",
 ) -> float | None:
     """C_F in N s2 that carries the vehicle: median of m (−f_z) / Σω² over calm instants, None where nothing says it.
 
-    `full_speed_rad_s` turns throttles into speeds where no speed is recorded. Without an accelerometer the thrust is
-    taken to carry the weight on average.
+    `kind` names the columns of speeds; `full_speed_rad_s` turns throttles into speeds where none is recorded. Without
+    an accelerometer the thrust is taken to carry the weight on average.
     """
     ratios: list[np.ndarray] = []
     for table in tables:
-        kind = "rotor_speed" if full_speed_rad_s is None else "throttle"
-        names = list(c.rotor_columns(kind, rotors))
+        names = list(c.rotor_columns(kind if full_speed_rad_s is None else "throttle", rotors))
         if not set(names) <= set(table.columns):
             continue
         drive = table[[c.TIME, *names]].dropna()

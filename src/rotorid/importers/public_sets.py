@@ -57,7 +57,7 @@ def _neurobem(path: Path, name: str) -> Runs:
 
 def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> Runs:
     """Flights of a uSD log, each with the faults of the whole log and its own."""
-    tables, faults = crazyflie.flights(path, prefix, stretches)
+    tables, faults = crazyflie.flights(path, prefix, stretches, crazyflie.in_the_air)
     return {run: (table, [f for f in faults if f.run in ("", run)]) for run, table in tables.items()}
 
 

@@ -20,6 +20,7 @@ import pandas as pd
 from pyulog import ULog
 
 from rotorid.errors import InputError
+from rotorid.importers import in_the_air
 from rotorid.importers.clean import drop_repeated_times, report_gaps
 from rotorid.importers.frames import continuous
 from rotorid.importers.report import Fault
@@ -36,8 +37,6 @@ OTHER_TYPES |= {n: "a VTOL" for n in range(19, 26)}
 PULSE_US = (1000.0, 2000.0)
 """Pulse widths of no and full throttle where no parameter states them."""
 PLAUSIBLE_PULSE_US = (500.0, 2500.0)
-LONGEST_PAUSE_S = 1.0
-"""A contact with the ground shorter than this does not end a flight."""
 AROUND_RESET_S = 0.2
 ARMED = 2
 
@@ -327,36 +326,20 @@ def _resets(data: Mapping[str, np.ndarray]) -> np.ndarray:
     return _time(data)[1:][jumps]
 
 
-def _flying(log: Px4Log, grid: np.ndarray, throttle: np.ndarray | None, speed: np.ndarray | None) -> np.ndarray:
-    """Rows in which the vehicle is in the air: by PX4's land detector, else by what its rotors are told."""
+def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
+    """Rows in which the vehicle is in the air by PX4's land detector, and armed; None where the log says neither."""
     land, status = _first(log.topics, "vehicle_land_detected"), _first(log.topics, "vehicle_status")
+    if "landed" not in land and "arming_state" not in status:
+        return None
+    up = np.ones(len(grid), bool)
     if "landed" in land:
         time = _time(land)
-        down = np.zeros(len(grid), bool)
         for name in ("landed", "maybe_landed", "ground_contact"):
             if name in land:
-                down |= _held(grid, time, land[name], 1.0) > 0.5
-        up = ~down
-    else:
-        drive = throttle if throttle is not None else speed
-        if drive is None:
-            return np.ones(len(grid), bool)
-        mean = pd.Series(np.nan_to_num(drive.mean(axis=1), nan=np.nan)).interpolate(limit_direction="both").to_numpy()
-        full = float(np.nanquantile(mean, 0.9)) if np.isfinite(mean).any() else 0.0
-        up = mean > 0.5 * full if full > 0.05 else np.zeros(len(grid), bool)
+                up &= _held(grid, time, land[name], 1.0) < 0.5
     if "arming_state" in status:
         up &= _held(grid, _time(status), status["arming_state"], 0.0) == ARMED
-    return _without_pauses(up, grid)
-
-
-def _without_pauses(up: np.ndarray, grid: np.ndarray) -> np.ndarray:
-    """The mask with pauses inside it that are shorter than `LONGEST_PAUSE_S` filled."""
-    up = up.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], up.astype(int), [0]])))
-    for stop, start in zip(edges[1:-1:2], edges[2::2], strict=True):
-        if (grid[start] - grid[stop - 1]) * 1e-6 < LONGEST_PAUSE_S:
-            up[stop:start] = True
-    return up
+    return in_the_air.without_pauses(up, (grid - grid[0]) * 1e-6)
 
 
 def convert(log: Px4Log, rotors: int) -> Converted:
@@ -391,15 +374,14 @@ def convert(log: Px4Log, rotors: int) -> Converted:
     faults += found
     for names, time, values in batteries:
         put(names, time, values)
-    drives = {}
     for kind, reader in (("throttle", _throttles), ("rotor_speed", _speeds)):
         values, time, found = reader(log, rotors)
         faults += found
         if values is not None:
             put(c.rotor_columns(kind, rotors), time, values)
-            drives[kind] = np.column_stack([columns[n] for n in c.rotor_columns(kind, rotors)])
     table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
-    flying = _flying(log, grid, drives.get("throttle"), drives.get("rotor_speed"))
+    flying, ground = in_the_air.airborne(table, _flying(log, grid))
+    faults += ground
     jumps = _resets(place) if place else []
     for jump in jumps:
         flying &= np.abs(grid - jump) * 1e-6 > AROUND_RESET_S

@@ -62,7 +62,7 @@ READERS: dict[str, Callable] = {
     },
     "mav_msgs/msg/Actuators": lambda m: {"speeds": list(m.angular_velocities)},
     "actuator_msgs/msg/Actuators": lambda m: {"speeds": list(m.velocity)},
-    "mavros_msgs/msg/ESCStatus": lambda m: {"speeds": [RPM * e.rpm for e in m.esc_status]},
+    "mavros_msgs/msg/ESCStatus": lambda m: {"rpm": [e.rpm for e in m.esc_status]},
     "mavros_msgs/msg/RCOut": lambda m: {"pulses": list(m.channels)},
     "sensor_msgs/msg/BatteryState": lambda m: {"voltage": [m.voltage], "current": [-m.current]},
     "sensor_msgs/msg/Range": lambda m: {"range": [m.range]},
@@ -148,12 +148,10 @@ def convert(series: dict[str, list[Series]], faults: list[Fault], where: object)
         own = next(s for s in series["attitude"] if s.topic == first["body_velocity"].topic)
         turn = Rotation.from_quat(own.values[:, [1, 2, 3, 0]])
         parts.append((c.VELOCITY, own.time_s, half_turn_about_x(turn.apply(first["body_velocity"].values))))
-    drive = None
-    if "speeds" in first:
-        speeds = np.abs(first["speeds"].values)
-        names = c.rotor_columns("rotor_speed", speeds.shape[1])
-        parts.append((names, first["speeds"].time_s, speeds))
-        drive = in_the_air.on_grid(grid, first["speeds"].time_s, speeds)
+    turning = first.get("speeds") or first.get("rpm")
+    if turning is not None:
+        speeds = np.abs(turning.values) * (1.0 if "speeds" in first else RPM)
+        parts.append((c.rotor_columns("rotor_speed", speeds.shape[1]), turning.time_s, speeds))
     if "pulses" in first:
         pulses = first["pulses"].values
         used = [i for i in range(pulses.shape[1]) if np.ptp(pulses[:, i]) > 0][:4]
@@ -164,17 +162,18 @@ def convert(series: dict[str, list[Series]], faults: list[Fault], where: object)
         )
         throttle = np.clip((pulses[:, used] - low) / (high - low), 0, 1)
         parts.append((c.rotor_columns("throttle", len(used)), first["pulses"].time_s, throttle))
-        drive = in_the_air.on_grid(grid, first["pulses"].time_s, throttle) if drive is None else drive
     for quantity, name in (("voltage", c.BATTERY_VOLTAGE), ("current", c.BATTERY_CURRENT), ("range", c.HEIGHT)):
         if quantity in first:
             parts.append(((name,), first[quantity].time_s, first[quantity].values))
     table = in_the_air.table_on(grid, parts)
-    return table, np.ones(len(grid), bool) if drive is None else in_the_air.driven(drive)
+    return table, in_the_air.airborne(table)[0]
 
 
-def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
-    """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, and what was found."""
+def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:
+    """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, what was found, and the unit
+    in which rotor speeds are stated."""
     series, faults = read_series(path)
     table, flying = convert(series, faults, path)
     runs, cuts = in_the_air.flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
-    return runs, [*faults, *report_gaps(table), *cuts]
+    unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"
+    return runs, [*faults, *report_gaps(table), *cuts], unit

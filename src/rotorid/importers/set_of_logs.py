@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from rotorid import templates
@@ -18,6 +19,7 @@ from rotorid.importers.logfile import TEMPLATES, files_of, read_log
 from rotorid.importers.mapping import Mapping
 from rotorid.importers.propose import propose
 from rotorid.importers.report import Fault, ImportReport
+from rotorid.importers.speed_unit import in_unit_of_weight
 from rotorid.recordings import Run, read_vehicle
 from rotorid.recordings.files import VEHICLE, usable_runs
 from rotorid.recordings.manifest import sha256, write_manifest
@@ -147,13 +149,15 @@ def set_of_logs(
             runs[run] = table
     usable, left_out = usable_runs((partial(_checked, run, table) for run, table in runs.items()), logs[0].name)
     runs = {run.name: run.table for run in usable}
+    faults = [fault for imported in found for fault in imported.faults]
+    units = {run: imported.speed_unit for imported in found for run in imported.runs}
     remarks: tuple[str, ...] = ()
     kept = False
     if vehicle_file is not None:
-        read_vehicle(vehicle_file)
+        vehicle = read_vehicle(vehicle_file)
         text = vehicle_file.read_text(encoding="utf-8")
     elif there is not None and there.is_file() and mass_kg is None and like is None:
-        read_vehicle(there)
+        vehicle = read_vehicle(there)
         text, kept = there.read_text(encoding="utf-8"), True
     else:
         if kinds != {"flight"}:
@@ -164,16 +168,25 @@ def set_of_logs(
                 f"{logs[0]}: nothing tells what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
                 f"{', '.join(templates.names())} and --mass-kg"
             )
-        proposal = propose(name, list(runs.values()), found[0].known, templates.read(template), template, mass_kg)
+        vehicle = templates.read(template)
+        mass = mass_kg or vehicle.mass_kg
+        rotors = len(found[0].known.rotors or found[0].known.directions or vehicle.rotors)
+        runs, changed = in_unit_of_weight(runs, units, mass, rotors)
+        faults += changed
+        proposal = propose(name, list(runs.values()), found[0].known, vehicle, template, mass_kg)
         text, remarks = proposal.text, proposal.remarks
         if there is not None and there.is_file() and there.read_text(encoding="utf-8") != text:
             raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
+    if kinds == {"flight"} and (vehicle_file is not None or kept):
+        known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
+        runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
+        faults += changed
     return SetOfLogs(
         name,
         runs,
         text,
         (*remarks, *left_out),
-        tuple(dict.fromkeys(f for i in found for f in i.faults)),
+        tuple(dict.fromkeys(faults)),
         found[0].axes,
         {name: sha256(file) for path in logs for name, file in files_of(path).items()},
         kept,

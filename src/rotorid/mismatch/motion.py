@@ -318,7 +318,7 @@ def build_segments(
             height=above,
             voltage=None if voltage is None else held_through_gaps(core(voltage)[:, 0]),
         )
-        extra = {n: np.interp(motion.time_s, t, np.nan_to_num(run.column(n))) for n in run.unknown_columns}
+        extra = {n: between_readings(motion.time_s, t, run.column(n)) for n in run.unknown_columns}
         segments.append(
             Segment(
                 run=run.name,
@@ -333,6 +333,12 @@ def build_segments(
             )
         )
     return segments
+
+
+def between_readings(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A column (n,) at instants (m,) by straight lines between its readings; 0 where it has none at all."""
+    known = np.isfinite(values)
+    return np.interp(instants, time_s[known], values[known]) if known.any() else np.zeros(len(instants))
 
 
 def held_through_gaps(values: np.ndarray) -> np.ndarray | None:

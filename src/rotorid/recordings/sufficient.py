@@ -14,6 +14,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.names import listed, nearest, plain
 from rotorid.recordings import columns as c
+from rotorid.recordings.own_rates import HOLE_PERIODS, on_own_rates
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import clock_jump, place
 from rotorid.recordings.vehicle import Vehicle
@@ -29,8 +30,6 @@ SINGLE_GAP_S, HELD_OUT_SHARE = 2.0, 1 / 3
 """Of a single run this share is held out, after a gap."""
 LEAST_READINGS = 10
 """Readings of a stand or a bench that are there in every compared channel at once, in a run."""
-HOLE_PERIODS = 6.0
-"""Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
 LEAST_VALUES = 4
 """Complete readings from which a sensor counts as recorded."""
 LARGEST = {
@@ -65,7 +64,7 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
     InputError
         One sentence with file and column, where a column is misspelled or what is left does not suffice.
     """
-    recordings = without_dead_sensors(without_rotors_on_a_bench(recordings))
+    recordings = on_own_rates(without_dead_sensors(without_rotors_on_a_bench(recordings)))
     for run in recordings.runs:
         check_spelling(run, recordings.vehicle)
     usable, reasons = [], []

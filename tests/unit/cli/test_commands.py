@@ -305,17 +305,17 @@ def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
 
 
 def test_names_of_times_and_commands_are_recognised_and_a_lacking_time_is_told() -> None:
-    from rotorid.importers.mapping import guess
+    from rotorid.importers.guessing.guess import guess
 
     rpm = np.linspace(8000, 9000, 50)
     names = {f"cmd_rpm{i}": rpm for i in range(1, 5)} | {f"motor_speed_{i}": rpm / 10 for i in range(1, 5)}
     for time, unit, scale in (("t_ms", "ms", 1e3), ("t [s]", "s", 1.0), ("t_us", "us", 1e6), ("time", "s", 1.0)):
-        mapping, doubts = guess(pd.DataFrame({time: np.arange(50) * 0.01 * scale} | names))
+        mapping = guess(pd.DataFrame({time: np.arange(50) * 0.01 * scale} | names)).mapping
         assert mapping.channels["time"].columns == (time,) and mapping.channels["time"].unit == unit
         assert mapping.channels["rotor_command"].columns == tuple(f"cmd_rpm{i}" for i in range(1, 5))
         assert mapping.channels["rotor_command"].unit == "rpm" and mapping.channels["rotor_speed"].unit == "rad/s"
-    _, doubts = guess(pd.DataFrame(names))
-    assert doubts[0].startswith("time: no column recognised")
+    lacking = guess(pd.DataFrame(names))
+    assert lacking.mapping.channels["time"].columns == ("?",) and "no column is named as a time" in lacking.open["time"]
 
 
 def test_help_by_its_short_name_and_by_python(tmp_path: Path) -> None:

@@ -1,0 +1,240 @@
+"""What the names of a table's columns say: families (`ang_vel_x`, `_y`, `_z`), the quantity, units, axes.
+
+A name is cut into words (`gyroADC[0]` is gyro, adc, 0), a unit at its end is set aside (`_deg_s`), then words that only
+qualify it (`body`, `raw`); what ends in an axis or a number is a member of a family, and the rest is its stem.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+UNIT_WORDS: dict[str, str] = {
+    "m_s2": "m/s2", "m_s_2": "m/s2", "m_s^2": "m/s2", "ms2": "m/s2", "mps2": "m/s2", "mg": "mg", "g": "g",
+    "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
+    "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
+    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz",
+}  # fmt: skip
+"""Words of a unit at the end of a name to the mapping's unit."""
+QUALIFIERS = frozenset(
+    "adc b body bodyframe w world i inertial n frd flu ned enu nwu imu raw smooth smoothed filt filtered est estimate "
+    "lin linear meas measured 0".split()
+)
+"""Words at the end of a stem that do not change what it is."""
+IN_BODY = frozenset(("b", "body", "bodyframe", "frd", "flu"))
+SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
+"""Words at the beginning of a stem that say where a value comes from."""
+OTHER_THINGS = frozenset(
+    "bias offset std sigma var variance cov covariance err error innov innovation sp setpoint ref reference des "
+    "desired cmd command target mag magnetometer thrust torque moment wind jerk alpha dot residual".split()
+)
+"""Words in a name of three columns that make it no measurement of motion."""
+WISHED = frozenset("sp setpoint ref reference des desired cmd command commanded target".split())
+
+TRIPLES: dict[str, tuple[frozenset[str], frozenset[str]]] = {
+    "specific_force": (
+        frozenset("acc accel acceleration accelerometer specific_force lin_acc linear_acceleration".split()),
+        frozenset("a f".split()),
+    ),
+    "angular_velocity": (
+        frozenset(
+            "gyro gyr gyroscope omega angular_velocity ang_vel angvel angular_rate rate rates body_rates".split()
+        ),
+        frozenset("w".split()),
+    ),
+    "position": (frozenset("pos position".split()), frozenset(("p", ""))),
+    "velocity": (frozenset("vel velocity".split()), frozenset("v".split())),
+}
+"""To a quantity the words that a stem may end in, and those that must be the whole of it."""
+ROTORS: dict[str, frozenset[str]] = {
+    "rotor_speed": frozenset("rpm erpm rotor_speed rotor_speeds motor_speed motor_speeds mot_speed".split()),
+    "rotor_command": frozenset("rotor_command rotor_commands".split()),
+    "throttle": frozenset(
+        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators".split()
+    ),
+}  # fmt: skip
+QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation".split())
+ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
+SCALARS: dict[str, tuple[str, ...]] = {
+    "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
+    "battery_voltage": (r"v_?bat(t|tery)?.*", r"battery_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
+    "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
+    "height": (r"height.*", r"agl.*", r"range.*"),
+    "temperature": (r"temp(erature)?.*",),
+}
+AXES = ("xyz", "012", "123", "ned", "enu")
+FOURS = ("wxyz", "0123", "1234")
+
+
+@dataclass(frozen=True)
+class Family:
+    """Columns of one stem, in the order of their axes."""
+
+    stem: str
+    columns: tuple[str, ...]
+    axes: str
+    """`xyz`, `ned`, `wxyz`, … or the numbers of the members."""
+    unit: str
+    """The mapping's unit that the names state, empty where they state none."""
+    words: frozenset[str]
+
+    @property
+    def in_body(self) -> bool:
+        """Whether a word of the names says body axes."""
+        return bool(self.words & IN_BODY)
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name in small letters."""
+    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", str(name))
+    return [w for w in re.split(r"[^a-z0-9^µ]+", parted.lower()) if w]
+
+
+def _without_unit(words: list[str]) -> tuple[list[str], str]:
+    for count in (3, 2, 1):
+        ending = "_".join(words[-count:])
+        if len(words) > count and ending in UNIT_WORDS:
+            return words[:-count], UNIT_WORDS[ending]
+    return words, ""
+
+
+def unit_of(name: str) -> str:
+    """The mapping's unit that the end of a name states; empty where it states none."""
+    return _without_unit(words_of(name))[1]
+
+
+def _without_qualifiers(words: list[str]) -> list[str]:
+    while len(words) > 1 and words[-1] in QUALIFIERS:
+        words = words[:-1]
+    while words and words[0] in SOURCES:
+        words = words[1:]
+    return words
+
+
+def _member(name: str, axes: str) -> tuple[str, str, str, frozenset[str]] | None:
+    """Stem, axis, stated unit and words of a name as a member of a family with `axes`; None where it is none."""
+    words, unit = _without_unit(words_of(name))
+    ends = words
+    while axes.isalpha() and len(ends) > 1 and ends[-1] in QUALIFIERS and ends[-1] not in axes:
+        ends = ends[:-1]
+    if not ends or ends[-1][-1] not in axes:
+        return None
+    last_word, axis = ends[-1][:-1], ends[-1][-1]
+    if axis.isdigit() and last_word[-1:].isdigit():
+        return None  # of a longer number
+    stem = [*ends[:-1], *([last_word] if last_word else [])]
+    stem, more = _without_unit(stem) if len(stem) > 1 else (stem, "")
+    kept = _without_qualifiers(stem)
+    return "_".join(kept), axis, unit or more, frozenset(words) | frozenset(stem)
+
+
+def families(names: Iterable[str], axes: str) -> list[Family]:
+    """Every family of the names whose members end in the axes, one each."""
+    names = list(names)
+    found: dict[tuple[str, frozenset[str]], dict[str, tuple[str, str]]] = {}
+    for name in names:
+        if (member := _member(name, axes)) is None:
+            continue
+        stem, axis, unit, words = member
+        key = stem, frozenset(w for w in words if w in QUALIFIERS and w not in axes and not w.isdigit())
+        found.setdefault(key, {}).setdefault(axis, (name, unit))
+    result = []
+    for (stem, qualifiers), members in found.items():
+        if set(members) == set(axes):
+            units = {unit for _, unit in members.values()}
+            columns = tuple(members[a][0] for a in axes)
+            words = frozenset(stem.split("_")) | qualifiers
+            result.append(Family(stem, columns, axes, units.pop() if len(units) == 1 else "", words))
+    return sorted(result, key=lambda f: names.index(f.columns[0]))
+
+
+def numbered(names: Iterable[str]) -> list[Family]:
+    """Families of three to twelve columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
+    found: dict[str, dict[int, tuple[str, str]]] = {}
+    for name in names:
+        words, unit = _without_unit(words_of(name))
+        if words and words[-1] in ("us", "pwm") and len(words) > 1 and re.search(r"\d$", words[-2]):
+            words = words[:-1]
+        match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})", "_".join(words))
+        if match:
+            stem = match.group(1) or "m"
+            found.setdefault(stem, {}).setdefault(int(match.group(2)), (name, unit))
+    result = []
+    for stem, members in found.items():
+        count = len(members)
+        if 3 <= count <= 12 and sorted(members) in (list(range(count)), list(range(1, count + 1))):
+            order = sorted(members)
+            units = {members[k][1] for k in order}
+            columns = tuple(members[k][0] for k in order)
+            unit = units.pop() if len(units) == 1 else ""
+            result.append(Family(stem, columns, "number", unit, frozenset(stem.split("_"))))
+    return result
+
+
+def _ends_in(stem: str, words: frozenset[str]) -> bool:
+    return any(stem == w or stem.endswith(f"_{w}") for w in words)
+
+
+def is_named(family: Family, quantity: str) -> bool:
+    """Whether three columns are named as a quantity of motion; `ang_vel` is no velocity, `acc_bias` no acceleration."""
+    if family.words & OTHER_THINGS:
+        return False
+    endings, whole = TRIPLES[quantity]
+    if family.axes in ("012", "123") and family.stem == "":
+        return False
+    turning = bool(family.words & {"ang", "angular", "rot", "rotational"})
+    if quantity != "angular_velocity" and turning:
+        return False
+    return _ends_in(family.stem, endings) or family.stem in whole
+
+
+def is_rotor(family: Family, quantity: str) -> bool:
+    """Whether numbered columns are named as speeds, commanded speeds or throttles of rotors."""
+    stem = family.stem
+    rest = [w for w in stem.split("_") if w not in WISHED]
+    if quantity == "rotor_command":
+        return _ends_in(stem, ROTORS[quantity]) or (
+            bool(family.words & WISHED) and _ends_in("_".join(rest), ROTORS["rotor_speed"])
+        )
+    if family.words & WISHED and quantity == "rotor_speed":
+        return False
+    if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz"):
+        return _ends_in(stem, ROTORS[quantity] | ROTORS["throttle"])
+    return _ends_in("_".join(rest), ROTORS[quantity])
+
+
+def is_quaternion(family: Family) -> bool:
+    return not family.words & OTHER_THINGS and _ends_in(family.stem, QUATERNION)
+
+
+def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
+    """Roll, pitch and yaw by their names, and the unit that these state."""
+    found, units = [], set()
+    for meant in ANGLES:
+        for name in names:
+            words, unit = _without_unit(words_of(name))
+            if words and words[-1] in meant and not frozenset(words) & OTHER_THINGS and "rate" not in words:
+                found.append(name)
+                units.add(unit)
+                break
+        else:
+            return None
+    return (found[0], found[1], found[2]), units.pop() if len(units) == 1 else ""
+
+
+def scalar(names: Iterable[str], quantity: str) -> str | None:
+    """The first column whose name is that of a scalar quantity, by the pattern that is most its own."""
+    for pattern in SCALARS[quantity]:
+        for name in names:
+            if re.fullmatch(pattern, str(name).lower()):
+                return name
+    return None
+
+
+def time_unit(name: str) -> str:
+    """The unit of a clock that its name states; empty where it states none."""
+    for unit, meant in (("ns", ("ns",)), ("us", ("us", "µs", "micro")), ("ms", ("ms", "milli")), ("s", ("s", "sec"))):
+        if any(re.search(rf"(^|[_( \[]){w}([\W_]|$)", str(name).lower()) for w in meant):
+            return unit
+    return ""

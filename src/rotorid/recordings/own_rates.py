@@ -1,0 +1,177 @@
+"""Sensors whose readings come at random (a radio link, loggers merged by time) on an even grid of their own.
+
+Where cells are empty by chance, steps of three or five rows are as usual as those of one, and a rule in usual steps
+cuts the flight at each longer one. Such a sensor is taken at its own rate: a cubic spline with even knots is fitted to
+all its readings by least squares, which keeps the band below half the rate of the knots and averages the noise above
+it. Its values at the knots are the new readings. Speeds and commands of rotors, which jump, are joined by straight
+lines. What this costs is stated: the rate, its band, and the noise there.
+
+A sensor that comes evenly, however slow, stays as it is, and so does a hole of several of its own periods.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import BSpline
+from scipy.sparse import diags, eye_array
+from scipy.sparse.linalg import spsolve
+
+from rotorid.recordings import columns as c
+from rotorid.recordings.run import RecordingSet, Run
+
+HOLE_PERIODS = 6.0
+"""Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
+LONGEST_USUAL = 10.0
+"""Steps longer than so many usual ones are holes, and count for no rate."""
+COVERED = 0.95
+"""Share of the steps between readings that a step of the new grid is as long as."""
+LONG_STEP, SCATTERED = 1.5, 0.15
+"""A sensor is scattered where more than such a share of its steps is longer than so many usual ones."""
+USED_BAND = 0.4
+"""Highest frequency, over the rate, that the analysis uses of a sensor."""
+LINES_A_PERIOD = 4.0
+"""Values a period on straight lines between readings: few would cut the corners off."""
+LEAST_READINGS = 20
+CUBIC = 3
+STIFFNESS = 5e-4
+"""Weight of the third differences of the spline: a smooth line where there are no readings. With half the cells empty
+by chance noise then is as even over the band as of an even sensor, and the gain at 0.3 of the rate is right to 2 %."""
+
+
+def on_own_rates(recordings: RecordingSet) -> RecordingSet:
+    """Flights whose scattered sensors have an even grid, the same in every run; a sentence for each in `left_out`.
+
+    A set that the rule of usual steps cuts at holes alone stays as it is.
+    """
+    if recordings.vehicle.kind != "flight":
+        return recordings
+    kinds = ("rotor_speed", "rotor_command", "throttle")
+    rotors = [c.rotor_columns(kind, recordings.vehicle.rotor_count) for kind in kinds]
+    sensors = (*rotors, c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, (c.HEIGHT,))
+    there = {names: [run for run in recordings.runs if is_read(run, names)] for names in sensors}
+    scattered = [names for names, runs in there.items() if any(is_scattered(run, names) for run in runs)]
+    if not any(cut_by_chance(run, names) for names in scattered for run in there[names]):
+        return recordings
+    periods = {n: max(own_period_s(run, n) for run in there[n]) for n in scattered}
+    runs = []
+    for run in recordings.runs:
+        new = {}
+        for names, period in periods.items():
+            if is_read(run, names):
+                values = evenly(run, names, period, jumps=names in rotors)
+                new |= dict(zip(names, values.T, strict=True))
+        runs.append(replace(run, table=run.table.assign(**new)))
+    said = [_sentence(there[n], n, period, n in rotors) for n, period in periods.items()]
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said))
+
+
+def _sentence(runs: list[Run], names: tuple[str, ...], period_s: float, jumps: bool) -> str:
+    """What was done to a sensor and what it costs."""
+    share = float(np.mean([np.isfinite(run.array(names)).mean() for run in runs]))
+    through = f"{names[0]} to {names[-1]} come" if len(names) > 1 else f"{names[0]} comes"
+    return (
+        f"{through} at random ({1 - share:.0%} of the cells are empty): brought to an even {1 / period_s:.0f} Hz, "
+        f"whose band to {USED_BAND / period_s:.0f} Hz can be used; there the noise is "
+        f"{noise_gain(runs[0], names, period_s, jumps):.2g} times that of full columns."
+    )
+
+
+def noise_gain(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -> float:
+    """Noise in the band of what `evenly` makes of white noise, over that of columns without an empty cell."""
+    rng = np.random.default_rng(1)
+    white = {n: np.where(np.isfinite(run.column(n)), rng.standard_normal(len(run.time_s)), np.nan) for n in names}
+    made = evenly(Run("", pd.DataFrame({c.TIME: run.time_s} | white)), names, period_s, jumps)
+    step = float(run.time_s[-1] - run.time_s[0]) / (len(run.time_s) - 1)
+    between = period_s / LINES_A_PERIOD if jumps else period_s
+    return float(np.sqrt(np.nanvar(made) * between / step))
+
+
+def is_read(run: Run, names: tuple[str, ...]) -> bool:
+    """Whether each column of a sensor has enough readings to tell how they come."""
+    return bool(names) and all(np.isfinite(run.column(name)).sum() > LEAST_READINGS for name in names)
+
+
+def _steps_s(run: Run, names: tuple[str, ...]) -> list[np.ndarray]:
+    """Steps between the readings of each column, s, without holes."""
+    steps = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
+    return [s[s <= LONGEST_USUAL * np.median(s)] for s in steps]
+
+
+def _whole_steps_s(run: Run, names: tuple[str, ...]) -> np.ndarray:
+    """Steps between the rows in which every column has a reading, s."""
+    return np.diff(run.time_s[np.isfinite(run.array(names)).all(axis=1)])
+
+
+def cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
+    """Whether a rule in usual steps cuts a sensor where no column of it has a hole of several of its own periods."""
+    steps = _steps_s(run, names)
+    whole = _whole_steps_s(run, names)
+    cuts = int((whole > HOLE_PERIODS * np.median(whole)).sum()) if len(whole) else len(run.time_s)
+    every = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
+    mean = max(float(s.mean()) for s in steps)
+    return cuts > sum(int((s > HOLE_PERIODS * mean).sum()) for s in every)
+
+
+def is_scattered(run: Run, names: tuple[str, ...]) -> bool:
+    """Whether the readings of a sensor come unevenly, or its columns not in the same rows."""
+    steps = _steps_s(run, names)
+    uneven = max(float((s > LONG_STEP * np.median(s)).mean()) for s in steps)
+    return uneven > SCATTERED or len(_whole_steps_s(run, names)) < (1 - SCATTERED) * min(map(len, steps))
+
+
+def own_period_s(run: Run, names: tuple[str, ...]) -> float:
+    """The step that covers nearly all steps between readings that come at random, s: what such a sensor resolves."""
+    return max(max(float(np.quantile(s, COVERED)), float(s.mean())) for s in _steps_s(run, names))
+
+
+def evenly(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -> np.ndarray:
+    """Values of a sensor in the rows nearest to an even grid, (n, len(names)); NaN in the others and inside holes."""
+    time_s = run.time_s
+    step = period_s / LINES_A_PERIOD if jumps else period_s
+    grid = np.arange(time_s[0], time_s[-1] + 1e-9, step)
+    rows = np.unique(np.searchsorted((time_s[1:] + time_s[:-1]) / 2, grid))
+    at = time_s[rows]
+    values = run.array(names)
+    if names == c.QUATERNION:
+        values = on_one_side(values)
+    out = np.full(values.shape, np.nan)
+    for k in range(values.shape[1]):
+        known = np.isfinite(values[:, k])
+        read_s, read = time_s[known], values[known, k]
+        made = np.interp(at, read_s, read) if jumps else _spline(read_s, read, period_s)(at)
+        after = np.searchsorted(read_s, at).clip(1, len(read_s) - 1)
+        inside = (at >= read_s[0]) & (at <= read_s[-1])
+        inside &= read_s[after] - read_s[after - 1] <= HOLE_PERIODS * period_s
+        out[rows[inside], k] = made[inside]
+    return out
+
+
+def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> BSpline:
+    """The cubic least-squares spline through readings (n,) whose knots are a period apart."""
+    count = int(np.ceil((time_s[-1] - time_s[0]) / period_s)) + 1
+    knots = time_s[0] + period_s * np.arange(-CUBIC, count + CUBIC)
+    design = BSpline.design_matrix(time_s, knots, CUBIC)
+    size = design.shape[1]
+    difference = eye_array(size, format="csr")
+    for n in range(CUBIC):
+        difference = diags([-1.0, 1.0], [0, 1], shape=(size - n - 1, size - n)) @ difference
+    normal = design.T @ design
+    weight = STIFFNESS * normal.diagonal().mean()
+    found = spsolve((normal + weight * difference.T @ difference).tocsc(), design.T @ (values - values.mean()))
+    return BSpline(knots, found + values.mean(), CUBIC)
+
+
+def on_one_side(quaternion: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) with empty cells, signs flipped so that successive ones stay on one side."""
+    out = quaternion.copy()
+    last = np.zeros(4)
+    for row in out:
+        known = np.isfinite(row)
+        if known.any():
+            if float(row[known] @ last[known]) < 0:
+                row[known] *= -1.0
+            last[known] = row[known]
+    return out

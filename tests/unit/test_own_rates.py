@@ -1,0 +1,135 @@
+"""Sensors whose readings come at random: an even grid of their own, in place of a flight cut into pieces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid import templates
+from rotorid.cli.simulating import fly
+from rotorid.errors import InputError
+from rotorid.mismatch.motion import between_readings
+from rotorid.recordings import RecordingSet, Run, read_set
+from rotorid.recordings import columns as c
+from rotorid.recordings.own_rates import evenly, is_scattered, noise_gain, on_one_side, on_own_rates, own_period_s
+from rotorid.recordings.sufficient import longest_stretch_s, moving_sensors, sufficient
+
+SPEEDS = c.rotor_columns("rotor_speed", 4)
+SENSORS = (SPEEDS, c.rotor_columns("rotor_command", 4), c.POSITION, c.VELOCITY, c.QUATERNION,
+           c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory) -> RecordingSet:
+    return read_set(fly(templates.read("thesis"), tmp_path_factory.mktemp("sets") / "flights", 12.0, 2, 3))
+
+
+def with_holes(recordings: RecordingSet, share: float, by_cell: bool, seed: int = 1) -> RecordingSet:
+    """Each sensor loses a share of its rows, or each of its columns of its cells, by chance."""
+    rng = np.random.default_rng(seed)
+
+    def holed(run: Run) -> Run:
+        table = run.table.copy()
+        for names in SENSORS:
+            for part in [[n] for n in names] if by_cell else [list(names)]:
+                table.loc[rng.random(len(table)) < share, part] = np.nan
+        return replace(run, table=table)
+
+    return replace(recordings, runs=tuple(map(holed, recordings.runs)))
+
+
+@pytest.mark.parametrize(("share", "by_cell"), [(0.5, False), (0.3, True), (0.5, True)])
+def test_half_empty_columns_are_used_in_one_piece(flown: RecordingSet, share: float, by_cell: bool) -> None:
+    """They were refused: 'the longest stretch in which every sensor has readings lasts 0.7 s'."""
+    holed = with_holes(flown, share, by_cell)
+    cut, _ = longest_stretch_s(holed.runs[0], [SPEEDS, *moving_sensors(holed.runs[0])])
+    used = sufficient(holed)
+    whole, slowest = longest_stretch_s(used.runs[0], [SPEEDS, *moving_sensors(used.runs[0])])
+    assert cut < 3 < 11.5 < whole and 0.01 < slowest < 0.03
+    assert len(used.left_out) == len(SENSORS)
+    empty = f"({share:.0%} of the cells are empty)"
+    assert any(
+        s.startswith("specific_force_x_m_s2 to specific_force_z_m_s2 come at random") and "the noise is" in s
+        for s in used.left_out
+    ), used.left_out
+    assert any(empty in s for s in used.left_out)
+    assert sufficient(used).runs[0].table.equals(used.runs[0].table)  # once is enough
+
+
+def test_a_band_of_signal_and_the_noise_of_what_is_there_remain() -> None:
+    """Tones below 0.4 of the new rate keep amplitude and phase; the noise in the band is that of half the readings."""
+    rng = np.random.default_rng(3)
+    time_s = np.arange(15000) / 250
+    tones = np.sin(2 * np.pi * 3 * time_s) + 0.3 * np.cos(2 * np.pi * 15 * time_s)
+    noise = 0.1 * rng.standard_normal(len(time_s))
+    table = {c.TIME: time_s, c.ANGULAR_VELOCITY[0]: tones + noise, c.ANGULAR_VELOCITY[1]: noise}
+    run = Run("run", pd.DataFrame(table | {c.ANGULAR_VELOCITY[2]: tones}))
+    gone = rng.random((len(time_s), 3)) < 0.5
+    run = replace(
+        run, table=run.table.assign(**{n: run.table[n].mask(gone[:, k]) for k, n in enumerate(c.ANGULAR_VELOCITY)})
+    )
+    assert is_scattered(run, c.ANGULAR_VELOCITY)
+    period = own_period_s(run, c.ANGULAR_VELOCITY)
+    values = evenly(run, c.ANGULAR_VELOCITY, period, jumps=False)
+    rows = np.isfinite(values).all(axis=1)
+    assert np.allclose(np.diff(time_s[rows]), period) and 0.016 <= period <= 0.024
+    inner = np.flatnonzero(rows)[20:-20]
+    assert np.abs(values[inner, 2] - tones[inner]).max() < 0.15  # of 1.3, in the longest steps
+    assert np.sqrt(np.mean((values[inner, 2] - tones[inner]) ** 2)) < 0.012  # of 0.74
+    density = np.var(values[inner, 1]) * period / (0.1**2 / 250)
+    gain = noise_gain(run, c.ANGULAR_VELOCITY, period, jumps=False)
+    assert gain == pytest.approx(np.sqrt(density), rel=0.1)
+    assert np.sqrt(2) < gain < 1.8  # half the readings have twice the density, their uneven steps cost the rest
+
+
+def test_a_hole_of_several_periods_stays_one_and_what_is_even_stays_as_it_is(flown: RecordingSet) -> None:
+    holed = with_holes(flown, 0.4, False)
+    table = holed.runs[0].table.copy()
+    lost = (table[c.TIME] > 4) & (table[c.TIME] < 4.5)
+    table.loc[lost, list(c.ANGULAR_VELOCITY)] = np.nan
+    used = sufficient(replace(holed, runs=(replace(holed.runs[0], table=table), holed.runs[1])))
+    known = used.runs[0].time_s[np.isfinite(used.runs[0].array(c.ANGULAR_VELOCITY)).all(axis=1)]
+    gap = np.argmax(np.diff(known))
+    assert known[gap] == pytest.approx(4.0, abs=0.03) and known[gap + 1] == pytest.approx(4.5, abs=0.03)
+    assert on_own_rates(flown) is flown
+    slow = flown.runs[0].table.copy()
+    slow.loc[slow.index % 5 != 0, list(c.VELOCITY)] = np.nan
+    even = replace(flown, runs=(replace(flown.runs[0], table=slow),))
+    assert on_own_rates(even) is even
+    bursts = slow.copy()
+    for start in np.arange(0.5, 12, 0.5):
+        bursts.loc[(slow[c.TIME] > start) & (slow[c.TIME] < start + 0.1), list(c.ANGULAR_VELOCITY)] = np.nan
+    with pytest.raises(InputError, match="the longest stretch in which every sensor has readings lasts 0.5 s"):
+        sufficient(replace(flown, runs=(replace(flown.runs[0], table=bursts),)))
+
+
+def test_a_sensor_of_next_to_no_readings_is_left_alone(flown: RecordingSet) -> None:
+    holed = with_holes(flown, 0.5, False)
+    table = holed.runs[1].table.copy()
+    table.loc[table.index > 30, list(c.VELOCITY)] = np.nan
+    made = on_own_rates(replace(holed, runs=(holed.runs[0], replace(holed.runs[1], table=table))))
+    assert made.runs[1].table[list(c.VELOCITY)].equals(table[list(c.VELOCITY)])
+    assert not made.runs[0].table[list(c.VELOCITY)].equals(holed.runs[0].table[list(c.VELOCITY)])
+
+
+def test_signs_of_quaternions_with_empty_cells_stay_on_one_side() -> None:
+    rng = np.random.default_rng(2)
+    angle = np.linspace(0, 8, 400)
+    true = np.column_stack([np.cos(angle / 2), np.sin(angle / 2) * 0.6, np.zeros(400), np.sin(angle / 2) * 0.8])
+    flipped = true * rng.choice([-1.0, 1.0], 400)[:, None]
+    flipped[rng.random((400, 4)) < 0.3] = np.nan
+    made = on_one_side(flipped)
+    known = np.isfinite(made) & (np.abs(true) > 0.2)
+    agrees = np.sign(made[known]) == np.sign(true[known])
+    assert max(agrees.mean(), 1 - agrees.mean()) > 0.99
+
+
+def test_a_half_empty_column_of_ones_own_is_read_between_its_readings() -> None:
+    """Empty cells of a column that the contract does not know counted as 0."""
+    time_s = np.arange(6.0)
+    values = np.array([2.0, np.nan, 4.0, np.nan, np.nan, 7.0])
+    assert between_readings(time_s, time_s, values).tolist() == [2, 3, 4, 5, 6, 7]
+    assert between_readings(time_s, time_s, np.full(6, np.nan)).tolist() == [0] * 6
