@@ -297,6 +297,49 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["study", "about", "found", "error", "unexplained"])
 
 
+def of_channels(channels: pd.DataFrame) -> pd.DataFrame:
+    """Errors on the runs held out of every channel, a row each: three stages and the noise, in the channel's unit.
+
+    `worse`: by how much the delivered model is worse than the refitted values where it is, in percent.
+    """
+    held = channels[channels["split"] == "held_out"].reset_index(drop=True)
+    out = pd.DataFrame({"recordings": held["example"], "channel": held["channel"].map(words), "unit": held["unit"]})
+    for name in ("noise_floor", "before", "refitted", "after"):
+        out[name] = held[name].map(lambda value: "–" if pd.isna(value) else f"{value:.3g}")
+    growth = held["after"] / held["refitted"] - 1
+    out["worse"] = [f"{100 * more:.1f} %" if more > LEAST_WORSE else "" for more in growth]
+    return out
+
+
+LEAST_WORSE = 5e-4
+"""Growth of an error that its three printed digits may show."""
+
+
+def of_campaign_sets(sets: pd.DataFrame) -> pd.DataFrame:
+    """The campaign's sets as text: verdict, what is at work, and what of it was named, rightly or wrongly."""
+    return sets.apply(lambda column: column.map(words)).replace({"right": {"": "–"}, "wrong": {"": "–"}})
+
+
+def of_campaign_numbers(numbers: pd.DataFrame) -> pd.DataFrame:
+    """A row a set and effect as text: how many numbers are inside, and the one furthest out."""
+    rows = []
+    for row in numbers.itertuples():
+        power = 3 * math.floor(math.log10(abs(row.found)) / 3) if 0 < abs(row.found) < 1e-3 else 0
+        true, found, low, high = (f"{x / 10**power:.4g}" for x in (row.truth, row.found, row.low_95, row.high_95))
+        rows.append(
+            {
+                "set": row.set,
+                "effect": words(row.effect),
+                "inside": f"{row.held} of {row.numbers}",
+                "symbol": row.symbol,
+                "truth": true,
+                "found": f"{found} ({low} to {high})",
+                "unit": (f"1e{power} " if power else "") + row.unit,
+            }
+        )
+    return pd.DataFrame(rows, columns=["set", "effect", "inside", "symbol", "truth", "found", "unit"])
+
+
 VALUE_UNIT = re.compile(r"_(kg_m2|kg|n_m_s2|n_s2|m_s2|rad_s)$")
 """The unit at the end of the name of a believed value."""
 

@@ -85,3 +85,34 @@ def test_plantings_are_counted_by_flight_and_family_beside_what_was_told_before(
     assert list(shown["told"]) == ["14 of 25", "≤ 0.1", "fails", "2 of 2"]
     assert list(shown["before"]) == ["12 of 24", "", "", "–"]
     assert shown.iloc[0]["moved"] == "0.68"
+
+
+def test_a_channel_that_got_worse_says_by_how_much() -> None:
+    channels = pd.DataFrame(
+        {
+            "example": "a",
+            "channel": ["force_x", "force_z", "force_z"],
+            "split": ["held_out", "held_out", "training"],
+            "unit": "N",
+            "before": [1.0, 0.106, 1.0],
+            "refitted": [1.0, 0.106, 1.0],
+            "after": [0.2, 0.456, 1.0],
+            "noise_floor": [0.1, None, 0.1],
+        }
+    )
+    shown = show.of_channels(channels)
+    assert shown["channel"].tolist() == ["force x", "force z"]
+    assert shown["worse"].tolist() == ["", "330.2 %"]
+    assert shown["noise_floor"].tolist() == ["0.1", "–"]
+
+
+def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
+    row = {"set": "s", "effect": "com_offset", "numbers": 3, "held": 1, "symbol": "r_x", "unit": "m"}
+    row |= {"truth": -4.045e-4, "found": -5.1e-4, "low_95": -5.2e-4, "high_95": -5.0e-4}
+    shown = show.of_campaign_numbers(pd.DataFrame([row]))
+    assert shown.iloc[0][["inside", "truth", "found", "unit"]].tolist() == [
+        "1 of 3",
+        "-404.5",
+        "-510 (-520 to -500)",
+        "1e-6 m",
+    ]
