@@ -34,6 +34,7 @@ QUOTED = {
     "proof_rows": f"{CONFIG.proof.tables}/summary.csv",
 }
 QUOTED_BY = {
+    "white_box": {"truth": rules.score_campaign.output.state},
     "abstract": QUOTED,
     "conclusions": QUOTED | {"propellers": "results/rotor/coefficients.json"},
 }

@@ -18,7 +18,11 @@ from rotorid.io.tables import by_recording
 
 RPM = 2 * np.pi / 60
 MARGIN_S = 0.6
-COLUMNS = ("test", "throttle", "speed_rad_s", "speed_sd_rad_s", "value", "value_sd", "samples", "voltage_v")
+COLUMNS = (
+    *("test", "throttle", "speed_rad_s", "speed_sd_rad_s"),
+    *("value", "value_sd", "samples", "rest_samples", "voltage_v"),
+)
+"""`rest_samples`: of how many samples the mean would be as uncertain as the tare is."""
 
 
 def _running(table: pd.DataFrame, name: str) -> tuple[float, float]:
@@ -43,7 +47,7 @@ def thrust_points(samples: pd.DataFrame, recordings: pd.DataFrame) -> pd.DataFra
         rest = table[table["host_time_s"] < start - 0.05]
         if len(rest) == 0:
             raise InputError(f"{name}: no sample before the motor started, so no tare")
-        rows.append(_row(name, steady, steady["thrust_n"] - rest["thrust_n"].mean()))
+        rows.append(_row(name, steady, steady["thrust_n"] - rest["thrust_n"].mean(), len(rest)))
     return _sorted(rows)
 
 
@@ -75,7 +79,8 @@ def torque_points(rotor: tuple[pd.DataFrame, pd.DataFrame], wrench: tuple[pd.Dat
         # The run lies in the middle between both rests, so that a steady drift of the zero drops out.
         turned = loaded - (before.mean() + after.mean()) / 2
         # The sign of the mean, not of each sample: that would turn noise into torque.
-        rows.append(_row(drive.group, steady, turned * np.sign(turned.mean())))
+        resting = 4 / (1 / len(before) + 1 / len(after))
+        rows.append(_row(drive.group, steady, turned * np.sign(turned.mean()), resting))
     return _sorted(rows)
 
 
@@ -83,7 +88,7 @@ def _sorted(rows: list[dict]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(COLUMNS)).sort_values("throttle", ignore_index=True, kind="stable")
 
 
-def _row(test: str, steady: pd.DataFrame, value: pd.Series) -> dict:
+def _row(test: str, steady: pd.DataFrame, value: pd.Series, rest_samples: float) -> dict:
     speed = steady["speed_rpm"] * RPM
     return {
         "test": test,
@@ -93,5 +98,6 @@ def _row(test: str, steady: pd.DataFrame, value: pd.Series) -> dict:
         "value": float(value.mean()),
         "value_sd": float(value.std()),
         "samples": int(len(value)),
+        "rest_samples": float(rest_samples),
         "voltage_v": float(steady["battery_voltage_v"].mean()),
     }
