@@ -1,5 +1,7 @@
 """From the chapters' figures, tables and texts to the report; included last, after every chapter's rule."""
 
+from rotorid.provenance import in_words
+
 PARTS = "workflow/report"
 
 
@@ -30,13 +32,18 @@ QUOTED = {
     "improved": "results/grey_box/inertias.json",
     "black_box": "results/black_box/summary.json",
     "held_out": "results/black_box/held_out_scores.csv",
-    "proof": f"{CONFIG.proof.tables}/state.json",
     "proof_rows": f"{CONFIG.proof.tables}/summary.csv",
+}
+# What the abstract counts is what the proof's chapter prints.
+PRINTED = {
+    "targets": rules.chapter_proof.output.rows,
+    "plantings": rules.chapter_proof.output.planted,
+    "proof_cases": f"{CONFIG.proof.tables}/cases.csv",
 }
 QUOTED_BY = {
     "white_box": {"truth": rules.score_campaign.output.state},
-    "abstract": QUOTED,
-    "conclusions": QUOTED | {"propellers": "results/rotor/coefficients.json"},
+    "abstract": QUOTED | PRINTED,
+    "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},
 }
 RECORDED = {row["kind"] for row in SESSIONS}
 LEFT_OUT = sorted({path.stem for path in Path("notebooks").glob("*.md")} - set(CONFIG.report.chapters))
@@ -48,6 +55,9 @@ NOTICE = (
     if EMULATED
     else "Captions say what each figure and table is made of."
 )
+
+
+ORIGIN = in_words(ROOT, code_of("judge"))
 
 
 def kinds_lacking(chapter):
@@ -131,6 +141,7 @@ rule typeset_pdf:
         subtitle=CONFIG.report.subtitle,
         left_out=LEFT_OUT,
         notice=NOTICE,
+        origin=ORIGIN,
         code=code_of("typeset_pdf"),
     log:
         "results/logs/typeset_pdf.log",
@@ -156,6 +167,7 @@ rule build_html:
         subtitle=CONFIG.report.subtitle,
         left_out=LEFT_OUT,
         notice=NOTICE,
+        origin=ORIGIN,
         code=code_of("build_html"),
     log:
         "results/logs/build_html.log",
