@@ -40,7 +40,6 @@ rule judge_examples:
 
 
 # The campaign's own sets are judged where the index lists every kind of test that they are made of.
-KINDS_RECORDED = {(row["kind"], row["instrument"]) for row in SESSIONS}
 NEEDED_BY_SETS = {
     tuple(BENCH_SETS.values()): {("calibration", "bench"), ("static", "bench"), ("static", "jr3")},
     tuple(STAND_SETS.values()): {

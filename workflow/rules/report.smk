@@ -14,8 +14,6 @@ ALL_KINDS = ["calibration", "static", "combined", "dynamic", "tensile", "thrust"
 KINDS_OF_CHAPTER = {
     "bench": ["calibration", "static", "combined", "dynamic", "tensile"],
     "stand": ["thrust", "torque", "dynamics"],
-    "white_box": ["thrust", "torque"],
-    "grey_box": ["thrust", "torque"],
     "black_box": ["thrust", "torque", "dynamics"],
     "abstract": ALL_KINDS,
     "conclusions": ALL_KINDS,
@@ -45,7 +43,7 @@ QUOTED_BY = {
     "abstract": QUOTED | PRINTED,
     "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},
 }
-RECORDED = {row["kind"] for row in SESSIONS}
+RECORDED = {kind for kind, _ in KINDS_RECORDED}
 LEFT_OUT = sorted({path.stem for path in Path("notebooks").glob("*.md")} - set(CONFIG.report.chapters))
 EMULATED = any(row["source"] == "emulator" for row in SESSIONS)
 NOTICE = (
@@ -61,7 +59,7 @@ ORIGIN = in_words(ROOT, code_of("judge"))
 
 
 def kinds_lacking(chapter):
-    """Kinds of recordings that a chapter needs and the index does not list."""
+    """Kinds of recordings that a chapter needs and the index lists too few of."""
     return [kind for kind in KINDS_OF_CHAPTER.get(chapter, []) if kind not in RECORDED]
 
 

@@ -2,8 +2,8 @@
 
 The reading at rest is taken off each test (the tare): before the motor starts, of a torque test also after.
 Thrust comes from the tester alone. Torque comes from two instruments with their own clocks: the tester counts
-revolutions, the wrench sensor feels the moment; both are averaged over the same stretch of the host's time, with
-a margin larger than the clocks' difference.
+revolutions, the wrench sensor feels the moment. The host's time tells when the sensor was while the motor ran; all
+margins are in each device's own time, which also holds for an emulator that runs faster than life.
 
 Tables are those of `rotorid.io.tables`: all samples of one instrument, and one row a recording.
 """
@@ -25,12 +25,12 @@ COLUMNS = (
 """`rest_samples`: of how many samples the mean would be as uncertain as the tare is."""
 
 
-def _running(table: pd.DataFrame, name: str) -> tuple[float, float]:
-    """Host times between which the motor runs steadily, s."""
-    on = table.loc[table["throttle"] > 0, "host_time_s"]
-    if len(on) == 0 or on.iloc[-1] - on.iloc[0] <= 2 * MARGIN_S:
+def _running(table: pd.DataFrame, name: str) -> pd.DataFrame:
+    """First and last sample with the motor on."""
+    on = table[table["throttle"] > 0]
+    if len(on) == 0 or on["time_s"].iloc[-1] - on["time_s"].iloc[0] <= 2 * MARGIN_S:
         raise InputError(f"{name}: the motor never ran for more than {2 * MARGIN_S} s")
-    return float(on.iloc[0]), float(on.iloc[-1])
+    return on.iloc[[0, -1]]
 
 
 def thrust_points(samples: pd.DataFrame, recordings: pd.DataFrame) -> pd.DataFrame:
@@ -42,9 +42,9 @@ def thrust_points(samples: pd.DataFrame, recordings: pd.DataFrame) -> pd.DataFra
     rows = []
     for name in recordings["id"]:
         table = tables[name]
-        start, stop = _running(table, name)
-        steady = table[table["host_time_s"].between(start + MARGIN_S, stop - MARGIN_S / 3)]
-        rest = table[table["host_time_s"] < start - 0.05]
+        start, stop = _running(table, name)["time_s"]
+        steady = table[table["time_s"].between(start + MARGIN_S, stop - MARGIN_S / 3)]
+        rest = table[table["time_s"] < start - 0.05]
         if len(rest) == 0:
             raise InputError(f"{name}: no sample before the motor started, so no tare")
         rows.append(_row(name, steady, steady["thrust_n"] - rest["thrust_n"].mean(), len(rest)))
@@ -67,10 +67,13 @@ def torque_points(rotor: tuple[pd.DataFrame, pd.DataFrame], wrench: tuple[pd.Dat
             )
         read = sensors[drive.group]
         table, reading = counted[drive.id], felt[read.id]
-        start, stop = _running(table, drive.id)
+        ends = _running(table, drive.id)
+        start, stop = ends["time_s"]
+        steady = table[table["time_s"].between(start + MARGIN_S, stop - MARGIN_S)]
         # Each recording's times count from its own beginning.
-        when = reading["host_time_s"] + (read.host_start_s - drive.host_start_s)
-        steady = table[table["host_time_s"].between(start + MARGIN_S, stop - MARGIN_S)]
+        seen = reading["host_time_s"] + (read.host_start_s - drive.host_start_s)
+        start, stop = np.interp(ends["host_time_s"], seen, reading["time_s"])
+        when = reading["time_s"]
         loaded = reading.loc[when.between(start + MARGIN_S, stop - MARGIN_S), "moment_z_n_m"]
         before = reading.loc[when < start - 0.1, "moment_z_n_m"]
         after = reading.loc[when > stop + MARGIN_S, "moment_z_n_m"]
