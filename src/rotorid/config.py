@@ -100,13 +100,20 @@ def _odd(window: int) -> int:
     return window
 
 
-def _day(text: str) -> str:
+SHORT_HASH = re.compile(r"[0-9a-f]{8}")
+"""First digits of a commit's hash."""
+
+
+def _release(text: str) -> str:
     try:
-        known = text == "" or date.fromisoformat(text).isoformat() == text
+        known = text == "" or bool(SHORT_HASH.fullmatch(text)) or date.fromisoformat(text).isoformat() == text
     except ValueError:
         known = False
     if not known:
-        raise ValueError(f"found {text!r}, expected a day of the calendar, as 2026-11-30, or an empty text")
+        raise ValueError(
+            f"found {text!r}, expected the first eight digits of a commit's hash, as 0285341c, a day of the calendar, as "
+            "2026-11-30, or an empty text"
+        )
     return text
 
 
@@ -344,8 +351,8 @@ class Proof(Section):
     seeds: dict[str, Annotated[int, Field(ge=0)]] = Field(
         description="Repetitions taken of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
     )
-    release: Annotated[str, AfterValidator(_day)] = Field(
-        description="Date of a release proof: cases are drawn from it that nobody has looked at; empty for none [date]."
+    release: Annotated[str, AfterValidator(_release)] = Field(
+        description="Release proof: commit (or date) that cases are drawn from which nobody has looked at; empty for none [name]."
     )
     released: dict[str, Annotated[int, Field(ge=0)]] = Field(
         description="Repetitions taken of each family of drawn cases in a release proof [1]."

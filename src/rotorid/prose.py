@@ -123,10 +123,10 @@ def _standing_alone(markdown: str, path: Path) -> str:
 
 
 def not_recorded(path: str | Path, kinds: Sequence[str], index: str) -> str:
-    """A chapter that cannot be made: its heading, and which kinds of recordings the index does not list."""
+    """A chapter that cannot be made: its heading, and of which kinds of recordings the index lists too few."""
     heading = Path(path).read_text(encoding="utf-8").splitlines()[0]
     named = " and ".join(filter(None, (", ".join(kinds[:-1]), kinds[-1])))
-    return f"{heading}\n\nThis chapter needs {named} recordings, and `{index}` lists none.\n"
+    return f"{heading}\n\nThis chapter needs {named} recordings, and `{index}` lists none or too few.\n"
 
 
 def _defined(form: Callable[..., str]) -> Callable[..., str]:

@@ -48,6 +48,25 @@ def commit(folder: str | Path) -> str:
     return done.stdout.strip()
 
 
+def commit_date(folder: str | Path) -> str:
+    """The day of the commit of the working tree (ISO); empty where there is none."""
+    command = ["git", "-C", str(folder), "log", "-1", "--format=%cs"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return done.stdout.strip()
+
+
+def in_words(folder: str | Path, judging: str) -> str:
+    """Commit, its date and the hash of the code that judges recordings, in one sentence for a title page."""
+    made, day = commit(folder), commit_date(folder)
+    known = f"Made from commit {made[:10]}" + (" of " + day if day else "")
+    known += ", with changes that are not committed" if made.endswith("-dirty") else ""
+    source = known if day else "Made outside of a git checkout, so that no commit is known"
+    return f"{source}. The code that judges recordings has the hash {judging[:7]} ({judging})."
+
+
 def installed_versions(lock: str) -> dict[str, str]:
     """Installed version of each package that a lock file's text names."""
     found = {}

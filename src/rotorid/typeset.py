@@ -32,6 +32,8 @@ class Document:
     left_out: Sequence[str] = ()
     """Names of chapters that are not in this report: a reference into one of them says so."""
     notice: str = ""
+    origin: str = ""
+    """Commit, date and code, for the title page."""
     """What the title page says of the data."""
 
 
@@ -146,6 +148,7 @@ def _pandoc(document: Document, options: Sequence[str]) -> None:
         "--metadata=link-citations:true",
         "--metadata=left-out:" + ",".join(name.replace("_", "-") for name in document.left_out),
         f"--metadata=notice:{document.notice}",
+        f"--metadata=origin:{document.origin}",
         "--metadata=reference-section-title:References",
         *options,
     ]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rotorid.acquire.emulators.bench import BenchPhysics
+from rotorid.acquire.emulators.build import build
 from rotorid.acquire.emulators.devices import programme_share
 from rotorid.acquire.emulators.load_cell import LoadCells
 from rotorid.acquire.emulators.oscillator import Oscillator
@@ -230,3 +231,19 @@ def test_low_pass_and_steadiness():
     assert low_pass.update((1.0,)) == pytest.approx([1 - math.exp(-1)])
     steady = Steadiness(3, (0.5,))
     assert [steady.update([x]) for x in (0.0, 1.0, 1.2, 1.4, 1.9)] == [False, False, False, True, False]
+
+
+def test_one_cell_alone_takes_a_load_from_the_command_line():
+    """Clamped for its calibration, the load is its own; the other five hang unloaded."""
+    ideal = Truth()
+    world = build("bench", ideal, cell=3)
+    world.physics.process(1.0)
+    rest = world.physics.volts()
+    world.physics.place_load("z", 500.48)
+    world.physics.process(5.0)
+    moved = world.physics.volts() - rest
+    assert moved[2] == pytest.approx(500.48 * ideal.cells.volts_per_gf[2], rel=1e-3)
+    assert np.abs(np.delete(moved, 2)).max() == 0
+    for what, cell in (("bench", 7), ("rotor", 1)):
+        with pytest.raises(ValueError, match="a cell is one of the bench"):
+            build(what, ideal, cell=cell)

@@ -83,7 +83,8 @@ def test_a_chapter_without_its_recordings_says_which(tmp_path: Path) -> None:
     path = tmp_path / "hover.md"
     path.write_text("# Hover {#sec:hover}\n\n{{ nothing.here }}\n")
     assert prose.not_recorded(path, ["thrust", "torque"], "mine/sessions.tsv") == (
-        "# Hover {#sec:hover}\n\nThis chapter needs thrust and torque recordings, and `mine/sessions.tsv` lists none.\n"
+        "# Hover {#sec:hover}\n\nThis chapter needs thrust and torque recordings, "
+        "and `mine/sessions.tsv` lists none or too few.\n"
     )
 
 

@@ -27,6 +27,7 @@ def test_raw_files_are_named_with_their_hash(tmp_path: Path) -> None:
 def test_outside_of_git_the_commit_is_said_to_be_unknown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
     assert provenance.commit(tmp_path) == "unknown: not a git checkout"
+    assert "no commit is known" in provenance.in_words(tmp_path, "0123456789ab")
 
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
@@ -44,3 +45,8 @@ def test_a_changed_file_marks_the_commit_dirty(tmp_path: Path) -> None:
     assert provenance.commit(tmp_path) == head
     (tmp_path / "a").write_text("2")
     assert provenance.commit(tmp_path) == f"{head}-dirty"
+    day = git("log", "-1", "--format=%cs")
+    assert provenance.in_words(tmp_path, "0123456789ab") == (
+        f"Made from commit {head[:10]} of {day}, with changes that are not committed. "
+        "The code that judges recordings has the hash 0123456 (0123456789ab)."
+    )

@@ -12,7 +12,6 @@ from rotorid.rotor.coefficients import (
     modified_z_scores,
     pool,
     rest_reading,
-    simulated_coverage,
     usable,
 )
 
@@ -46,24 +45,13 @@ def test_the_interval_holds_where_fast_points_are_noisier() -> None:
     assert 0.933 < held / 1500 < 0.967
 
 
-def test_the_simulated_coverage_is_that_of_the_intervals_themselves() -> None:
-    """The same twenty tests: by brute force the usual formula holds 86 % and the one used 95 %."""
-    rng = np.random.default_rng(5)
-    speed = 1575 * (np.arange(1, 21) / 20) ** 0.669
-    noise = 0.0006 + 0.0008 * (speed / 1000) ** 2
-    found = [simulated_coverage(points(1.8558e-8 * speed**2 + rng.normal(0, noise), speed)) for _ in range(25)]
-    assert np.mean([c.equal_noise for c in found]) == pytest.approx(0.86, abs=0.02)
-    assert np.mean([c.own_noise for c in found]) == pytest.approx(0.95, abs=0.01)
-    assert np.median([c.noise_growth for c in found]) == pytest.approx(noise[-1] / noise[0], rel=0.5)
-
-
-def test_the_simulated_coverage_of_equal_noise_is_what_both_promise() -> None:
-    rng = np.random.default_rng(6)
-    run = points(1.2e-6 * SPEED**2 + rng.normal(0, 0.01, len(SPEED)))
-    found = simulated_coverage(Points("equal", np.tile(run.speed_rad_s, 20), np.tile(run.thrust_n, 20)))
-    low, high = found.interval_equal_noise_95
-    assert low < 1.2e-6 < high
-    assert found.own_noise == pytest.approx(0.95, abs=0.015)
+def test_equal_noise_gives_the_usual_formula_by_hand() -> None:
+    # As above three points: sum F w² = 1·1 + 3·4 + 8·9 = 85, sum w⁴ = 98; residuals² over two degrees of freedom.
+    thrust, square = np.array([1.0, 3.0, 8.0]), np.array([1.0, 4.0, 9.0])
+    fit = fit_coefficient([points(thrust, [1000.0, 2000.0, 3000.0])], offset=False, equal_noise=True)
+    variance = np.sum((thrust - 85 / 98 * square) ** 2) / 2
+    assert fit.standard_error == pytest.approx(np.sqrt(variance / 98) * 1e-6)
+    assert fit.freedom == 2
 
 
 def test_each_run_has_an_offset_of_its_own() -> None:

@@ -23,6 +23,7 @@ TARGETS = (
     "results/stand/experiments.csv",
     "results/black_box/experiments.csv",
 )
+SOME_CHAPTERS = ("--config", "raw=mine", "report={chapters: [white_box, stand]}")
 WHITE_BOX = "White box: rotor coefficients and mass properties"
 ROTOR = {
     WHITE_BOX,
@@ -162,6 +163,25 @@ def test_a_folder_with_thrust_tests_alone_gives_the_thrust_coefficient(project: 
     project.snakemake("results/report/chapters/bench.md", "--config", "raw=mine")
     text = (project.root / "results/report/chapters/bench.md").read_text()
     assert "needs calibration, static, combined, dynamic and tensile recordings" in text
+    # Without torque tests only what needs them is left out.
+    project.snakemake("results/report/chapters/white_box.md", "results/grey_box/rotor.json", *SOME_CHAPTERS)
+    text = (project.root / "results/report/chapters/white_box.md").read_text()
+    assert f"{len(thrust)} thrust tests of one rotor were recorded" in text
+    assert "The torque coefficient is left out" in text and "Attitude control" in text
+    assert set(json.loads((project.root / "results/grey_box/rotor.json").read_text())) == {"c_f"}
+
+
+@pytest.mark.slow
+def test_one_thrust_test_is_a_sentence_and_no_stop(project: Project) -> None:
+    raw, elsewhere = project.root / "raw", project.root / "mine"
+    record_again(raw, [row for row in read_index(raw) if row["kind"] == "thrust"][:1], elsewhere)
+    write_index(elsewhere)
+    chapters = [f"results/report/chapters/{name}.md" for name in ("white_box", "stand")]
+    project.snakemake(*chapters, "results/grey_box/rotor.json", *SOME_CHAPTERS)
+    white_box, stand = ((project.root / path).read_text() for path in chapters)
+    assert "lists too few of them for a curve" in white_box
+    assert "This chapter needs thrust, torque and dynamics recordings" in stand
+    assert json.loads((project.root / "results/grey_box/rotor.json").read_text()) == {}
 
 
 def test_first_tries_enter_no_index_unasked(tmp_path: Path) -> None:

@@ -86,6 +86,16 @@ def test_typst_says_the_same_numbers_and_makes_a_pdf(chapters: list[str]) -> Non
     assert Path("again.pdf").read_bytes() == first
 
 
+def test_both_forms_say_on_their_first_page_from_which_commit_they_are(chapters: list[str]) -> None:
+    document = typeset.Document(chapters, "Title", "Subtitle", PARTS, origin="Made from commit abc of 2026-01-02.")
+    typeset.typst_source(document, "report.typ")
+    source = Path("report.typ").read_text()
+    assert "Made from commit abc" in source[: source.index("Contents")]
+    typeset.html(document, "report.html")
+    page = Path("report.html").read_text()
+    assert "Made from commit abc" in page[: page.index('id="contents"')]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

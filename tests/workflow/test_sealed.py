@@ -9,7 +9,7 @@ from test_rules import RULES, WORKING
 from rotorid.codehash import Code
 
 ROOT = Path(__file__).parents[2]
-OPENS = {"score_proof", "score_ablation"}
+OPENS = {"score_proof", "score_ablation", "score_campaign"}
 WRITES = {"conceal"}
 
 

@@ -39,6 +39,52 @@ rule judge_examples:
         "../scripts/judge_examples.py"
 
 
+# The campaign's own sets are judged where the index lists every kind of test that they are made of.
+NEEDED_BY_SETS = {
+    tuple(BENCH_SETS.values()): {("calibration", "bench"), ("static", "bench"), ("static", "jr3")},
+    tuple(STAND_SETS.values()): {
+        *(("dynamics", instrument) for instrument in ("quadrotor", "wrench")),
+        *(("torque", instrument) for instrument in ("rotor", "wrench")),
+        ("thrust", "rotor"),
+    },
+}
+JUDGED_OF_CAMPAIGN = {
+    Path(folder).name: folder
+    for folders, needed in NEEDED_BY_SETS.items()
+    if needed <= KINDS_RECORDED
+    for folder in folders
+}
+
+
+def sealed_truth(wildcards):
+    """What the emulators were given, where the project's own emulated campaign is what was recorded."""
+    emulated = SESSIONS and all(row["source"] == "emulator" for row in SESSIONS)
+    return ["tests/sealed/campaign_stated.yaml"] if emulated and CONFIG.raw == "raw" else []
+
+
+rule score_campaign:
+    """Verdicts on the campaign's own sets, beside what the emulators were given."""
+    message:
+        "Mismatch: the campaign's own sets beside what is true"
+    input:
+        verdicts=expand("results/mismatch/{set}/verdict.json", set=JUDGED_OF_CAMPAIGN),
+        ledgers=expand("results/mismatch/{set}/ledger.json", set=JUDGED_OF_CAMPAIGN),
+        truth=sealed_truth,
+        recordings=list(JUDGED_OF_CAMPAIGN.values()),
+    output:
+        state="results/campaign/state.json",
+        channels="results/campaign/channels.csv",
+        sets="results/campaign/sets.csv",
+        numbers="results/campaign/numbers.csv",
+    params:
+        sets=JUDGED_OF_CAMPAIGN,
+        code=code_of("score_campaign"),
+    log:
+        "results/logs/score_campaign.log",
+    script:
+        "../scripts/score_campaign.py"
+
+
 rule chapter_mismatch:
     """Figures and tables of the mismatch chapter."""
     message:
@@ -50,6 +96,10 @@ rule chapter_mismatch:
         effects=rules.judge_examples.output.effects,
         locations=rules.judge_examples.output.locations,
         traces=rules.judge_examples.output.traces,
+        campaign=rules.score_campaign.output.state,
+        campaign_channels=rules.score_campaign.output.channels,
+        campaign_sets=rules.score_campaign.output.sets,
+        campaign_numbers=rules.score_campaign.output.numbers,
     output:
         real_error=report(
             "results/report/mismatch/real_error.svg",
@@ -70,6 +120,10 @@ rule chapter_mismatch:
             labels={"figure": "bench error"},
         ),
         verdicts="results/report/mismatch/verdicts.csv",
+        example_channels="results/report/mismatch/example_channels.csv",
+        set_channels="results/report/mismatch/set_channels.csv",
+        sets="results/report/mismatch/sets.csv",
+        numbers="results/report/mismatch/numbers.csv",
         real_effects="results/report/mismatch/real_effects.csv",
         bench_effects="results/report/mismatch/bench_effects.csv",
     params:

@@ -28,6 +28,19 @@ def logs_of(kind, instrument):
     return [f"{CONFIG.raw}/{row[name]}" for row in rows for name in ("file", "metadata")]
 
 
+# So many tests of a rotor make a curve; fewer are as good as none.
+LEAST_TESTS = {"thrust": 4, "torque": 4}
+
+
+def recorded_kinds():
+    """Kinds of tests and instruments that the index lists often enough to be used."""
+    pairs = [(row["kind"], row["instrument"]) for row in SESSIONS]
+    return {pair for pair in pairs if pairs.count(pair) >= LEAST_TESTS.get(pair[0], 1)}
+
+
+KINDS_RECORDED = recorded_kinds()
+
+
 def logs_to_ingest(wildcards):
     """Raw logs and metadata behind one pair of tables."""
     found = logs_of(wildcards.kind, wildcards.instrument)

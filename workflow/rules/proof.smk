@@ -160,6 +160,7 @@ rule tabulate_real:
         table="results/proof/real.csv",
         coefficients="results/proof/coefficients.csv",
     params:
+        judging=code_of("judge"),
         code=code_of("tabulate_real"),
     log:
         "results/logs/tabulate_real.log",
@@ -227,6 +228,9 @@ rule chapter_proof:
         coefficients=f"{CONFIG.proof.tables}/coefficients.csv",
         next_flight="docs/proof/next_flight.csv",
         next_flight_summary="docs/proof/next_flight_summary.csv",
+        releases_named="docs/proof/releases.csv",
+        plantings_rows="docs/proof/plantings.csv",
+        plantings_before_rows="docs/proof/plantings_before.csv",
         plantings="docs/proof/plantings_summary.csv",
         plantings_before="docs/proof/plantings_before_summary.csv",
     output:
@@ -276,8 +280,8 @@ rule chapter_proof:
         planted="results/report/proof/planted.csv",
         flights="results/report/proof/flights.csv",
         asked="results/report/proof/asked.csv",
+        stored="results/report/proof/stored.json",
     params:
-        present=code_of("judge"),
         code=code_of_chapter("proof"),
     log:
         "results/logs/chapter_proof/run.log",

@@ -1,5 +1,7 @@
 """From the chapters' figures, tables and texts to the report; included last, after every chapter's rule."""
 
+from rotorid.provenance import in_words
+
 PARTS = "workflow/report"
 
 
@@ -12,8 +14,6 @@ ALL_KINDS = ["calibration", "static", "combined", "dynamic", "tensile", "thrust"
 KINDS_OF_CHAPTER = {
     "bench": ["calibration", "static", "combined", "dynamic", "tensile"],
     "stand": ["thrust", "torque", "dynamics"],
-    "white_box": ["thrust", "torque"],
-    "grey_box": ["thrust", "torque"],
     "black_box": ["thrust", "torque", "dynamics"],
     "abstract": ALL_KINDS,
     "conclusions": ALL_KINDS,
@@ -30,14 +30,20 @@ QUOTED = {
     "improved": "results/grey_box/inertias.json",
     "black_box": "results/black_box/summary.json",
     "held_out": "results/black_box/held_out_scores.csv",
-    "proof": f"{CONFIG.proof.tables}/state.json",
     "proof_rows": f"{CONFIG.proof.tables}/summary.csv",
 }
-QUOTED_BY = {
-    "abstract": QUOTED,
-    "conclusions": QUOTED | {"propellers": "results/rotor/coefficients.json"},
+# What the abstract counts is what the proof's chapter prints.
+PRINTED = {
+    "targets": rules.chapter_proof.output.rows,
+    "plantings": rules.chapter_proof.output.planted,
+    "proof_cases": f"{CONFIG.proof.tables}/cases.csv",
 }
-RECORDED = {row["kind"] for row in SESSIONS}
+QUOTED_BY = {
+    "white_box": {"truth": rules.score_campaign.output.state},
+    "abstract": QUOTED | PRINTED,
+    "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},
+}
+RECORDED = {kind for kind, _ in KINDS_RECORDED}
 LEFT_OUT = sorted({path.stem for path in Path("notebooks").glob("*.md")} - set(CONFIG.report.chapters))
 EMULATED = any(row["source"] == "emulator" for row in SESSIONS)
 NOTICE = (
@@ -49,8 +55,11 @@ NOTICE = (
 )
 
 
+ORIGIN = in_words(ROOT, code_of("judge"))
+
+
 def kinds_lacking(chapter):
-    """Kinds of recordings that a chapter needs and the index does not list."""
+    """Kinds of recordings that a chapter needs and the index lists too few of."""
     return [kind for kind in KINDS_OF_CHAPTER.get(chapter, []) if kind not in RECORDED]
 
 
@@ -130,6 +139,7 @@ rule typeset_pdf:
         subtitle=CONFIG.report.subtitle,
         left_out=LEFT_OUT,
         notice=NOTICE,
+        origin=ORIGIN,
         code=code_of("typeset_pdf"),
     log:
         "results/logs/typeset_pdf.log",
@@ -155,6 +165,7 @@ rule build_html:
         subtitle=CONFIG.report.subtitle,
         left_out=LEFT_OUT,
         notice=NOTICE,
+        origin=ORIGIN,
         code=code_of("build_html"),
     log:
         "results/logs/build_html.log",

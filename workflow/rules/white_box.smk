@@ -4,8 +4,8 @@ THESIS_VEHICLE = "raw/vehicle/thesis.yaml"
 
 
 def ingested_if_recorded(kind, instrument):
-    """Samples and recordings of one kind of test and instrument; nothing where the index lists none."""
-    return ingested(kind, instrument) if logs_of(kind, instrument) else []
+    """Samples and recordings of one kind of test and instrument; nothing where the index lists too few."""
+    return ingested(kind, instrument) if (kind, instrument) in KINDS_RECORDED else []
 
 
 rule fit_white_box:

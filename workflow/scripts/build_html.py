@@ -13,5 +13,6 @@ if __name__ == "__main__":
             parts=Path(snakemake.input.template).parent,
             left_out=snakemake.params.left_out,
             notice=snakemake.params.notice,
+            origin=snakemake.params.origin,
         )
         typeset.html(document, snakemake.output.html)

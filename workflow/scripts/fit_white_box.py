@@ -1,8 +1,8 @@
 """White box: rotor coefficients from the rotor tests, mass properties from the component table.
 
 - Steady points of the thrust and torque tests; a coefficient whose tests were not recorded is left out.
-- C_F and C_Q through the origin (thesis eqs 4.25, 4.26) with intervals, and with the noise of the speed considered,
-  and how often these intervals hold the truth on simulated tests whose noise grows as that of the tests does.
+- C_F and C_Q through the origin (thesis eqs 4.25, 4.26) with intervals, and with the noise of the speed considered.
+- Noise of the samples behind the points: whether it grows with speed, and whether the points scatter as it says.
 - Mass, centre of mass and inertia from the components by parallel axes.
 """
 
@@ -19,7 +19,8 @@ from scipy.stats import t as student_t
 from rotorid import log, thesis
 from rotorid.io.tables import read_sessions
 from rotorid.rotor.campaign import COLUMNS, thrust_points, torque_points
-from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient, simulated_coverage
+from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
+from rotorid.rotor.sample_noise import sample_noise
 from rotorid.vehicle.mass_properties import compose, read_components
 
 LEAST_TORQUE_SD_N_M = 1e-6
@@ -28,12 +29,12 @@ LEAST_TORQUE_SD_N_M = 1e-6
 def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
     """C with its intervals: speed exact, and speed as noisy as its own readings at each point scattered."""
     run = [Points("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
-    plain = fit_coefficient(run, offset=False)
+    plain = fit_coefficient(run, offset=False, equal_noise=True)
+    own_noise = fit_coefficient(run, offset=False)
     # The mean of n readings: its speed is uncertain by sd / sqrt(n) as a share of the speed.
     relative = float(np.median(points["speed_sd_rad_s"] / np.sqrt(points["samples"]) / points["speed_rad_s"]))
     noisy = fit_coefficient(run, offset=False, speed_noise_relative=relative, least_sd=least_sd)
-    offset = fit_coefficient(run, offset=True)
-    coverage = simulated_coverage(run[0])
+    offset = fit_coefficient(run, offset=True, equal_noise=True)
     return {
         "value": plain.value,
         "interval_95": plain.interval_95,
@@ -50,10 +51,8 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "standard_errors_off": (plain.value - believed) / plain.standard_error,
         "p_value": float(2 * student_t.sf(abs(plain.value - believed) / plain.standard_error, plain.freedom)),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
-        "coverage": asdict(coverage),
-        "thesis_inside_equal_noise": coverage.interval_equal_noise_95[0]
-        <= believed
-        <= coverage.interval_equal_noise_95[1],
+        "interval_95_own_noise": own_noise.interval_95,
+        "noise": asdict(sample_noise(points)),
     }
 
 

@@ -18,6 +18,7 @@ import pandas as pd
 from rotorid import log
 from rotorid.importers.report import read_report
 from rotorid.mismatch.deliver import analysis_of, write_files
+from rotorid.proof import quoted
 from rotorid.recordings import RecordingSet, Run, read_set
 
 SHOWN_HZ = 50.0
@@ -50,13 +51,6 @@ def recorded(case: str, root: str) -> RecordingSet:
 
 def rows_of(example: str, verdict: Mapping[str, Any]) -> tuple[list[dict], list[dict], list[dict]]:
     """Channels, effects and locations of a verdict as rows of tables."""
-    channels = []
-    for name, channel in verdict["channels"].items():
-        for split, errors in channel["rmse"].items():
-            channels.append(
-                {"example": example, "channel": name, "split": split, "unit": channel["unit"], **(errors or {})}
-                | {"noise_floor": channel["noise_floor"]}
-            )
     effects = []
     for effect in verdict["effects"]:
         common = {"example": example, "effect": effect["id"], "status": effect["status"]}
@@ -71,7 +65,7 @@ def rows_of(example: str, verdict: Mapping[str, Any]) -> tuple[list[dict], list[
         {"example": example, **{name: place[name] for name in ("run", "channel", "start_s", "stop_s")}}
         for place in verdict["locations"]
     ]
-    return channels, effects, locations
+    return quoted.channels(example, verdict), effects, locations
 
 
 def main(
@@ -91,11 +85,7 @@ def main(
         files = [place / file for file in ("verdict.json", "report.html", "improved_vehicle.yaml")]
         verdict = json.loads(write_files(analysis, *files).text())
         state["examples"][name] = {
-            "verdict": verdict["verdict"].replace("_", " "),
-            "sentence": verdict["sentence"],
-            # As on the page: what the verdict rests on and what is doubted come before it.
-            "said_before": [verdict["basis"]["sentence"], *(doubt["sentence"] for doubt in verdict["doubts"])],
-            "said_with_it": verdict["warnings"],
+            **quoted.said(verdict),
             "runs": len(recordings.runs),
             "seconds": float(sum(run.time_s[-1] - run.time_s[0] for run in recordings.runs)),
             "values": [

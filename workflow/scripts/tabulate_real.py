@@ -12,13 +12,14 @@ from rotorid import log
 from rotorid.proof import real
 
 
-def main(studies: list[str], flights: str, table: str, coefficients: str) -> None:
-    """Gather the results of `studies`; `flights` holds NeuroBEM's own errors."""
+def main(studies: list[str], flights: str, judging: str, table: str, coefficients: str) -> None:
+    """Gather the results of `studies`, judged by the code `judging`; `flights` holds NeuroBEM's own errors."""
     results = real.read_results([Path(p) for p in studies])
     rows = pd.DataFrame([r["row"] for r in results], columns=real.ROW_COLUMNS)
     own = real.neurobem_errors(pd.read_csv(flights).to_dict("records"))
     for group in ("force", "moment"):
         rows[f"{group}_neurobem"] = [own.get((held, group)) for held in rows["held_out"]]
+    rows["judged_by"] = judging
     rows.to_csv(table, index=False, float_format="%.6g")
     found = [c for r in results for c in r["compared"]]
     pd.DataFrame(found, columns=real.COMPARED_COLUMNS).to_csv(coefficients, index=False, float_format="%.6g")
@@ -29,6 +30,7 @@ if __name__ == "__main__":
         main(
             studies=snakemake.input.studies,
             flights=snakemake.input.flights,
+            judging=snakemake.params.judging,
             table=snakemake.output.table,
             coefficients=snakemake.output.coefficients,
         )

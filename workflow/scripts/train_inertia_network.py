@@ -103,6 +103,7 @@ def main(
         "epochs": epochs,
         "mini_batch": MINI_BATCH,
         "samples": len(thinned[0]),
+        "samples_of_all": len(whole[0]),
         "methods": [
             method_row(name, fit, truth, floor * (k_d**2 if "scaled" in name else 1.0))
             for name, fit in (
@@ -119,6 +120,13 @@ def main(
         "epochs_to_settle_scaled": scaled.epochs_to_settle.tolist(),
         "least_squares": squares.weights.tolist(),
         "least_squares_sigma": np.sqrt(np.diag(squares.covariance)).tolist(),
+        # On the samples that the network is trained on.
+        "same_samples": {
+            "weights": short.weights.tolist(),
+            "sigma": np.sqrt(np.diag(short.covariance)).tolist(),
+            "inertias": short.inertias.tolist(),
+            "half_width_95": (1.96 * short.inertia_errors).tolist(),
+        },
         "thesis": list(printed),
         "inertias": {
             "truth": truth.tolist(),

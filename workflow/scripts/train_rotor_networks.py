@@ -2,6 +2,7 @@
 
 - Scaling of eqs 4.67-4.73, batch method, rate and epochs from the configuration.
 - The error by epoch for several sizes of the hidden layer, each from several seeds.
+- The coefficients of the weights that the thesis prints. One whose tests were not recorded is left out.
 """
 
 import json
@@ -15,17 +16,23 @@ from rotorid.estimate.aerodynamic import fit_coefficient_network
 from rotorid.networks.training import Training
 from rotorid.rotor.coefficients import Points, fit_coefficient
 
+HISTORY = ["coefficient", "epoch", "mse"]
+SIZES = ["coefficient", "hidden", "epoch", "mse"]
+
 
 def main(
     thrust: str, torque: str, rate: float, epochs: int, hidden: int, seed: int, fits: str, history: str, sizes: str
 ) -> None:
     """Train on the points; write coefficients (JSON), error by epoch (CSV) and by hidden size (CSV)."""
-    found, curves, by_size = {}, [], []
+    found, curves, by_size = {}, [pd.DataFrame(columns=HISTORY)], [pd.DataFrame(columns=SIZES)]
     for name, path, key in (
         ("c_f", thrust, "thrust_coefficient_n_s2"),
         ("c_q", torque, "torque_coefficient_n_m_s2"),
     ):
         points = pd.read_csv(path)
+        if points.empty:
+            continue
+        printed = thesis.ROTOR_NETWORKS[key]
         speed, value = points["speed_rad_s"].to_numpy(), points["value"].to_numpy()
         fit = fit_coefficient_network(speed, value, hidden, Training(rate, epochs, seed=seed))
         squares = fit_coefficient([Points("tests", speed, value)], offset=False)
@@ -36,6 +43,8 @@ def main(
             "interval_95": squares.interval_95,
             "thesis_network": thesis.GREY_BOX[key],
             "thesis_least_squares": thesis.WHITE_BOX[key],
+            "thesis_weights": printed.coefficient,
+            "thesis_weights_rounding": printed.rounding,
             "network_inside": squares.interval_95[0] <= fit.coefficient <= squares.interval_95[1],
             "k_x": fit.scaling.k_x,
             "k_d": fit.scaling.k_d,
@@ -53,8 +62,8 @@ def main(
             middle = np.median([r.mse[:, 0] for r in runs], axis=0)
             by_size.append(pd.DataFrame({"coefficient": name, "hidden": size, "epoch": runs[0].epochs, "mse": middle}))
     Path(fits).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    pd.concat(curves).to_csv(history, index=False, float_format="%.6g")
-    pd.concat(by_size).to_csv(sizes, index=False, float_format="%.6g")
+    pd.concat(curves[1:] or curves).to_csv(history, index=False, float_format="%.6g")
+    pd.concat(by_size[1:] or by_size).to_csv(sizes, index=False, float_format="%.6g")
 
 
 if __name__ == "__main__":

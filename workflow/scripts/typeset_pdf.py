@@ -20,5 +20,6 @@ if __name__ == "__main__":
             parts=Path(snakemake.input.template).parent,
             left_out=snakemake.params.left_out,
             notice=snakemake.params.notice,
+            origin=snakemake.params.origin,
         )
         main(document, snakemake.output.source, snakemake.output.pdf)

@@ -33,6 +33,7 @@ from rotorid.acquire.emulators.devices import (
 from rotorid.acquire.emulators.faults import Faults
 from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
 from rotorid.acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
+from rotorid.acquire.emulators.stated import write_stated
 from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
 from rotorid.acquire.emulators.wire import WireHalf, World
@@ -47,6 +48,8 @@ from rotorid.io.session import Air, Session, Setup, session_path, write_session
 from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 
 SEED = 2024
+STATED = "campaign_stated.yaml"
+"""Beside the sealed truth: the same in the words of the catalogue."""
 REPEATS = 10
 COMBINED_AXES = ("xy", "xz", "yz", "xyz")
 COMBINED_LOADS = (3, 4, 6)  # combinations of weights
@@ -469,6 +472,7 @@ def run_campaign(
         say(f"{name}: {sum(s.setup.kind == name for s in campaign.recordings)} recordings")
     write_index(raw)
     write_truth(campaign.truth, sealed, seed)
+    write_stated(campaign.truth, sealed.with_name(STATED))
     return campaign.recordings
 
 

@@ -405,6 +405,9 @@ def emulate(
     ],
     material: Annotated[str, typer.Option(help="of the bench: al or pla")] = "al",
     load: Annotated[str | None, typer.Option(help="put a weight on: AXIS:GF@SECONDS, e.g. z:500.48@6")] = None,
+    cell: Annotated[
+        int | None, typer.Option(help="bench: this cell alone, clamped for its calibration; --load goes onto it")
+    ] = None,
     number: Annotated[int, typer.Option("--experiment", help="stand: mount angle of this experiment")] = 1,
     infill_percent: Annotated[int, typer.Option(help="of the tensile specimen")] = 100,
     speed: Annotated[float, typer.Option(help="device seconds per second")] = 1.0,
@@ -419,7 +422,7 @@ def emulate(
 
     try:
         chosen = read_truth(truth) if truth else draw_truth(seed)
-        world = build(what, chosen, seed, material, number, infill_percent, fault_share)
+        world = build(what, chosen, seed, material, number, infill_percent, fault_share, cell=cell)
         if load is not None:
             world.plan(*parse_load(load))
     except (ValueError, OSError) as error:

@@ -10,6 +10,9 @@ import pandas as pd
 from rotorid.plots import style
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
@@ -20,6 +23,9 @@ def rotor_networks(points: dict[str, pd.DataFrame], history: pd.DataFrame, fits:
     """Error by epoch and the network's curve with the tests, thrust and torque (figures 4.18, 4.19)."""
     fig, axes = style.figure(4.4, 2, 2)
     for row, (key, (label, unit, scale)) in enumerate(NAMES.items()):
+        if key not in fits:
+            _not_recorded(axes[row], label)
+            continue
         mine = history[history["coefficient"] == key]
         axes[row, 0].loglog(mine["epoch"] + 1, mine["mse"], color=style.COLOUR["model"])
         axes[row, 0].set_ylabel(f"{label}: scaled MSE")
@@ -41,10 +47,20 @@ def rotor_networks(points: dict[str, pd.DataFrame], history: pd.DataFrame, fits:
     return fig
 
 
+def _not_recorded(axes: Iterable[Axes], label: str) -> None:
+    """Empty axes that say why."""
+    for axis in axes:
+        axis.text(0.5, 0.5, f"no {label} tests recorded", ha="center", va="center", transform=axis.transAxes)
+        axis.set_axis_off()
+
+
 def hidden_sizes(sizes: pd.DataFrame) -> Figure:
     """Median error by epoch for several sizes of the hidden layer (figure 4.20)."""
     fig, axes = style.figure(2.6, 1, 2)
     for axis, (key, (label, _, _)) in zip(axes, NAMES.items(), strict=True):
+        if not (sizes["coefficient"] == key).any():
+            _not_recorded([axis], label)
+            continue
         for colour, (size, part) in zip(
             style.CYCLE, sizes[sizes["coefficient"] == key].groupby("hidden"), strict=False
         ):
@@ -72,7 +88,7 @@ def inertia_training(history: pd.DataFrame, fits: dict) -> Figure:
         ("truth", fits["truth"][:3], style.BLACK, "_"),
     )
     for shift, (label, values, colour, mark) in zip((-0.2, 0.0, 0.2), found, strict=True):
-        sigma = fits["least_squares_sigma"][:3] if "here" in label else None
+        sigma = fits["same_samples"]["sigma"][:3] if "here" in label else None
         error = None if sigma is None else 1.96 * np.array(sigma)
         axes[1].errorbar(
             place + shift, values, error, fmt=mark, color=colour, label=label, markersize=6, capsize=2, linestyle="none"

@@ -8,9 +8,11 @@ import numpy as np
 
 from rotorid.plots import style
 from rotorid.proof.next_flight import WITHIN
-from rotorid.proof.show import in_a_release
+from rotorid.proof.show import in_words
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
     from matplotlib.figure import Figure
 
@@ -19,22 +21,36 @@ FEWEST_CASES = 10
 LAST_COLUMNS = ("several", "a value", "nothing")
 
 
-def targets(summary: pd.DataFrame) -> Figure:
-    """Each rate that has a target, its 95 % interval, and the stretch that the target allows; grey: not refuted."""
-    rows = summary[(summary["at_least"].notna() | summary["at_most"].notna()) & ~in_a_release(summary)]
-    rows = rows[rows["value"].notna() & ~rows["id"].str.endswith(("oracle", "better", "failed"))].iloc[::-1]
-    fig, ax = style.figure(0.6 + 0.17 * len(rows))
-    for k, row in enumerate(rows.itertuples()):
-        low = row.at_least if np.isfinite(row.at_least) else 0.0
-        high = row.at_most if np.isfinite(row.at_most) else 1.0
-        ax.barh(k, high - low, left=low, height=0.8, color="#dcefe6", zorder=0)
-        colour = {"holds": style.COLOUR["after"], "fails": style.COLOUR["before"]}.get(row.holds, style.GREY)
-        ax.plot([row.low_95, row.high_95], [k, k], color=colour, lw=1.6)
-        ax.plot(row.value, k, "o", color=colour)
-    ax.set_yticks(range(len(rows)), [f"{r.what} ({int(r.cases)})" for r in rows.itertuples()])
-    ax.set_xlim(-0.02, 1.02)
-    ax.set_xlabel("share (in brackets: cases)")
-    ax.grid(axis="y", visible=False)
+RATIO_ROWS = "oracle"
+"""End of the ids of targets that are a ratio and no share."""
+
+
+def targets(summary: pd.DataFrame, names: Mapping[str, str] | None = None) -> Figure:
+    """Every row that has a target, its 95 % interval, and the stretch that the target allows.
+
+    Above the shares, below the ratios of errors. Green: the target holds; red: it fails; grey: not refuted. A release
+    is called by its commit in `names`.
+    """
+    rows = summary[(summary["at_least"].notna() | summary["at_most"].notna()) & summary["value"].notna()].iloc[::-1]
+    ratio = rows["id"].str.endswith(RATIO_ROWS)
+    shares, ratios = rows[~ratio], rows[ratio]
+    heights = [max(len(shares), 1), max(len(ratios), 1)]
+    fig, axes = style.figure(1.0 + 0.115 * sum(heights), rows=2, gridspec_kw={"height_ratios": heights})
+    for ax, part, label in ((axes[0], shares, "share"), (axes[1], ratios, "error over the oracle's")):
+        top = 1.0 if part is shares else 1.05 * max([1.05, *part["high_95"].dropna()])
+        for k, row in enumerate(part.itertuples()):
+            low = row.at_least if np.isfinite(row.at_least) else (0.0 if part is shares else 0.95)
+            high = row.at_most if np.isfinite(row.at_most) else top
+            ax.barh(k, high - low, left=low, height=0.8, color="#dcefe6", zorder=0)
+            colour = {"holds": style.COLOUR["after"], "fails": style.COLOUR["before"]}.get(row.holds, style.GREY)
+            ax.plot([row.low_95, row.high_95], [k, k], color=colour, lw=1.6)
+            ax.plot(row.value, k, "o", color=colour, markersize=3)
+        labels = [f"{in_words(r.what, names or {})} ({int(r.cases)})" for r in part.itertuples()]
+        ax.set_yticks(range(len(part)), labels, fontsize=6)
+        ax.set_ylim(-0.7, len(part) - 0.3)
+        ax.set_xlabel(f"{label} (in brackets: cases)")
+        ax.grid(axis="y", visible=False)
+    axes[0].set_xlim(-0.02, 1.02)
     return fig
 
 

@@ -19,12 +19,20 @@ AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
 def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figure:
     """Steady points of the rotor tests, the fitted parabolas (figure 4.6) and, below, what they leave.
 
-    `thrust` and `torque` have columns `speed_rad_s` and `value` (N, N m); `fits` has `c_f` and `c_q`.
+    `thrust` and `torque` have columns `speed_rad_s` and `value` (N, N m); `fits` has `c_f` and `c_q`, or
+    one of them, or none.
     """
     fig, axes = style.figure(3.2, 2, 2, sharex="col", height_ratios=(2.2, 1))
     for column, (points, fit, label, scale, unit) in enumerate(
-        ((thrust, fits["c_f"], "thrust", 1.0, "N"), (torque, fits["c_q"], "torque", 1000.0, "mN m"))
+        ((thrust, fits.get("c_f"), "thrust", 1.0, "N"), (torque, fits.get("c_q"), "torque", 1000.0, "mN m"))
     ):
+        if fit is None:
+            for axis in axes[:, column]:
+                axis.set_axis_off()
+            axes[0, column].text(
+                0.5, 0.5, f"no {label} tests recorded", ha="center", va="center", transform=axes[0, column].transAxes
+            )
+            continue
         speed = points["speed_rad_s"].to_numpy()
         fine = np.linspace(0, speed.max(), 200)
         top, low = axes[0, column], axes[1, column]

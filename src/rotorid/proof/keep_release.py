@@ -1,6 +1,7 @@
 """A release proof into the tables that are kept: `python -m rotorid.proof.keep_release results/proof docs/proof DATE`.
 
 Rows of the date replace those that were kept of it; everything else stays. Targets are counted anew, cases are not.
+The report calls a release by the commit of its code (`releases.csv`): the date is only what its cases are drawn from.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.proof import table
+from rotorid.provenance import commit
 
 
 def merged(kept: pd.DataFrame, fresh: pd.DataFrame, of_date: Callable[[pd.DataFrame], pd.Series]) -> pd.DataFrame:
@@ -38,6 +40,10 @@ def keep(fresh: Path, kept: Path, date: str) -> int:
         raise InputError(f"{fresh / 'cases.csv'}: no case is of the release {date}")
     for name, of_date in masks.items():
         merged(pd.read_csv(kept / name), tables[name], of_date).to_csv(kept / name, index=False, float_format="%.6g")
+    codes = tables["cases.csv"].loc[masks["cases.csv"](tables["cases.csv"]), "judged_by"].dropna().unique()
+    named = pd.DataFrame([{"released": date, "commit": commit(kept), "code": " ".join(codes)}])
+    known = pd.read_csv(kept / "releases.csv") if (kept / "releases.csv").is_file() else named.iloc[:0]
+    merged(known, named, lambda t: t["released"].astype(str) == date).to_csv(kept / "releases.csv", index=False)
     path = kept / "state.json"
     state = json.loads(path.read_text(encoding="utf-8"))
     state |= {"released": sorted({*state["released"], date}), **targets(pd.read_csv(kept / "summary.csv"))}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 
 import pandas as pd
 
@@ -24,13 +25,35 @@ RELEASE_ROW = re.compile(r"(?P<simulator>\w+)_(?P<date>\d{4}-\d\d-\d\d)_(?P<scor
 """Id of a release's row."""
 
 
-def in_a_release(summary: pd.DataFrame) -> pd.Series:
-    """Mask of the rows of releases: they have a table of their own."""
-    return summary["id"].map(lambda key: RELEASE_ROW.fullmatch(key) is not None)
+NOT_KEPT = "not kept"
 
 
-def of_releases(summary: pd.DataFrame) -> pd.DataFrame:
-    """A row for each date and simulator of the release proof, as text, and one for all of them.
+def short_code(code: object) -> str:
+    """The beginning of a hash; several, or none that was kept, in words."""
+    known = [part for part in str(code).split() if part not in ("nan", "None", "unknown")]
+    return " ".join(part[:7] for part in known) or NOT_KEPT
+
+
+def codes_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
+    """Beginnings of the hashes of the code that judged each stored table's rows, in words."""
+    found = {}
+    for name, table in tables.items():
+        column = "judged_by" if "judged_by" in table else "code"
+        rows = table[column] if column in table else pd.Series([None])
+        codes = sorted({short_code(code) for code in rows}, key=lambda code: (code == NOT_KEPT, code))
+        found[name] = ", ".join(codes)
+    return found
+
+
+def commits(releases: pd.DataFrame) -> dict[str, str]:
+    """Short name of each release by the date that its cases are drawn from: the commit whose code met them first."""
+    return {str(row.released): str(row.commit)[:7] for row in releases.itertuples()}
+
+
+def of_releases(summary: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """A row for each release and simulator of the release proof, as text, and one for all of them.
+
+    `names` has each release's commit by the date that its cases are drawn from.
 
     `right` counts the sets in which all that is hidden was told and nothing else, with the 95 % interval of their share
     (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
@@ -42,7 +65,7 @@ def of_releases(summary: pd.DataFrame) -> pd.DataFrame:
             groups.setdefault((found["date"], found["simulator"]), {})[found["score"]] = row
     rows = [
         {
-            "released": date,
+            "released": names.get(date, date),
             "simulator": short.get(simulator, words(simulator)),
             "right": _of(scores["right"]),
             "share": _span_of(scores["right"]),
@@ -129,27 +152,33 @@ def _target_of_planting(score: pd.Series) -> str:
     return f"≤ {score['at_most']:g}" if pd.notna(score["at_most"]) else ""
 
 
-def with_target(summary: pd.DataFrame, present: str = "") -> pd.DataFrame:
-    """`what`, `measured`, `interval`, `cases`, `target`, `holds`, `by` as text, rows that have a target.
+def with_target(summary: pd.DataFrame, names: Mapping[str, str] | None = None) -> pd.DataFrame:
+    """`what`, `measured`, `interval`, `cases`, `target`, `holds`, `by` as text: every row that has a target.
 
-    Those of releases are left to `of_releases`.
-
-    `by` says whether code older than that of hash `present` judged the row, and how many of its cases were looked at.
+    `by` says which code judged the row's cases, and how many of them had been looked at. A release is called by its
+    commit in `names`.
     """
-    summary = summary[~in_a_release(summary)]
-    return _shown(present, summary[summary["at_least"].notna() | summary["at_most"].notna()])
+    shown = _shown(summary[summary["at_least"].notna() | summary["at_most"].notna()])
+    shown["what"] = [in_words(what, names or {}) for what in shown["what"]]
+    return shown
 
 
-def without_target(summary: pd.DataFrame, present: str = "") -> pd.DataFrame:
-    """The same for rows without one."""
-    summary = summary[~in_a_release(summary)]
-    return _shown(present, summary[summary["at_least"].isna() & summary["at_most"].isna()]).drop(
-        columns=["target", "holds"]
-    )
+def in_words(what: str, names: Mapping[str, str]) -> str:
+    """What a row is about, a release called by its commit instead of the date that its cases are drawn from."""
+    for date, commit in names.items():
+        what = what.replace(f"released {date}", f"release of {commit}")
+    return what
 
 
-def _shown(present: str, rows: pd.DataFrame) -> pd.DataFrame:
-    return pd.DataFrame(
+def without_target(summary: pd.DataFrame) -> pd.DataFrame:
+    """The same for rows without one; those of releases are left to `of_releases`."""
+    others = summary["at_least"].isna() & summary["at_most"].isna()
+    others &= ~summary["id"].map(lambda key: RELEASE_ROW.fullmatch(key) is not None)
+    return _shown(summary[others]).drop(columns=["target", "holds"])
+
+
+def _shown(rows: pd.DataFrame) -> pd.DataFrame:
+    out = pd.DataFrame(
         [
             {
                 "what": row["what"],
@@ -158,26 +187,28 @@ def _shown(present: str, rows: pd.DataFrame) -> pd.DataFrame:
                 if pd.isna(row["low_95"]) or pd.isna(row["value"])
                 else span(row["id"], row["low_95"], row["high_95"]),
                 "cases": "" if pd.isna(row["cases"]) else str(int(row["cases"])),
-                "target": target(row),
+                "target": target(row).replace("\u00a0", " "),
                 "holds": "" if pd.isna(row["holds"]) else row["holds"],
-                "by": provenance(row, present),
+                "by": provenance(row),
             }
             for _, row in rows.iterrows()
         ]
     )
+    out["with_interval"] = [
+        f"{row.measured} ({row.interval})" if row.interval else row.measured for row in out.itertuples()
+    ]
+    return out
 
 
-def provenance(row: pd.Series, present: str) -> str:
-    """Whether older code judged a row's cases, and how many of them are development cases."""
-    said = [] if pd.isna(row["judged_by"]) or row["judged_by"] in ("", present) else ["older"]
+def provenance(row: pd.Series) -> str:
+    """The code that judged a row's cases, and how many of them are development cases."""
     looked, cases = row["looked_at"], row["cases"]
-    if looked > 0 and pd.notna(cases):
-        said.append("seen" if looked >= cases else f"{int(looked)} seen")
-    return ", ".join(said)
+    seen = "none seen" if looked == 0 else "all seen" if pd.isna(cases) or looked >= cases else f"{int(looked)} seen"
+    return f"{short_code(row['judged_by'])}, {seen}"
 
 
-def of_families(families: pd.DataFrame) -> pd.DataFrame:
-    """Drawn cases as text: a row for each family and date with something wrong, the others of a date together."""
+def of_families(families: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
+    """Drawn cases as text: a row for each family and release with something wrong, its other families in one row."""
     known = families.astype(object).fillna("")
     whole = (known["cases"] == known["right"]) & (known["false_alarms"] == 0)
     rows = []
@@ -189,7 +220,7 @@ def of_families(families: pd.DataFrame) -> pd.DataFrame:
             sums = {name: right[name].sum() for name in ("cases", "right", "false_alarms")}
             rows.append({"family": f"{len(right)} families, all right", **others, **sums})
     out = pd.DataFrame(rows, columns=[c for c in known.columns if c not in ("judged_by", "looked_at")]).astype(str)
-    out["released"] = out["released"].replace("", "development")
+    out["released"] = out["released"].replace({"": "development", **names})
     short = {simulator.what: simulator.short for simulator in SIMULATORS.values()}
     out["simulator"] = [short.get(name, name) for name in out["simulator"]]
     for column in ("family", "wrong_names", "missed"):
@@ -215,7 +246,7 @@ def asked_of_flights(rows: pd.DataFrame) -> pd.DataFrame:
                 "found": sigma(row["measured_sigma"]),
                 "standard": sigma(row["standard_sigma"]),
                 "outcome": row["outcome"],
-                "code": "unknown" if row["judged_by"] == "unknown" else f"#{str(row['judged_by'])[:7]}",
+                "code": short_code(row["judged_by"]),
             }
             for _, row in asked.iterrows()
         ],
@@ -285,16 +316,65 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
         found += [f"wrong {'values' if len(wrong) > 1 else 'value'}: {words(', '.join(wrong))}"] if wrong else []
         error = " / ".join("–" if pd.isna(s) else f"{s:.{digits}f}" for s in stages) + f" {unit}"
         share = row["unexplained_share"]
+        expected, confirmed = (
+            [] if pd.isna(row[name]) else [words(one) for one in str(row[name]).split("; ")]
+            for name in ("expected", "expected_found")
+        )
         rows.append(
             {
                 "study": row["study"],
                 "about": row["about"],
                 "found": "; ".join(found) or "nothing",
+                "expected": "; ".join(f"{one}: {'found' if one in confirmed else 'no'}" for one in expected) or "–",
+                "confirmed": len(confirmed) if expected else "",
                 "error": error.replace(" ", "\u00a0"),
                 "unexplained": "–" if pd.isna(share) else f"{100 * share:.0f} %",
             }
         )
-    return pd.DataFrame(rows, columns=["study", "about", "found", "error", "unexplained"])
+    return pd.DataFrame(rows, columns=["study", "about", "expected", "confirmed", "found", "error", "unexplained"])
+
+
+def of_channels(channels: pd.DataFrame) -> pd.DataFrame:
+    """Errors on the runs held out of every channel, a row each: three stages and the noise, in the channel's unit.
+
+    `worse`: by how much the delivered model is worse than the refitted values where it is, in percent.
+    """
+    held = channels[channels["split"] == "held_out"].reset_index(drop=True)
+    out = pd.DataFrame({"recordings": held["example"], "channel": held["channel"].map(words), "unit": held["unit"]})
+    for name in ("noise_floor", "before", "refitted", "after"):
+        out[name] = held[name].map(lambda value: "–" if pd.isna(value) else f"{value:.3g}")
+    growth = held["after"] / held["refitted"] - 1
+    out["worse"] = [f"{100 * more:.1f} %" if more > LEAST_WORSE else "" for more in growth]
+    return out
+
+
+LEAST_WORSE = 5e-4
+"""Growth of an error that its three printed digits may show."""
+
+
+def of_campaign_sets(sets: pd.DataFrame) -> pd.DataFrame:
+    """The campaign's sets as text: verdict, what is at work, and what of it was named, rightly or wrongly."""
+    return sets.apply(lambda column: column.map(words)).replace({"right": {"": "–"}, "wrong": {"": "–"}})
+
+
+def of_campaign_numbers(numbers: pd.DataFrame) -> pd.DataFrame:
+    """A row a set and effect as text: how many numbers are inside, and the one furthest out."""
+    rows = []
+    for row in numbers.itertuples():
+        power = 3 * math.floor(math.log10(abs(row.found)) / 3) if 0 < abs(row.found) < 1e-3 else 0
+        true, found, low, high = (f"{x / 10**power:.4g}" for x in (row.truth, row.found, row.low_95, row.high_95))
+        rows.append(
+            {
+                "set": row.set,
+                "effect": words(row.effect),
+                "inside": f"{row.held} of {row.numbers}",
+                "symbol": row.symbol,
+                "truth": true,
+                "found": f"{found} ({low} to {high})",
+                "unit": (f"1e{power} " if power else "") + row.unit,
+            }
+        )
+    return pd.DataFrame(rows, columns=["set", "effect", "inside", "symbol", "truth", "found", "unit"])
 
 
 VALUE_UNIT = re.compile(r"_(kg_m2|kg|n_m_s2|n_s2|m_s2|rad_s)$")

@@ -2,8 +2,8 @@
 
 The reading at rest is taken off each test (the tare): before the motor starts, of a torque test also after.
 Thrust comes from the tester alone. Torque comes from two instruments with their own clocks: the tester counts
-revolutions, the wrench sensor feels the moment; both are averaged over the same stretch of the host's time, with
-a margin larger than the clocks' difference.
+revolutions, the wrench sensor feels the moment. The host's time tells when the sensor was while the motor ran; all
+margins are in each device's own time, which also holds for an emulator that runs faster than life.
 
 Tables are those of `rotorid.io.tables`: all samples of one instrument, and one row a recording.
 """
@@ -18,15 +18,19 @@ from rotorid.io.tables import by_recording
 
 RPM = 2 * np.pi / 60
 MARGIN_S = 0.6
-COLUMNS = ("test", "throttle", "speed_rad_s", "speed_sd_rad_s", "value", "value_sd", "samples", "voltage_v")
+COLUMNS = (
+    *("test", "throttle", "speed_rad_s", "speed_sd_rad_s"),
+    *("value", "value_sd", "samples", "rest_samples", "voltage_v"),
+)
+"""`rest_samples`: of how many samples the mean would be as uncertain as the tare is."""
 
 
-def _running(table: pd.DataFrame, name: str) -> tuple[float, float]:
-    """Host times between which the motor runs steadily, s."""
-    on = table.loc[table["throttle"] > 0, "host_time_s"]
-    if len(on) == 0 or on.iloc[-1] - on.iloc[0] <= 2 * MARGIN_S:
+def _running(table: pd.DataFrame, name: str) -> pd.DataFrame:
+    """First and last sample with the motor on."""
+    on = table[table["throttle"] > 0]
+    if len(on) == 0 or on["time_s"].iloc[-1] - on["time_s"].iloc[0] <= 2 * MARGIN_S:
         raise InputError(f"{name}: the motor never ran for more than {2 * MARGIN_S} s")
-    return float(on.iloc[0]), float(on.iloc[-1])
+    return on.iloc[[0, -1]]
 
 
 def thrust_points(samples: pd.DataFrame, recordings: pd.DataFrame) -> pd.DataFrame:
@@ -38,12 +42,12 @@ def thrust_points(samples: pd.DataFrame, recordings: pd.DataFrame) -> pd.DataFra
     rows = []
     for name in recordings["id"]:
         table = tables[name]
-        start, stop = _running(table, name)
-        steady = table[table["host_time_s"].between(start + MARGIN_S, stop - MARGIN_S / 3)]
-        rest = table[table["host_time_s"] < start - 0.05]
+        start, stop = _running(table, name)["time_s"]
+        steady = table[table["time_s"].between(start + MARGIN_S, stop - MARGIN_S / 3)]
+        rest = table[table["time_s"] < start - 0.05]
         if len(rest) == 0:
             raise InputError(f"{name}: no sample before the motor started, so no tare")
-        rows.append(_row(name, steady, steady["thrust_n"] - rest["thrust_n"].mean()))
+        rows.append(_row(name, steady, steady["thrust_n"] - rest["thrust_n"].mean(), len(rest)))
     return _sorted(rows)
 
 
@@ -63,10 +67,13 @@ def torque_points(rotor: tuple[pd.DataFrame, pd.DataFrame], wrench: tuple[pd.Dat
             )
         read = sensors[drive.group]
         table, reading = counted[drive.id], felt[read.id]
-        start, stop = _running(table, drive.id)
+        ends = _running(table, drive.id)
+        start, stop = ends["time_s"]
+        steady = table[table["time_s"].between(start + MARGIN_S, stop - MARGIN_S)]
         # Each recording's times count from its own beginning.
-        when = reading["host_time_s"] + (read.host_start_s - drive.host_start_s)
-        steady = table[table["host_time_s"].between(start + MARGIN_S, stop - MARGIN_S)]
+        seen = reading["host_time_s"] + (read.host_start_s - drive.host_start_s)
+        start, stop = np.interp(ends["host_time_s"], seen, reading["time_s"])
+        when = reading["time_s"]
         loaded = reading.loc[when.between(start + MARGIN_S, stop - MARGIN_S), "moment_z_n_m"]
         before = reading.loc[when < start - 0.1, "moment_z_n_m"]
         after = reading.loc[when > stop + MARGIN_S, "moment_z_n_m"]
@@ -75,7 +82,8 @@ def torque_points(rotor: tuple[pd.DataFrame, pd.DataFrame], wrench: tuple[pd.Dat
         # The run lies in the middle between both rests, so that a steady drift of the zero drops out.
         turned = loaded - (before.mean() + after.mean()) / 2
         # The sign of the mean, not of each sample: that would turn noise into torque.
-        rows.append(_row(drive.group, steady, turned * np.sign(turned.mean())))
+        resting = 4 / (1 / len(before) + 1 / len(after))
+        rows.append(_row(drive.group, steady, turned * np.sign(turned.mean()), resting))
     return _sorted(rows)
 
 
@@ -83,7 +91,7 @@ def _sorted(rows: list[dict]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(COLUMNS)).sort_values("throttle", ignore_index=True, kind="stable")
 
 
-def _row(test: str, steady: pd.DataFrame, value: pd.Series) -> dict:
+def _row(test: str, steady: pd.DataFrame, value: pd.Series, rest_samples: float) -> dict:
     speed = steady["speed_rpm"] * RPM
     return {
         "test": test,
@@ -93,5 +101,6 @@ def _row(test: str, steady: pd.DataFrame, value: pd.Series) -> dict:
         "value": float(value.mean()),
         "value_sd": float(value.std()),
         "samples": int(len(value)),
+        "rest_samples": float(rest_samples),
         "voltage_v": float(steady["battery_voltage_v"].mean()),
     }

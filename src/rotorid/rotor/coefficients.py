@@ -4,10 +4,10 @@
 - Speeds are noisy too: where their noise σ_ω is given, the fit is the maximum-likelihood one with errors in
   both variables, min Σ (F - F_0 - C_F Ω²)²/σ_F² + (ω - Ω)²/σ_ω² over C_F, F_0 and the true speeds Ω. At its
   solution each point weighs 1/(σ_F² + (2 C_F Ω σ_ω)²); σ_F is what gives weighted residuals unit variance.
-- A point at high speed counts for more and scatters more, since a turning rotor shakes the sensor: an interval that
-  takes all points as equally noisy is too narrow (86 % hold the torque coefficient where the noise grows four
-  times over the tests). Without a noise of the speed the covariance is therefore the one that allows each point a
-  variance of its own (HC2, MacKinnon and White 1985), with Satterthwaite's degrees of freedom.
+- Without a noise of the speed the covariance allows each point a variance of its own (HC2, MacKinnon and White 1985),
+  with Satterthwaite's degrees of freedom: points at high speed count for more, and if they scatter more, an interval
+  that takes all points as equally noisy is too narrow. Where the samples behind the points show that all are equally
+  noisy (`rotorid.rotor.sample_noise`), `equal_noise` gives the usual formula.
 - One motor's interval says how well that motor's points fit a curve, not how well the propeller is known: the
   same propeller differs from motor to motor. The pooled value is therefore a random-effects mean
   (Paule and Mandel 1982) with Hartung's and Knapp's interval (2001), which holds for few motors.
@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, nnls
+from scipy.optimize import brentq
 from scipy.stats import t as student_t
 
 from rotorid.errors import InputError
@@ -155,7 +155,11 @@ LEAST_FORCE_SD_N = 1e-4
 
 
 def fit_coefficient(
-    runs: Sequence[Points], offset: bool, speed_noise_relative: float = 0.0, least_sd: float = LEAST_FORCE_SD_N
+    runs: Sequence[Points],
+    offset: bool,
+    speed_noise_relative: float = 0.0,
+    least_sd: float = LEAST_FORCE_SD_N,
+    equal_noise: bool = False,
 ) -> CoefficientFit:
     """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
 
@@ -169,6 +173,8 @@ def fit_coefficient(
         One-sigma noise of the speed reading, as a share of the speed; 0 for ordinary least squares.
     least_sd
         The force (or torque) is never taken as more exact than this, N (N m); where the speed's noise is considered.
+    equal_noise
+        Whether all points are equally noisy; otherwise each has a variance of its own.
 
     Raises
     ------
@@ -190,7 +196,10 @@ def fit_coefficient(
     values = inverse @ (columns.T @ thrust)
     residual = thrust - columns @ values
     variance = np.sum(residual**2) / freedom
-    covariance, freedoms = _each_its_own_noise(columns, inverse, residual)
+    if equal_noise:
+        covariance, freedoms = variance * inverse, np.full(unknowns, float(freedom))
+    else:
+        covariance, freedoms = _each_its_own_noise(columns, inverse, residual)
     if speed_noise_relative > 0:
 
         def fit_at(force_sd):
@@ -213,54 +222,6 @@ def fit_coefficient(
         residual_rms_n=float(np.sqrt(np.mean((thrust - columns @ values) ** 2))),
         points=len(speed),
         freedom=float(freedoms[0]),
-    )
-
-
-@dataclass(frozen=True)
-class Coverage:
-    """How often 95 % intervals of a coefficient through the origin hold the truth, where noise grows with speed."""
-
-    equal_noise: float
-    """Of the usual formula, which takes all points as equally noisy; share of the draws."""
-    own_noise: float
-    """Of the one used here, which allows each point a variance of its own."""
-    interval_equal_noise_95: tuple[float, float]
-    """The usual formula's interval on the points themselves."""
-    noise_growth: float
-    """Noise of the fastest point over that of the slowest."""
-    draws: int
-
-
-def simulated_coverage(run: Points, draws: int = 4000, seed: int = 0) -> Coverage:
-    """Both intervals on points that obey the parabola, with noise as large as the residuals show at each speed.
-
-    The noise is a + b ω² with a, b ≥ 0 from the residuals' sizes: its mean absolute value is sqrt(2/π) of it.
-    """
-    kept = usable(run.speed_rad_s, run.thrust_n)
-    square, thrust = run.speed_rad_s[kept] ** 2, run.thrust_n[kept]
-    total = square @ square
-    value = square @ thrust / total
-    residual = thrust - value * square
-    growing = np.column_stack([np.ones_like(square), square / square.max()])
-    noise = np.sqrt(np.pi / 2) * growing @ nnls(growing, np.abs(residual))[0]
-    columns, inverse = square[:, None], np.array([[1 / total]])
-    _, freedom = _each_its_own_noise(columns, inverse, residual)
-    drawn = np.random.default_rng(seed).standard_normal((draws, len(square))) * noise
-    errors = drawn @ square / total
-    left = drawn - errors[:, None] * square
-
-    def equal(left: np.ndarray) -> np.ndarray:
-        """Half widths by the usual formula."""
-        return student_t.ppf(0.975, len(square) - 1) * np.sqrt(np.sum(left**2, axis=-1) / (len(square) - 1) / total)
-
-    own = np.sqrt(left**2 @ ((square / total) ** 2 / (1 - square**2 / total)))
-    half = float(equal(residual))
-    return Coverage(
-        equal_noise=float(np.mean(np.abs(errors) <= equal(left))),
-        own_noise=float(np.mean(np.abs(errors) <= student_t.ppf(0.975, freedom[0]) * own)),
-        interval_equal_noise_95=(float(value - half), float(value + half)),
-        noise_growth=float(noise[np.argmax(square)] / noise[np.argmin(square)]),
-        draws=draws,
     )
 
 

@@ -19,7 +19,7 @@ def tables(folder: Path, dates: list[str], right: int) -> Path:
     pd.DataFrame({"family": ["gust"] * len(dates), "released": dates, "right": right}).to_csv(
         folder / "families.csv", index=False
     )
-    pd.DataFrame({"case": [f"multibody/gust/{d}/000" for d in dates], "released": dates}).to_csv(
+    pd.DataFrame({"case": [f"multibody/gust/{d}/000" for d in dates], "released": dates, "judged_by": "ab12"}).to_csv(
         folder / "cases.csv", index=False
     )
     ids = ["single_named", *(f"multibody_{d}_right" for d in dates if d)]
@@ -38,6 +38,8 @@ def test_rows_of_the_date_are_replaced_and_the_rest_stays(tmp_path):
     families = pd.read_csv(kept / "families.csv").fillna("")
     assert families[["released", "right"]].to_numpy().tolist() == [["", 0], [DATE, 2]]
     assert len(pd.read_csv(kept / "cases.csv")) == 2
+    releases = pd.read_csv(kept / "releases.csv")
+    assert releases[["released", "code"]].to_numpy().tolist() == [[DATE, "ab12"]] and releases["commit"].notna().all()
     counted = {"targets": 2, "met": 0, "open": 1, "missed": [f"multibody_{DATE}_right"]}
     assert json.loads((kept / "state.json").read_text()) == {"cases": 1, "released": [DATE], **counted}
 

@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from rotorid.plots import proof
 from rotorid.proof import show
 
 
@@ -26,6 +27,8 @@ def test_a_wrong_value_is_named_without_its_unit() -> None:
         "study": "a",
         "about": "b",
         "found": "rotor_drag",
+        "expected": None,
+        "expected_found": None,
         "values": "inertia_yy_kg_m2; mass_kg",
         "unexplained_share": 1,
     }
@@ -44,7 +47,8 @@ def test_families_in_which_nothing_was_wrong_stand_together():
         ],
         columns="simulator family released cases right false_alarms wrong_names missed judged_by looked_at".split(),
     )
-    shown = show.of_families(families)
+    shown = show.of_families(families, {"2026-11-30": "6319ce1"})
+    assert set(shown["released"]) == {"6319ce1"}
     assert shown["family"].tolist() == ["steady wind", "2 families, all right"]
     assert shown["cases"].tolist() == ["2", "5"] and shown["missed"].tolist() == ["steady wind 1", ""]
 
@@ -64,13 +68,55 @@ def test_releases_have_a_row_for_each_date_and_simulator_and_one_for_all():
                 release_row(f"{simulator}_{date}_false", 0.1, 10),
             ]
     summary = pd.DataFrame([*rows, release_row("clean_alarms", 0.0, 20)])
-    shown = show.of_releases(summary)
+    shown = show.of_releases(summary, {"2026-11-26": "40ff225"})
+    assert shown["released"].tolist() == ["40ff225", "40ff225", "2026-11-27", "2026-11-27", "all"]
     assert list(shown["simulator"]) == ["flights (multibody)", "stands", "flights (multibody)", "stands", ""]
     assert list(shown["right"]) == ["6 of 8", "6 of 8", "4 of 8", "4 of 8", "20 of 32"]
     assert shown.iloc[-1]["alarms"] == "4 of 16"
     assert shown.iloc[-1]["share"] == "45.3 to 77.1 %".replace(" ", "\u00a0")
-    # Elsewhere they do not stand a second time.
-    assert list(show.with_target(summary)["what"]) == ["clean_alarms"]
+    # All targets stand in one table, those of releases too; further scores leave releases out.
+    assert len(show.with_target(summary)) == len(summary)
+    assert list(show.without_target(summary.assign(at_most=float("nan")))["what"]) == ["clean_alarms"]
+
+
+def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
+    row = release_row("multibody_2026-11-26_false", 0.1, 10) | {"what": "Drawn, released 2026-11-26: wrong"}
+    rows = pd.DataFrame(
+        [
+            row | {"judged_by": "c87a46b88923cd47"},
+            row | {"judged_by": "unknown", "looked_at": 10},
+            row | {"judged_by": None, "looked_at": 4},
+        ]
+    )
+    shown = show.with_target(rows, {"2026-11-26": "40ff225"})
+    assert shown["by"].tolist() == ["c87a46b, none seen", "not kept, all seen", "not kept, 4 seen"]
+    assert shown["what"].unique().tolist() == ["Drawn, release of 40ff225: wrong"]
+    assert shown["with_interval"][0] == "10.0 % (0.0 to 100.0 %)".replace(
+        "0.0 to 100.0 %", "0.0\u00a0to\u00a0100.0\u00a0%"
+    )
+
+
+def test_codes_of_stored_tables() -> None:
+    tables = {"a": pd.DataFrame({"judged_by": ["c87a46b88923cd47", None]}), "b": pd.DataFrame({"x": [1]})}
+    assert show.codes_of(tables) == {"a": "c87a46b, not kept", "b": "not kept"}
+
+
+def test_the_figure_of_the_targets_has_every_target() -> None:
+    rows = [release_row("clean_alarms", 0.0, 20), release_row("multibody_2026-11-26_right", 0.9, 4)]
+    rows += [release_row("oracle", 1.01, 9) | {"at_most": 1.05, "low_95": 1.0, "high_95": 1.02}]
+    fig = proof.targets(pd.DataFrame(rows).astype({"at_least": float}))
+    labels = [text.get_text() for axis in fig.axes for text in axis.get_yticklabels()]
+    assert sorted(labels) == ["clean_alarms (20)", "multibody_2026-11-26_right (4)", "oracle (9)"]
+
+
+def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> None:
+    row = {"study": "a", "about": "cut", "found": None, "values": None, "unexplained_share": 1}
+    row |= {f"force_{stage}": 0.1 for stage in ("before", "refitted", "after")}
+    rows = [row | {"expected": "unequal_rotors; com_offset", "expected_found": None}]
+    rows += [row | {"expected": "motor_lag", "expected_found": "motor_lag"}, row | {"expected": None}]
+    shown = show.of_studies(pd.DataFrame(rows))
+    assert shown["expected"].tolist() == ["unequal rotors: no; com offset: no", "motor lag: found", "–"]
+    assert shown["confirmed"].tolist() == [0, 1, ""]
 
 
 def test_plantings_are_counted_by_flight_and_family_beside_what_was_told_before():
@@ -85,3 +131,34 @@ def test_plantings_are_counted_by_flight_and_family_beside_what_was_told_before(
     assert list(shown["told"]) == ["14 of 25", "≤ 0.1", "fails", "2 of 2"]
     assert list(shown["before"]) == ["12 of 24", "", "", "–"]
     assert shown.iloc[0]["moved"] == "0.68"
+
+
+def test_a_channel_that_got_worse_says_by_how_much() -> None:
+    channels = pd.DataFrame(
+        {
+            "example": "a",
+            "channel": ["force_x", "force_z", "force_z"],
+            "split": ["held_out", "held_out", "training"],
+            "unit": "N",
+            "before": [1.0, 0.106, 1.0],
+            "refitted": [1.0, 0.106, 1.0],
+            "after": [0.2, 0.456, 1.0],
+            "noise_floor": [0.1, None, 0.1],
+        }
+    )
+    shown = show.of_channels(channels)
+    assert shown["channel"].tolist() == ["force x", "force z"]
+    assert shown["worse"].tolist() == ["", "330.2 %"]
+    assert shown["noise_floor"].tolist() == ["0.1", "–"]
+
+
+def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
+    row = {"set": "s", "effect": "com_offset", "numbers": 3, "held": 1, "symbol": "r_x", "unit": "m"}
+    row |= {"truth": -4.045e-4, "found": -5.1e-4, "low_95": -5.2e-4, "high_95": -5.0e-4}
+    shown = show.of_campaign_numbers(pd.DataFrame([row]))
+    assert shown.iloc[0][["inside", "truth", "found", "unit"]].tolist() == [
+        "1 of 3",
+        "-404.5",
+        "-510 (-520 to -500)",
+        "1e-6 m",
+    ]

@@ -17,6 +17,7 @@ def drive(name: str, throttle: float, speed_rpm: float, thrust_n: float = 0.0) -
     return pd.DataFrame(
         {
             "id": name,
+            "time_s": time,
             "host_time_s": time,
             "quality": 0,
             "throttle": np.where(on, throttle, 0.0),
@@ -45,7 +46,13 @@ def test_a_torque_point_pairs_the_instruments_by_group_and_by_the_hosts_clock() 
     sensor_time = np.arange(0, 10, STEP_S)
     on = (sensor_time >= 3.5) & (sensor_time < 7.5)
     reading = pd.DataFrame(
-        {"id": "w", "host_time_s": sensor_time, "quality": 0, "moment_z_n_m": 0.01 - np.where(on, 0.03, 0.0)}
+        {
+            "id": "w",
+            "time_s": sensor_time,
+            "host_time_s": sensor_time,
+            "quality": 0,
+            "moment_z_n_m": 0.01 - np.where(on, 0.03, 0.0),
+        }
     )
     rotor = (drive("r", 0.2, 9000.0), rows("r", groups=["one"], start_s=101.5))
     found = torque_points(rotor, (reading, rows("w", groups=["one"], start_s=100.0)))
@@ -58,3 +65,16 @@ def test_a_torque_point_pairs_the_instruments_by_group_and_by_the_hosts_clock() 
 def test_a_motor_that_never_ran_is_named() -> None:
     with pytest.raises(InputError, match="idle: the motor never ran"):
         thrust_points(drive("idle", 0.0, 0.0), rows("idle", groups=["idle"]))
+
+
+def test_a_test_that_an_emulator_made_faster_than_life_is_taken_by_the_devices_own_time() -> None:
+    """Five device seconds a host second: four seconds of throttle arrive within 0.8 s."""
+    made = drive("fast", 0.2, 9000.0, 3.0)
+    made["host_time_s"] = made["time_s"] / 5
+    found = thrust_points(made, rows("fast", groups=["fast"]))
+    np.testing.assert_allclose(found["value"], [3.0])
+    time = np.arange(0, 8, STEP_S)
+    reading = pd.DataFrame({"id": "w", "time_s": time, "host_time_s": time / 5, "quality": 0})
+    reading["moment_z_n_m"] = 0.01 - np.where((time >= 2) & (time < 6), 0.03, 0.0)
+    pair = (made, rows("fast", groups=["one"])), (reading, rows("w", groups=["one"]))
+    np.testing.assert_allclose(torque_points(*pair)["value"], [0.03])

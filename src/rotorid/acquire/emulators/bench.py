@@ -49,13 +49,13 @@ class BenchPhysics:
         self._time_s += dt_s
         load = self._load_n if self._drive is None else self._load_n + self._drive(self._time_s)
         felt = self._structure.process(dt_s, load)
-        self._cells.process(dt_s, self._to_cells @ self._bent(felt))
+        self._cells.process(dt_s, self._to_cells @ self.bent(felt))
 
     def volts(self) -> np.ndarray:
         """Voltages of the six bridges, V."""
         return self._cells.volts()
 
-    def _bent(self, force_n: np.ndarray) -> np.ndarray:
+    def bent(self, force_n: np.ndarray) -> np.ndarray:
         """The force as the cells feel it once the structure has given way: larger, and turned."""
         size = float(np.sqrt(force_n @ force_n))
         turned = force_n + self._bench.turn_rad_n * size * np.cross(np.array([0.6, 0.8, 0.0]), force_n)

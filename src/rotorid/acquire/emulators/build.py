@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.acquire.emulators.bench import BenchPhysics
+from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Jr3Device,
@@ -33,10 +33,11 @@ def build(
     infill_percent: int = 100,
     fault_share: float = 0.0,
     faults: Faults | None = None,
+    cell: int | None = None,
 ) -> World:
     """A world with one instrument, or (`stand`) with quadrotor and wrench, or (`torque`) with thrust tester
-    and wrench. Raises ValueError for a name,
-    material, experiment or infill that does not exist."""
+    and wrench. `cell`: of the bench this cell alone, clamped for its calibration. Raises ValueError for a name,
+    material, experiment, infill or cell that does not exist."""
     rng = np.random.default_rng(seed)
 
     def line(device, **options) -> WireHalf:
@@ -45,6 +46,11 @@ def build(
         device.needs_watchdog = True
         return WireHalf(device, rng, clock_error=error, faults=chosen, **options)
 
+    if cell is not None and (what != "bench" or cell not in range(1, 7)):
+        raise ValueError(f"a cell is one of the bench, 1 to 6, not {cell} of {what!r}")
+    if what == "bench" and cell is not None:
+        clamp = CellClamp(truth.cells, rng, cell)
+        return World(clamp, line(BenchDevice(clamp)))
     if what == "bench":
         if material not in truth.bench:
             raise ValueError(f"the bench is made of {' or '.join(truth.bench)}, not of {material!r}")

@@ -1,0 +1,82 @@
+"""Verdicts on the campaign's own sets beside what the emulators were given.
+
+The truth is stated in the words of the catalogue by the emulators' side (`rotorid.acquire.emulators.stated`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+STATED = ("established", "ambiguous")
+
+
+def stated(verdict: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Effects that the verdict claims, alone or as one of a class."""
+    return [effect for effect in verdict["effects"] if effect["status"] in STATED]
+
+
+def names(verdict: Mapping[str, Any], at_work: Sequence[str]) -> dict[str, list[str]]:
+    """Ids claimed that are at work (`right`, a class that holds one too), that are not (`wrong`)."""
+    right, wrong = [], []
+    for effect in stated(verdict):
+        members = {effect["id"], *effect["alternatives"]}
+        word = " or ".join(dict.fromkeys((effect["id"], *effect["alternatives"])))
+        (right if members & set(at_work) else wrong).append(word)
+    return {"right": right, "wrong": wrong}
+
+
+def numbers(verdict: Mapping[str, Any], of: Mapping[str, Mapping[str, float]]) -> pd.DataFrame:
+    """Each number that is both stated and known, and whether the truth is `inside` its interval."""
+    rows = []
+    for effect in stated(verdict):
+        known = of.get(effect["id"], {})
+        for parameter in effect["parameters"]:
+            if parameter["symbol"] in known and parameter["interval_95"]:
+                true, (low, high) = known[parameter["symbol"]], parameter["interval_95"]
+                rows.append(
+                    {
+                        "effect": effect["id"],
+                        "symbol": parameter["symbol"],
+                        "unit": parameter["unit"],
+                        "truth": true,
+                        "found": parameter["value"],
+                        "low_95": low,
+                        "high_95": high,
+                        "inside": low <= true <= high,
+                    }
+                )
+    columns = ["effect", "symbol", "unit", "truth", "found", "low_95", "high_95", "inside"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def furthest(table: pd.DataFrame) -> pd.DataFrame:
+    """One row an effect: how many of its numbers are inside, and the one that is furthest out in half widths."""
+    if table.empty:
+        return table.assign(numbers=[], held=[])
+    half = (table["high_95"] - table["low_95"]) / 2
+    away = (table["truth"] - (table["high_95"] + table["low_95"]) / 2).abs() / half
+    rows = []
+    for _, own in table.groupby("effect", sort=False):
+        worst = own.loc[away[own.index].idxmax()].to_dict()
+        rows.append(worst | {"numbers": len(own), "held": int(own["inside"].sum())})
+    return pd.DataFrame(rows)
+
+
+def straight_line(load_n: np.ndarray, error_n: np.ndarray, held_out: np.ndarray) -> dict[str, Any]:
+    """What a straight line in the loads, fitted to training runs, leaves of the reading's error on those held out.
+
+    Shapes (n, 3), (n, 3), (n,) bool. `before_n`, `after_n`: RMS of each channel; `slopes`: [channel][load] (1).
+    """
+    known = np.isfinite(load_n).all(axis=1) & np.isfinite(error_n).all(axis=1)
+    fit, test = known & ~held_out, known & held_out
+    slopes = np.linalg.lstsq(load_n[fit], error_n[fit], rcond=None)[0]
+    left = error_n[test] - load_n[test] @ slopes
+    return {
+        "before_n": np.sqrt(np.mean(error_n[test] ** 2, axis=0)).tolist(),
+        "after_n": np.sqrt(np.mean(left**2, axis=0)).tolist(),
+        "slopes": slopes.T.tolist(),
+    }

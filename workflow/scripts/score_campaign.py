@@ -1,0 +1,95 @@
+"""Verdicts on the campaign's own sets against the emulators' truth, opened here and nowhere else.
+
+- What is at work in each set, what the verdict names of it, and which of its numbers are inside their intervals.
+- Whether the stand's numbers are those of a displaced sensor taken for a displaced centre of mass and unequal rotors.
+- What a straight line in the loads leaves of the aluminium bench's error, which the verdict may call unexplained.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid import log
+from rotorid.proof import campaign, quoted
+from rotorid.recordings import read_set
+from rotorid.text_files import read_yaml
+
+LINE, STAND = "campaign-bench-al", "campaign-stand"
+SETS = ["set", "verdict", "hidden", "right", "wrong"]
+NUMBERS = ["set", "effect", "numbers", "held", "symbol", "unit", "truth", "found", "low_95", "high_95"]
+
+
+def main(
+    verdicts: Sequence[str],
+    ledgers: Sequence[str],
+    sets: Mapping[str, str],
+    truth: Sequence[str],
+    out: Mapping[str, str],
+) -> None:
+    """Write what each verdict says (JSON) and its channels (CSV), and beside the truth a row a set and an effect (CSV).
+
+    `truth` is empty where it is not known: both of these are empty then.
+    """
+    judged = [json.loads(Path(path).read_text(encoding="utf-8")) for path in verdicts]
+    found = {verdict["set"]: verdict for verdict in judged}
+    state = {"verdicts": {name: quoted.said(verdict) for name, verdict in found.items()}}
+    rows = [row for name, verdict in found.items() for row in quoted.channels(name, verdict)]
+    pd.DataFrame(rows, columns=quoted.CHANNEL_COLUMNS).to_csv(out["channels"], index=False, float_format="%.6g")
+    if LINE in found:
+        ledger = json.loads(Path(ledgers[list(found).index(LINE)]).read_text(encoding="utf-8"))
+        state["line"] = campaign.straight_line(*_readings(sets[LINE], found[LINE]["runs"]["held_out"]))
+        state["line"]["ledger"] = [entry["sentence"] for entry in ledger if entry["on"] == "crosstalk"]
+    rows, numbers = [], []
+    if truth:
+        true = read_yaml(Path(truth[0]))
+        known = true["sets"]
+        state["torque_sensor"] = {"force_into_moment_z": true["force_into_moment_z_m"]}
+        if STAND in found:
+            state["sensor"] = _as_displaced(found[STAND], known[STAND], true)
+        for name, verdict in found.items():
+            named = campaign.names(verdict, known[name]["ids"])
+            row = {"set": name, "verdict": verdict["verdict"], "hidden": "; ".join(known[name]["ids"])}
+            rows.append(row | {word: "; ".join(ids) for word, ids in named.items()})
+            numbers.append(campaign.furthest(campaign.numbers(verdict, known[name]["numbers"])).assign(set=name))
+    pd.DataFrame(rows, columns=SETS).to_csv(out["sets"], index=False)
+    table = pd.concat(numbers) if numbers else pd.DataFrame()
+    table.reindex(columns=NUMBERS).to_csv(out["numbers"], index=False, float_format="%.6g")
+    Path(out["state"]).write_text(json.dumps(state, indent=1) + "\n", encoding="utf-8")
+
+
+def _as_displaced(verdict: Mapping, known: Mapping, true: Mapping) -> dict:
+    """How many of the stand's numbers are those of centre and rotors, and of a displaced sensor taken for these."""
+    alike = true["displaced"]
+    seen = campaign.numbers(verdict, alike)
+    own = campaign.numbers(verdict, {name: known["numbers"][name] for name in alike})
+    own = own[own["symbol"].isin(seen["symbol"])]
+    return {
+        "place_error_m": true["sensor_place_error_m"],
+        "numbers": len(seen),
+        "inside_truth": int(own["inside"].sum()),
+        "inside_displaced": int(seen["inside"].sum()),
+    }
+
+
+def _readings(folder: str, held_out: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Loads and errors (n, 3) of a bench set, and which samples are of runs held out (n,)."""
+    loads, errors, held = [], [], []
+    for run in read_set(Path(folder)).runs:
+        loads.append(run.table[[f"reference_force_{a}_n" for a in "xyz"]].to_numpy())
+        errors.append(run.table[[f"force_{a}_n" for a in "xyz"]].to_numpy() - loads[-1])
+        held.append(np.full(len(run.table), run.name in held_out))
+    return np.concatenate(loads), np.concatenate(errors), np.concatenate(held)
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            verdicts=snakemake.input.verdicts,
+            ledgers=snakemake.input.ledgers,
+            sets=snakemake.params.sets,
+            truth=snakemake.input.truth,
+            out=dict(snakemake.output.items()),
+        )
