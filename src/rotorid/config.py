@@ -111,8 +111,8 @@ def _release(text: str) -> str:
         known = False
     if not known:
         raise ValueError(
-            f"found {text!r}, expected the first eight digits of a commit's hash, as 0285341c, a day of the calendar, as "
-            "2026-11-30, or an empty text"
+            f"found {text!r}, expected the first eight digits of a commit's hash, as 0285341c, a day of the calendar, "
+            "as 2026-11-30, or an empty text"
         )
     return text
 
@@ -352,7 +352,7 @@ class Proof(Section):
         description="Repetitions taken of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
     )
     release: Annotated[str, AfterValidator(_release)] = Field(
-        description="Release proof: commit (or date) that cases are drawn from which nobody has looked at; empty for none [name]."
+        description="Release proof: commit (or date) whose cases, never looked at, are drawn; empty for none [name]."
     )
     released: dict[str, Annotated[int, Field(ge=0)]] = Field(
         description="Repetitions taken of each family of drawn cases in a release proof [1]."
