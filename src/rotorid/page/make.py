@@ -82,7 +82,9 @@ def make_page(
     environment.globals.update(figure=figure_html, ranges=ranges_html)
     shown, more = shown_locations(verdict.locations)
     known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
-    silent = [effect_words(i) for i in catalogue() if i not in known]
+    known |= {i for e in verdict.effects for i in e.alternatives}
+    flown = verdict.kind == "flight"
+    silent = [effect_words(i) for i, e in catalogue().items() if i not in known and not (flown and e.of_the_rig)]
     data = page_data(analysis, verdict, main)
     data["regimes"]["first"] = first_variable(verdict, main, data["regimes"]["variables"])
     claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
@@ -164,7 +166,7 @@ def limit_row(limit: Absent) -> dict[str, str]:
     size = Markup("")
     if limit.at_most is not None:
         size = Markup("|{}| ≤ {}").format(
-            subscripts(limit.symbol), pretty(f"{number(limit.at_most)} {limit.unit}".strip())
+            subscripts(limit.symbol), pretty(f"{number(limit.at_most)} {limit.unit}".removesuffix(" 1").strip())
         )
     return {
         "name": capital(effect_words(limit.id)),
@@ -203,7 +205,7 @@ def pretty(text: str) -> Markup:
         lambda m: f"({m[1]} ± {m[3]}) × 10{m[2].translate(SUPERSCRIPTS)}",
         text,
     )
-    text = re.sub(r"(\d)e([+-]?\d+)\b", lambda m: f"{m[1]} × 10{m[2].lstrip('+').translate(SUPERSCRIPTS)}", text)
+    text = re.sub(r"(\d)e([+-]?\d+)\b", lambda m: f"{m[1]} × 10{str(int(m[2])).translate(SUPERSCRIPTS)}", text)
     text = re.sub(r"(?<![\w])-(?=\d)", "−", text)
     return Markup(html.escape(unit_text(text), quote=False))
 

@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal
 from rotorid.mismatch.comparison import environments
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import spectrum_of
+from rotorid.mismatch.posterior.limits import limits_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, problem_of
 from rotorid.mismatch.posterior.score import Posterior, log_prior, scored
@@ -215,3 +216,21 @@ def test_what_could_stand_in_an_ids_place_is_its_class():
     assert min(said.probability, alone.probability) > 0.99
     k = alone.parameters[0]
     assert k.low < 0.9 < k.high and k.value == pytest.approx(0.9, abs=0.15)
+
+
+def squares_at_one(asked: Problem) -> dict[str, np.ndarray]:
+    """What a coefficient of one amounts to in these flights: as much as itself."""
+    return {key: np.eye(len(asked.columns_of[key])) for key in asked.effects}
+
+
+def test_what_was_not_found_is_smaller_than_its_limit_in_nineteen_of_twenty_flights():
+    """A lift that is too weak to be named: the limit holds it, and it shrinks where there is no lift at all."""
+    held, most = [], []
+    for seed in range(60):
+        found = decide(flight([0.0, 0.0, 0.3, 0.03, 0.0], seed=seed).evidence(), Prior())
+        limits = {x.id: x.at_most for x in limits_of(found, squares_at_one(found.problem))}
+        assert "drag" not in limits
+        if "lift" in limits:
+            held.append(limits["lift"] >= 0.03)
+            most.append(limits["lift"])
+    assert len(held) >= 30 and np.mean(held) >= 0.9 and np.median(most) < 0.3

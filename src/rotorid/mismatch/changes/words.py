@@ -47,7 +47,7 @@ def size_words(estimate: Estimate) -> str:
     half = 0.5 * (estimate.high - estimate.low)
     if estimate.symbol in VALUES:
         return f"{100 * estimate.value:+.1f} ± {100 * half:.1f} %"
-    return f"{estimate.symbol} by {number(estimate.value)} ± {number(half)} {estimate.unit}".rstrip()
+    return f"{estimate.symbol} by {number(estimate.value)} ± {number(half)} {estimate.unit}".removesuffix(" 1").rstrip()
 
 
 def unchanged_words(limits: tuple[Limit, ...]) -> str:
