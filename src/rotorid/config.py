@@ -100,8 +100,8 @@ def _odd(window: int) -> int:
     return window
 
 
-SHORT_HASH = re.compile(r"[0-9a-f]{8}")
-"""First digits of a commit's hash."""
+SHORT_HASH = re.compile(r"(?=.*[a-f])[0-9a-f]{8}")
+"""First digits of a commit's hash, with a letter among them: a day without hyphens is none."""
 
 
 def _release(text: str) -> str:
