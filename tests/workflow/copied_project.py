@@ -19,6 +19,7 @@ PARTS = (
     "raw",
     "tests/configs",
     "tests/concealed",
+    "tests/sealed",
     "docs/proof",
 )
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.mismatch.changes.joint import joint_of
-from rotorid.mismatch.changes.problem import problem_of_changes
+from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.findings import Estimate, Finding, Status
 from rotorid.mismatch.posterior.limits import Limit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.search import most_probable
 from rotorid.mismatch.posterior.statements import Statement, statements_of
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.values import believed_value
@@ -51,7 +50,7 @@ class Comparison:
 def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Comparison:  # noqa: B008
     """What changed from the first set of flights to the second."""
     joint = joint_of(base, new)
-    found = most_probable(problem_of_changes(joint.base, joint.new, prior), [()])
+    found = decide_changes(joint.base, joint.new, prior)
     vehicles = base.vehicle, new.vehicle
     changes = [
         Change(s.id, s.status, s.alternatives, s.probability, changes_of(s, *vehicles))

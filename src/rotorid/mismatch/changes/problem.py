@@ -13,14 +13,16 @@ and a controller's answer are wrong by is in b and cancels.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
-from rotorid.mismatch.posterior.leftover import Spectrum, Weighed, spectrum_of
+from rotorid.mismatch.posterior.leftover import VARIANCES, Spectrum, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, believed, log_priors
+from rotorid.mismatch.posterior.score import scored
+from rotorid.mismatch.posterior.search import Found, most_probable
 from rotorid.mismatch.rows import PARAMETER_NAMES
 
 SAME_SD = 0.01
@@ -32,41 +34,64 @@ RIDGE = 1e-4
 ROUNDS = 4
 
 
-def problem_of_changes(base: Evidence, new: Evidence, prior: Prior) -> Problem:
-    """The problem that two sets pose on the same columns."""
-    spectra = spectrum_of(base), spectrum_of(new)
-    first, second = (in_units(weighed(s)[0], s.unit) for s in spectra)
-    variance = weighed(spectra[1])[1]
-    seen = np.diag(second[0]) > 0
-    unit = np.where(seen, 1.0 / np.sqrt(np.where(seen, np.diag(second[0]), 1.0)), 0.0)
-    gram_base, gram_new = (own[0] * np.outer(unit, unit) for own in (first, second))
-    cross_base, cross_new = (own[1] * unit for own in (first, second))
-    rows = spectra[1].rows
-    inverse = np.linalg.inv(gram_base + gram_new + np.eye(len(unit)) / rows)
-    gram = gram_new - gram_new @ inverse @ gram_new
-    cross = cross_new - gram_new @ inverse @ (cross_base + cross_new)
+def decide_changes(base: Evidence, new: Evidence, prior: Prior) -> Found:
+    """The most probable changes between two sets on the same columns.
+
+    The leftover is learnt from both sets with what is common to both: at first all that differs between the sets counts
+    as leftover, then what the changes found do not explain.
+    """
+    unit = unit_of(base, new)
+    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
+    change, starts = np.zeros(len(unit)), [()]
+    variance = leftover_of(spectra, change)
+    for _ in range(ROUNDS):
+        problem = problem_of_changes(new, spectra, variance, prior)
+        found = most_probable(problem, starts)
+        starts = [(), found.model]
+        before, variance = variance, leftover_of(spectra, change_of(found, len(unit)))
+        if np.array_equal(before, variance):
+            break
+    return found
+
+
+def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray) -> np.ndarray:
+    """The variance of each channel's leftover, (C,), with one fit of all columns for both sets.
+
+    `change` (K,) is what the second set's coefficients are more, in units of the spectra.
+    """
+    base, new = (s.weighed(np.zeros(len(s.channels))) for s in spectra)
+    gram = base.gram + new.gram
+    common = np.linalg.solve(gram + RIDGE * np.eye(len(gram)), base.cross + new.cross - new.gram @ change)
+    gains = spectra[0].gains_of_leftover(common) + spectra[1].gains_of_leftover(common + change)
+    return VARIANCES[np.argmax(gains, axis=1)]
+
+
+def change_of(found: Found, count: int) -> np.ndarray:
+    """The changes (count,) of the columns' coefficients in a model, a value's as its own column's."""
+    at, out = scored(found.problem, found.model), np.zeros(count)
+    for column, beta in zip(at.columns, at.mode.beta, strict=True):
+        out[found.problem.same_column[column]] += beta
+    return out
+
+
+def problem_of_changes(
+    new: Evidence, spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, prior: Prior
+) -> ProblemOfChanges:
+    """The problem that two sets pose on the same columns, with a leftover of `variance` (C,) in each channel."""
+    base, other = (s.weighed(variance) for s in spectra)
+    unit, rows = spectra[1].unit, spectra[1].rows
+    inverse = np.linalg.inv(base.gram + other.gram + np.eye(len(unit)) / rows)
+    gram = other.gram - other.gram @ inverse @ other.gram
+    cross = other.cross - other.gram @ inverse @ (base.cross + other.cross)
     return posed(new, 0.5 * (gram + gram.T), cross, unit, rows, variance, prior)
 
 
-def weighed(spectrum: Spectrum) -> tuple[Weighed, np.ndarray]:
-    """Products of a set with its leftover taken out, and the leftover's variance in each channel (C,).
+@dataclass(frozen=True)
+class ProblemOfChanges(Problem):
+    """A problem in which some columns stand twice."""
 
-    The leftover is what one fit of all columns leaves over from environment to environment.
-    """
-    variance = np.zeros(len(spectrum.channels))
-    for _ in range(ROUNDS):
-        found = spectrum.weighed(variance)
-        beta = np.linalg.solve(found.gram + RIDGE * np.eye(len(found.gram)), found.cross)
-        before, variance = variance, spectrum.variance_of_leftover(beta)
-        if np.array_equal(before, variance):
-            break
-    return spectrum.weighed(variance), variance
-
-
-def in_units(found: Weighed, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gram matrix and cross products in the units of the coefficients."""
-    own = np.where(unit > 0, 1.0 / np.where(unit > 0, unit, 1.0), 0.0)
-    return found.gram * np.outer(own, own), found.cross * own
+    same_column: np.ndarray
+    """(K,) number of the column of the evidence that each one is."""
 
 
 def posed(
@@ -77,7 +102,7 @@ def posed(
     rows: float,
     variance: np.ndarray,
     prior: Prior,
-) -> Problem:
+) -> ProblemOfChanges:
     """The problem of changes: every effect may have changed, in any direction, and every value.
 
     A value has its column twice: as what is a little different in every flight, and as an id that changed.
@@ -97,7 +122,8 @@ def posed(
     free = np.concatenate(free) if free else np.zeros(0, int)
     low[free], high[free] = -np.inf, np.inf
     size = len(unit)
-    return Problem(
+    return ProblemOfChanges(
+        same_column=index,
         terms=terms,
         columns_of=columns_of,
         always=np.concatenate([columns_of[t.key] for t in new.terms if t.kind != "effect"]),

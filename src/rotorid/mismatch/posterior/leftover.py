@@ -94,21 +94,29 @@ class Spectrum:
 
     def variance_of_leftover(self, beta: np.ndarray) -> np.ndarray:
         """The variance of each channel's leftover that makes what coefficients (K,) leave most probable, (C,)."""
-        found = np.zeros(len(self.channels))
+        return VARIANCES[np.argmax(self.gains_of_leftover(beta), axis=1)]
+
+    def gains_of_leftover(self, beta: np.ndarray) -> np.ndarray:
+        """Twice the log likelihood of each of VARIANCES in each channel, given what coefficients (K,) leave, (C, V)."""
+        out = np.zeros((len(self.channels), len(VARIANCES)))
         for c, own in enumerate(self.channels):
             left = own.turned - own.values * np.einsum("eik,i->ek", own.vectors, beta[own.columns])
             values, squares = own.values.ravel(), (left**2).ravel()
             grown = [1.0 + t * values for t in VARIANCES]
-            gains = [(t / g * squares - np.log(g)).sum() for t, g in zip(VARIANCES, grown, strict=True)]
-            found[c] = VARIANCES[int(np.argmax(gains))]
-        return found
+            out[c] = [(t / g * squares - np.log(g)).sum() for t, g in zip(VARIANCES, grown, strict=True)]
+        return out
 
 
-def spectrum_of(evidence: Evidence) -> Spectrum:
-    """The spectrum of a flight's evidence."""
+def unit_of(*evidence: Evidence) -> np.ndarray:
+    """Coefficients (K,) with which columns have unit length in all of some evidence; 0 of one never excited."""
+    energy = sum(np.einsum("cekk->k", own.gram) for own in evidence)
+    return np.where(energy > NEVER_EXCITED, 1.0 / np.sqrt(np.maximum(energy, TINY)), 0.0)
+
+
+def spectrum_of(evidence: Evidence, unit: np.ndarray | None = None) -> Spectrum:
+    """The spectrum of a flight's evidence, with columns in units of `unit` (K,), by default of unit length."""
     energies = np.einsum("cekk->ck", evidence.gram)
-    energy = energies.sum(axis=0)
-    unit = np.where(energy > NEVER_EXCITED, 1.0 / np.sqrt(np.maximum(energy, TINY)), 0.0)
+    unit = unit_of(evidence) if unit is None else unit
     channels = []
     for own, gram, cross in zip(energies, evidence.gram, evidence.cross, strict=True):
         columns = np.flatnonzero((own > 0) & (unit > 0))
