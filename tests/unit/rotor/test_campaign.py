@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.rotor.campaign import COLUMNS, thrust_points, torque_points
+from rotorid.rotor.campaign import COLUMNS, _device_time, thrust_points, torque_points
 
 STEP_S = 0.02
 
@@ -78,3 +78,10 @@ def test_a_test_that_an_emulator_made_faster_than_life_is_taken_by_the_devices_o
     reading["moment_z_n_m"] = 0.01 - np.where((time >= 2) & (time < 6), 0.03, 0.0)
     pair = (made, rows("fast", groups=["one"])), (reading, rows("w", groups=["one"]))
     np.testing.assert_allclose(torque_points(*pair)["value"], [0.03])
+
+
+def test_of_a_batch_that_the_host_sees_at_once_the_last_sample_tells_the_time() -> None:
+    """Five samples arrive together every 0.1 s: between two looks of the host, time goes on from the latest sample."""
+    time = pd.Series(np.arange(1, 51) * STEP_S)
+    seen = pd.Series(10 + np.ceil(np.arange(1, 51) / 5) * 0.1)
+    np.testing.assert_allclose(_device_time(time, seen, pd.Series([10.1, 10.25, 11.0])), [0.1, 0.25, 1.0])
