@@ -73,6 +73,7 @@ def rebuilt(
     regression = build(rows, terms, old.filters, rule, block_s, rate, again, *alone)
     return replace(
         model,
+        terms=terms,
         rows=rows,
         regression=regression,
         segments=list(segments),
