@@ -34,7 +34,7 @@ def listed(names: Iterable[str], most: int = 4) -> str:
 
 
 def neighbour(path: Path) -> str:
-    """`; did you mean flights?` by what lies beside a path that is missing, or nothing."""
+    """`; did you mean flights?` by what lies next to a path that is missing, or nothing."""
     path = Path(path)
     try:
         there = sorted(p.name for p in path.parent.iterdir() if p.name.isprintable() and not p.name.startswith("."))

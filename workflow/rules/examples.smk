@@ -63,9 +63,9 @@ def sealed_truth(wildcards):
 
 
 rule score_campaign:
-    """Verdicts on the campaign's own sets, beside what the emulators were given."""
+    """Verdicts on the campaign's own sets, against what the emulators were given."""
     message:
-        "Mismatch: the campaign's own sets beside what is true"
+        "Mismatch: the campaign's own sets against what is true"
     input:
         verdicts=expand("results/mismatch/{set}/verdict.json", set=JUDGED_OF_CAMPAIGN),
         ledgers=expand("results/mismatch/{set}/ledger.json", set=JUDGED_OF_CAMPAIGN),

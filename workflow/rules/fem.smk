@@ -64,7 +64,7 @@ rule vary_bench_sizes:
 
 
 rule follow_signal_chain:
-    """From force to strain, volts and counts of one cell, beside the thesis's calibration."""
+    """From force to strain, volts and counts of one cell, against the thesis's calibration."""
     message:
         "Finite elements: from strain to counts"
     input:

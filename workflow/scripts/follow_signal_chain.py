@@ -1,7 +1,7 @@
 """Follow one load cell's signal from force to counts.
 
 - Strain of its gauges by finite elements, voltage of the bridge, counts of the converter.
-- Beside the sensitivity that the thesis's calibration gives each cell, and how far the assumed sizes move it.
+- Against the sensitivity that the thesis's calibration gives each cell, and how far the assumed sizes move it.
 - The ligament with which the cell would have the measured sensitivity.
 """
 
@@ -17,7 +17,7 @@ from rotorid.io.wire import bench as wire
 
 
 def main(sizes: str, moduli: str, calibration: str, mesh: str, chain: str, variants: str) -> None:
-    """Write the chain beside the calibration (JSON), and a size's end a row (CSV)."""
+    """Write the chain and the calibration (JSON), and a size's end a row (CSV)."""
     assumed, modulus = read_assumed(sizes), read_moduli(moduli)
     level = studies.LEVELS[mesh]
     table = studies.chain_study(assumed, modulus, level.chain, level.sizes)

@@ -29,7 +29,7 @@ def main(
     truth: Sequence[str],
     out: Mapping[str, str],
 ) -> None:
-    """Write what each verdict says (JSON) and its channels (CSV), and beside the truth a row a set and an effect (CSV).
+    """Write what each verdict says (JSON), its channels, and against the truth a row a set and an effect (CSV).
 
     `truth` is empty where it is not known: both of these are empty then.
     """

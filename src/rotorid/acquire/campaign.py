@@ -49,7 +49,7 @@ from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 
 SEED = 2024
 STATED = "campaign_stated.yaml"
-"""Beside the sealed truth: the same in the words of the catalogue."""
+"""Next to the sealed truth: the same in the words of the catalogue."""
 REPEATS = 10
 COMBINED_AXES = ("xy", "xz", "yz", "xyz")
 COMBINED_LOADS = (3, 4, 6)  # combinations of weights

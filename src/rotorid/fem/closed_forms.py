@@ -19,7 +19,7 @@ FINENESSES = (1.0, 2.0, 4.0)
 
 @dataclass(frozen=True)
 class Checked:
-    """A computed number beside the closed form."""
+    """A computed number and the closed form's."""
 
     case: str
     quantity: str
@@ -95,12 +95,12 @@ def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1
     moved = given.ravel() + elasticity.solve(stiffness, binding, -(stiffness @ given.reshape(-1, 1)))[:, 0]
     stress = body.stress(moved, materials)
     above = np.flatnonzero(np.hypot(nodes[:, 0], nodes[:, 1] - radius_m) < 1e-9)
-    beside = np.flatnonzero(np.hypot(nodes[:, 0] - radius_m, nodes[:, 1]) < 1e-9)
+    edge = np.flatnonzero(np.hypot(nodes[:, 0] - radius_m, nodes[:, 1]) < 1e-9)
     return [
         Checked("plate with a hole", name, fineness, len(nodes), float(component[at].mean()), factor * pull_pa)
         for name, component, at, factor in (
             ("stress across (Pa)", stress[0, 0], above, 3.0),
-            ("stress along (Pa)", stress[1, 1], beside, -1.0),
+            ("stress along (Pa)", stress[1, 1], edge, -1.0),
         )
     ]
 

@@ -110,5 +110,5 @@ class Bench:
         frame = self.leg.frames[name]
         nodes = self.body.nodes_of(name)
         own = np.abs((self.body.nodes_m[nodes] - frame.origin_m) @ frame.axes.T)
-        beside = np.abs(own[:, 0] - self.sizes.cell_between_holes_m / 2)
-        return nodes[(beside < self.sizes.hole_radius_m / 2) & (own[:, 1] > self.sizes.hole_radius_m / 2)]
+        off_hole = np.abs(own[:, 0] - self.sizes.cell_between_holes_m / 2)
+        return nodes[(off_hole < self.sizes.hole_radius_m / 2) & (own[:, 1] > self.sizes.hole_radius_m / 2)]

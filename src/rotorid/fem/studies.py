@@ -118,7 +118,7 @@ def surface(finest: Finest) -> pd.DataFrame:
 
 
 def verification() -> pd.DataFrame:
-    """Closed forms beside what the solver says, a quantity and mesh a row."""
+    """Closed forms and what the solver says, a quantity and mesh a row."""
     return pd.DataFrame([asdict(row) | {"error": row.error} for row in closed_forms.all_checks()])
 
 

@@ -45,7 +45,7 @@ class Imported:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is the folder of a ROS 2 bag (`metadata.yaml` beside its .db3 or .mcap), and no recording set."""
+    """Whether a path is the folder of a ROS 2 bag (`metadata.yaml` next to its .db3 or .mcap), and no recording set."""
     return (path / "metadata.yaml").is_file() and not (path / "vehicle.yaml").is_file()
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rotorid.mismatch.posterior.evidence import evidence_from
 from rotorid.mismatch.posterior.leftover import spectrum_of
-from rotorid.mismatch.posterior.limits import Limit, limits_of
+from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import problem_of
 from rotorid.mismatch.posterior.score import Posterior
@@ -28,7 +28,7 @@ ROUNDS = 3
 """Rounds in which the leftover is learnt from what the model leaves."""
 
 
-def absent(model: WrenchModel) -> tuple[Limit, ...]:
+def absent(model: WrenchModel) -> tuple[UpperLimit, ...]:
     """Upper limits of the ids that the fitted runs were tested for and that are not at work, the largest first."""
     effects = [t for t in model.regression.terms if t.kind == "effect"]
     return limits_of(chosen_already(model), squares_of(model, effects))

@@ -37,7 +37,7 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.payload_windows import loads, on_board
-from rotorid.mismatch.posterior.limits import Limit
+from rotorid.mismatch.posterior.limits import UpperLimit
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.refitted import refitted, values_alone
 from rotorid.mismatch.regime import regime_variables
@@ -147,7 +147,7 @@ class Choice:
     scale: dict[str, tuple[float, float, float, float]]
     """A full speed that nobody stated, by its contract name."""
     findings: tuple[Finding, ...]
-    absent: tuple[Limit, ...]
+    absent: tuple[UpperLimit, ...]
     """Ids that were tested and not found, and how large they may be."""
     remarks: tuple[str, ...]
 

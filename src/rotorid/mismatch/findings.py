@@ -15,7 +15,7 @@ from rotorid.recordings import RecordingSet, Split, Vehicle
 from rotorid.recordings.doubts import Doubt
 
 if TYPE_CHECKING:
-    from rotorid.mismatch.posterior.limits import Limit
+    from rotorid.mismatch.posterior.limits import UpperLimit
     from rotorid.mismatch.sizes import Size
 
 CLAIMED = ("established", "ambiguous")
@@ -146,7 +146,7 @@ class Analysis:
     """Channel to p-value that the residual does not depend on the inputs, before and after."""
     regimes: dict[str, dict[str, np.ndarray]]
     """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
-    absent: tuple[Limit, ...] = ()
+    absent: tuple[UpperLimit, ...] = ()
     """Ids that were tested and not found, and how large they may be."""
     winds: tuple[RunWind, ...] = ()
     """Winds that the model flies in, by run."""

@@ -27,7 +27,7 @@ from rotorid.mismatch.words import (
 )
 
 if TYPE_CHECKING:
-    from rotorid.mismatch.posterior.limits import Limit
+    from rotorid.mismatch.posterior.limits import UpperLimit
     from rotorid.mismatch.verdict import Channel, Location
 
 MOST_WORDS = 40
@@ -120,7 +120,7 @@ def headline(told: Told) -> str:
 
 
 def unexplained_words(share: float) -> str:
-    """What stays unexplained beside causes that were named, 0 to 1."""
+    """What stays unexplained given the causes that were named, 0 to 1."""
     if share >= NEARLY_ALL:
         return f"that explains less than {100 * (1 - NEARLY_ALL):.0f} % of it"
     return f"{100 * share:.0f} % stays unexplained"
@@ -176,7 +176,7 @@ def details(told: Told) -> list[str]:
     return [text for text in out if text]
 
 
-def _not_found(limits: Sequence[Limit]) -> str:
+def _not_found(limits: Sequence[UpperLimit]) -> str:
     """What was tested and not found, and how large it may be at most with 95 % probability."""
     sized = [(effect_words(x.id), percent_words(x.share)) for x in limits if x.share > 0]
     if not sized:

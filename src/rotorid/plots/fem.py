@@ -42,7 +42,7 @@ def whole_bench(surface: pd.DataFrame, column: str, factor: float, label: str, g
     label
         Quantity and unit.
     gamma
-        Power of the scale of colours; below 1 small values are told apart.
+        Power of the scale of colours; below 1 small values can be distinguished.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -169,7 +169,7 @@ def _plain(size: str) -> str:
 
 
 def sensitivity(variants: pd.DataFrame, measured_v_per_n: Sequence[float]) -> Figure:
-    """Sensitivity of a cell as computed, with each size at its ends, beside what the six cells have."""
+    """Sensitivity of a cell as computed, with each size at its ends, and what the six cells have."""
     first, alone = variants.iloc[0], variants.iloc[1:]
     sizes = list(dict.fromkeys(alone["size"]))
     fig, axis = style.figure(0.17 * len(sizes) + 1.1)

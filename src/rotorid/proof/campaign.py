@@ -1,4 +1,4 @@
-"""Verdicts on the campaign's own sets beside what the emulators were given.
+"""Verdicts on the campaign's own sets against what the emulators were given.
 
 The truth is stated in the words of the catalogue by the emulators' side (`rotorid.acquire.emulators.stated`).
 """

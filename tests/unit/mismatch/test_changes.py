@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.mismatch.changes import Comparison, changes_between
+from rotorid.mismatch.changes import Changes, changes_between
 from rotorid.mismatch.changes.compare import Change
 from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.recordings import RecordingSet, Vehicle, write_set
@@ -36,7 +36,7 @@ def monday() -> RecordingSet:
 
 
 @cache
-def compared(case: str) -> Comparison:
+def compared(case: str) -> Changes:
     """Monday's flights against Friday's."""
     new = flights("friday", (3, 4), drag=1.2 if case == "dragging" else 0.6)
     if case == "believed lighter":
@@ -44,7 +44,7 @@ def compared(case: str) -> Comparison:
     return changes_between(monday(), new)
 
 
-def sure(found: Comparison) -> list[Change]:
+def sure(found: Changes) -> list[Change]:
     """What surely changed."""
     return [c for c in found.changes if c.status in ("established", "ambiguous")]
 

@@ -34,7 +34,7 @@ SENSES = {"x": 1.0, "y": 1.0, "z": -1.0}
 def stated(truth: Truth) -> dict[str, Any]:
     """Ids at work in each set (`ids`, also what is smaller than the noise) and their `numbers` by id and symbol.
 
-    Beside the `sets`: `displaced`, the sensor's place error (m), and its crosstalk of a force into the moment
+    Next to the `sets`: `displaced`, the sensor's place error (m), and its crosstalk of a force into the moment
     about z (m).
     """
     rotor, vehicle, wrench = truth.rotor, truth.vehicle, truth.wrench

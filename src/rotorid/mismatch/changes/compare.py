@@ -10,7 +10,7 @@ from rotorid.mismatch.changes.joint import joint_of
 from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.findings import Estimate, Finding, Status
-from rotorid.mismatch.posterior.limits import Limit, limits_of
+from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.statements import Statement, statements_of
 from rotorid.mismatch.rows import PARAMETER_NAMES
@@ -36,18 +36,18 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Changes:
     """What changed between two sets of flights of one vehicle."""
 
     base: str
     new: str
     changes: tuple[Change, ...]
     """The surest first."""
-    limits: tuple[Limit, ...]
+    limits: tuple[UpperLimit, ...]
     """By how much everything else may have changed at most, with 95 % probability; of a value relative."""
 
 
-def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Comparison:  # noqa: B008
+def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the first set of flights to the second."""
     joint = joint_of(base, new)
     found = decide_changes(joint.base, joint.new, prior)
@@ -59,7 +59,7 @@ def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior(
     ]
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
     squares = joint.squares | {f"{PARAMETER_NAMES[key]}/changed": own for key, own in joint.value_squares.items()}
-    return Comparison(
+    return Changes(
         base=base.name,
         new=new.name,
         changes=(*mistakes_that_differ(joint.mistakes_of_base, joint.mistakes_of_new), *changes),

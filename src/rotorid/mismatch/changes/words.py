@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rotorid.mismatch.changes.compare import Change, Comparison
+from rotorid.mismatch.changes.compare import Change, Changes
 from rotorid.mismatch.findings import Estimate
-from rotorid.mismatch.posterior.limits import Limit
+from rotorid.mismatch.posterior.limits import UpperLimit
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.words import capital, effect_words, listed, number, parameter_words, percent_words
 
@@ -13,7 +13,7 @@ MOST_LIMITS = 4
 """Things that did not change and are named with their limit; more are counted."""
 
 
-def sentences(found: Comparison) -> list[str]:
+def sentences(found: Changes) -> list[str]:
     """One sentence a change, the surest first, and one on what did not change."""
     out = [change_words(c) for c in found.changes]
     if not out:
@@ -50,7 +50,7 @@ def size_words(estimate: Estimate) -> str:
     return f"{estimate.symbol} by {number(estimate.value)} ± {number(half)} {estimate.unit}".removesuffix(" 1").rstrip()
 
 
-def unchanged_words(limits: tuple[Limit, ...]) -> str:
+def unchanged_words(limits: tuple[UpperLimit, ...]) -> str:
     """What did not change: believed values with their limits, then the effects that may have changed most."""
     values = [
         f"{name_words(x.id)} by at most {percent_words(x.at_most)}" for x in limits if x.id in VALUES and x.at_most
@@ -62,7 +62,7 @@ def unchanged_words(limits: tuple[Limit, ...]) -> str:
     return f"Not changed, with 95 % probability: {listed([*values, *named])}."
 
 
-def as_json(found: Comparison) -> dict:
+def as_json(found: Changes) -> dict:
     """The comparison as `changes.json` holds it."""
     return {
         "base": found.base,

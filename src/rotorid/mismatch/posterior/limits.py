@@ -22,7 +22,7 @@ DRAWS = 400
 
 
 @dataclass(frozen=True)
-class Limit:
+class UpperLimit:
     """The largest that an id may be which was tested and not found."""
 
     id: str
@@ -35,7 +35,7 @@ class Limit:
     """Root mean square of its contribution over the fitted runs, in the unit of `size_of`."""
 
 
-def limits_of(found: Found, squares: Mapping[str, np.ndarray]) -> tuple[Limit, ...]:
+def limits_of(found: Found, squares: Mapping[str, np.ndarray]) -> tuple[UpperLimit, ...]:
     """Limits of the ids that are not at work, the largest share first.
 
     `squares` holds to a term's key what its columns amount to, (k, k): βᵀ S β is the square of the share that
@@ -55,8 +55,8 @@ def limits_of(found: Found, squares: Mapping[str, np.ndarray]) -> tuple[Limit, .
     return tuple(sorted(out, key=lambda limit: -limit.share))
 
 
-def limit_of(found: Found, key: str, squares: np.ndarray) -> Limit | None:
-    """The limit of one form; None where its columns are not excited, or beside which the model has no mode."""
+def limit_of(found: Found, key: str, squares: np.ndarray) -> UpperLimit | None:
+    """The limit of one form; None where its columns are not excited, or with which the model has no mode."""
     problem, term = found.problem, found.problem.terms[key]
     own = problem.columns_of[key]
     if not problem.unit[own].any():
@@ -69,11 +69,11 @@ def limit_of(found: Found, key: str, squares: np.ndarray) -> Limit | None:
     beta = beta * unit
     share = np.sqrt(np.maximum(np.einsum("di,ij,dj->d", beta, squares, beta), 0.0))
     if not term.linear:
-        return Limit(term.effect, "", None, "", float(np.quantile(share, PROBABILITY)))
+        return UpperLimit(term.effect, "", None, "", float(np.quantile(share, PROBABILITY)))
     main = int(np.argmax(np.diag(squares) * np.median(beta**2, axis=0)))
     most = float(np.quantile(np.abs(beta[:, main]), PROBABILITY))
     parameter = term.linear[main]
-    return Limit(term.effect, parameter.symbol, most, parameter.unit, float(np.quantile(share, PROBABILITY)))
+    return UpperLimit(term.effect, parameter.symbol, most, parameter.unit, float(np.quantile(share, PROBABILITY)))
 
 
 def drawn(mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

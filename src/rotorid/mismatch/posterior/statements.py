@@ -50,7 +50,7 @@ class Statement:
         if self.status in CLAIMED:
             return ""
         if self.probability >= SURE:
-            return "it is too small to matter, by itself or beside a larger effect"
+            return "it is too small to matter, by itself or next to a larger effect"
         return f"its probability is {100 * self.probability:.0f} %"
 
 
