@@ -43,7 +43,7 @@ class Prior:
     percent at most."""
     form_error: float = 0.15
     """Share of an effect's contribution that its form is wrong by: what is less than that of another one in the same
-    channel may be what is wrong with that one's form."""
+    channel may be what is wrong with that one's form. Chosen on 22 drawn flights (docs/proof/README.md)."""
     open_nats: float = 5.0
     """Nats that a model with another id in its place may be worse for that id to be looked at."""
     beside_nats: float = 3.0
