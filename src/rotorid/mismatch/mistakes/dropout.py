@@ -127,8 +127,8 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
 def standing_commands(run: Run, sensor: str, names: list[str], noisy: set[str]) -> list[Stretch]:
     """Stretches in which one rotor's command stands still while all others go on.
 
-    A command at the end of its range may truly stand: its motor gives all that it can. All commands stand together where
-    nothing is flown.
+    A command at the end of its range may truly stand still: its motor gives all that it can. On the ground all commands
+    stand still together.
     """
     found = []
     commands = run.array(tuple(names))

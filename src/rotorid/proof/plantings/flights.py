@@ -27,6 +27,11 @@ class Flight:
     rate_hz: float | None = None
     """Rate to which the tables are thinned, every so many rows, as a slow logger writes them; None for all rows."""
 
+    @property
+    def reduced(self) -> bool:
+        """Whether it is another flight with less recorded: one size of each kind is planted, and no pairs."""
+        return bool(self.without) or self.rate_hz is not None
+
 
 FLIGHTS = (
     Flight("neurobem", "neurobem", 12.0, has="motion capture, body rates, accelerometer, rotor speeds, voltage"),

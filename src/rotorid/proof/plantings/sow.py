@@ -48,15 +48,17 @@ def fitting(recordings: RecordingSet) -> tuple[Kind, ...]:
     return tuple(k for k in KINDS if k.fits(recordings))
 
 
-def of_flight(name: str, kinds: Sequence[Kind], pairs: int = PAIRS) -> list[Planting]:
-    """All plantings of a flight: each kind in each of its sizes, and `pairs` pairs of kinds in both sizes.
+def of_flight(
+    name: str, kinds: Sequence[Kind], pairs: int = PAIRS, sizes: Sequence[str] = (LARGE, SMALL)
+) -> list[Planting]:
+    """All plantings of a flight: each kind in some of its sizes, and `pairs` pairs of kinds in both of them.
 
     Pairs are of two families and of kinds that change different things; drawn, the same at every start.
     """
-    out = [Planting(name, k.family, (k.name,), size, 0) for size in (LARGE, SMALL) for k in kinds if size in k.sizes]
+    out = [Planting(name, k.family, (k.name,), size, 0) for size in sizes for k in kinds if size in k.sizes]
     apart = [(a.name, b.name) for a, b in combinations(kinds, 2) if a.family != b.family and not a.touches & b.touches]
     drawn = generator(f"{name}/pairs").permutation(len(apart))[:pairs]
-    return out + [Planting(name, PAIR, apart[k], size, 0) for size in (LARGE, SMALL) for k in drawn]
+    return out + [Planting(name, PAIR, apart[k], size, 0) for size in sizes for k in drawn]
 
 
 def plant(recordings: RecordingSet, planting: Planting) -> tuple[RecordingSet, tuple[Truth, ...]]:
@@ -78,7 +80,8 @@ def list_text(sets: Path) -> str:
     lines = ["planting"]
     for flight in FLIGHTS:
         kinds = fitting(taken(read_set(sets / flight.set), flight))
-        lines += [p.name for p in of_flight(flight.name, kinds)]
+        reduced = {"pairs": 0, "sizes": (LARGE,)} if flight.reduced else {}
+        lines += [p.name for p in of_flight(flight.name, kinds, **reduced)]
     return "\n".join(lines) + "\n"
 
 
