@@ -29,7 +29,7 @@ class Flight:
 
     @property
     def reduced(self) -> bool:
-        """Whether it is another flight with less recorded: one size of each kind is planted, and no pairs."""
+        """Whether it is another flight with less recorded."""
         return bool(self.without) or self.rate_hz is not None
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.proof.plantings import air, clocks, commands, geometry, sensors, values
-from rotorid.proof.plantings.flights import FLIGHTS, taken
+from rotorid.proof.plantings.flights import FLIGHTS, Flight, taken
 from rotorid.proof.plantings.kinds import LARGE, SMALL, Kind, Truth
 from rotorid.proof.plantings.plan import PAIR, Planting
 from rotorid.recordings import RecordingSet, read_set
@@ -61,6 +61,11 @@ def of_flight(
     return out + [Planting(name, PAIR, apart[k], size, 0) for size in sizes for k in drawn]
 
 
+def planned(flight: Flight, kinds: Sequence[Kind]) -> list[Planting]:
+    """The plantings of a flight; of one that has less recorded than another the large size of each kind, no pairs."""
+    return of_flight(flight.name, kinds, 0, (LARGE,)) if flight.reduced else of_flight(flight.name, kinds)
+
+
 def plant(recordings: RecordingSet, planting: Planting) -> tuple[RecordingSet, tuple[Truth, ...]]:
     """The set with a planting in it, and what is true of it: one truth a kind.
 
@@ -80,8 +85,7 @@ def list_text(sets: Path) -> str:
     lines = ["planting"]
     for flight in FLIGHTS:
         kinds = fitting(taken(read_set(sets / flight.set), flight))
-        reduced = {"pairs": 0, "sizes": (LARGE,)} if flight.reduced else {}
-        lines += [p.name for p in of_flight(flight.name, kinds, **reduced)]
+        lines += [p.name for p in planned(flight, kinds)]
     return "\n".join(lines) + "\n"
 
 
