@@ -36,8 +36,13 @@ def stamp_of_batch(wildcards):
     Where it changes the batch is gone through once more, and what changed in content is judged. The files are no inputs:
     Snakemake looks at every input of every waiting job each second, which took half a core from a thousand sets.
     """
+    return stamp_of(folders_of_batch(wildcards))
+
+
+def stamp_of(folders):
+    """Hash of the names, sizes and times of the files in some folders."""
     found = hashlib.sha256()
-    for folder in folders_of_batch(wildcards):
+    for folder in folders:
         for path in sorted(Path(folder).glob("*")):
             about = path.lstat()
             found.update(os.fsencode(path) + f"\0{about.st_size}\0{about.st_mtime_ns}\0".encode())
@@ -70,12 +75,33 @@ rule judge_fleet:
         "../scripts/judge_fleet.py"
 
 
+rule fleet_history:
+    """What changed in each vehicle of the fleet since its first sets."""
+    message:
+        "Fleet: history of each vehicle"
+    output:
+        numbers="results/fleet/history.csv",
+        events="results/fleet/events.csv",
+        figure="results/fleet/history.svg",
+    params:
+        folders=lambda wildcards: [f"{CONFIG.recordings}/{name}" for name in fleet_sets()],
+        stamp=lambda wildcards: stamp_of(f"{CONFIG.recordings}/{name}" for name in fleet_sets()),
+        good=CONFIG.fleet.good,
+        code=code_of("fleet_history"),
+    log:
+        "results/logs/fleet_history.log",
+    script:
+        "../scripts/fleet_history.py"
+
+
 rule fleet:
     """What the sets of a folder show together: tables, figure and page."""
     message:
         "Fleet: summary"
     input:
         batches=verdicts_of_fleet,
+        events="results/fleet/events.csv" if CONFIG.fleet.history else [],
+        history="results/fleet/history.svg" if CONFIG.fleet.history else [],
     output:
         sets="results/fleet/sets.csv",
         effects="results/fleet/effects.csv",

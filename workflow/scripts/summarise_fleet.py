@@ -7,14 +7,21 @@
 import os
 from pathlib import Path
 
+import pandas as pd
+
 from rotorid import log
 from rotorid.fleet.page import make_page
 from rotorid.fleet.summary import by_effect, by_vehicle, collect
 from rotorid.plots.fleet import draw_fleet
 
 
-def main(batches: list[str], recordings: str, tables: dict[str, str], figure: str, page: str) -> None:
-    """Summarise the folders of sets below `batches`; `tables` are paths by name: sets, effects, parameters."""
+def main(
+    batches: list[str], recordings: str, tables: dict[str, str], figure: str, page: str, history: list[str]
+) -> None:
+    """Summarise the folders of sets below `batches`; `tables` are paths by name: sets, effects, parameters.
+
+    `history` are the files of events and their figure, empty where they were not asked for.
+    """
     folders = [folder for batch in batches for folder in Path(batch).iterdir() if folder.is_dir()]
     sets, effects, parameters = collect(folders, Path(recordings))
     counts = by_effect(effects, sets)
@@ -24,7 +31,8 @@ def main(batches: list[str], recordings: str, tables: dict[str, str], figure: st
     beside = Path(page).parent
     links = {f.name: os.path.relpath(f / "report.html", beside) for f in folders if (f / "report.html").is_file()}
     name, fleet = Path(recordings).resolve().name, by_vehicle(effects, sets)
-    text = make_page(name, sets, counts, fleet, links, Path(figure))
+    since = (pd.read_csv(history[0]), Path(history[1])) if history else None
+    text = make_page(name, sets, counts, fleet, links, Path(figure), since)
     Path(page).write_text(text, encoding="utf-8")
 
 
@@ -36,4 +44,5 @@ if __name__ == "__main__":
             tables={name: snakemake.output[name] for name in ("sets", "effects", "parameters")},
             figure=snakemake.output.figure,
             page=snakemake.output.page,
+            history=[str(f) for f in (snakemake.input.events, snakemake.input.history) if f],
         )

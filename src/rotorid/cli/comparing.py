@@ -16,30 +16,38 @@ if TYPE_CHECKING:
 
 
 def compare(
-    base: Annotated[Path, typer.Argument(help="The recording set of the flights that were good.")],
-    new: Annotated[Path, typer.Argument(help="The recording set of the flights in question.")],
+    sets: Annotated[
+        list[Path],
+        typer.Argument(help="Sets: one or more of flights that were good, then the one in question."),
+    ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File for the result as JSON.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
     ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where something surely changed.")] = False,
 ) -> None:
-    """Say what changed between two sets of flights of one vehicle, and by how much at most everything else.
+    """Say what changed since the flights of one vehicle that were good, and by how much at most everything else.
 
-    Both sets are held against their own vehicle.yaml: what was changed on purpose and is written there is no change.
+    Each set is held against its own vehicle.yaml: what was changed on purpose and is written there is no change. With
+    three or more good flights their differences among themselves are the yardstick.
     Not compared yet: the chain from command to rotor speed where speeds are not measured, and stands and benches.
 
     Examples:
 
     `rotorid compare flights-of-monday flights-of-friday`
 
+    `rotorid compare monday tuesday wednesday thursday`
+
     `rotorid compare reference today --ci`
     """
     with one_sentence():
+        *good, new = sets
+        if not good:
+            raise InputError(f"{new}: nothing to compare it with; expected two sets or more, the last one in question")
         with progress(None, quiet) as step:
-            step(f"reading {base.name} and {new.name}")
-            first, second = flights(base), flights(new)
-            from rotorid.mismatch.changes import changes_between, words
+            step(f"reading {', '.join(path.name for path in sets)}")
+            from rotorid.mismatch.changes import as_one, changes_between, words
 
+            first, second = as_one([flights(path) for path in good]), flights(new)
             step(f"comparing {second.name} with {first.name}")
             found = changes_between(first, second)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -43,6 +43,10 @@ td:last-child:not(.number) { min-width: 9rem; }
 <td class="number">{{ row.failed or "" }}</td><td class="number">{{ row.person or "" }}</td><td>{{ row.effects }}</td>
 <td class="{{ row.last }}">{{ row.last.replace("_", " ") }}</td></tr>
 {% endfor %}</table></div>
+{% if history %}<h2>What changed since the first sets</h2>
+{% if events %}<ul>{% for row in events %}<li>{{ row.sentence }} {% if row.lasts > 1 %}Seen in {{ row.lasts }} sets.
+{% else %}Seen in this set alone.{% endif %}</li>{% endfor %}</ul>{% else %}<p>Nothing.</p>{% endif %}
+{{ history }}{% endif %}
 <h2>Need a person</h2>
 {% if looked %}<div class="wide"><table>
 <tr><th>set</th><th>vehicle</th><th>verdict</th><th>why</th><th>what it says</th></tr>
@@ -63,12 +67,20 @@ td:last-child:not(.number) { min-width: 9rem; }
 
 
 def make_page(
-    name: str, sets: pd.DataFrame, counts: pd.DataFrame, fleet: pd.DataFrame, links: dict[str, str], figure: Path
+    name: str,
+    sets: pd.DataFrame,
+    counts: pd.DataFrame,
+    fleet: pd.DataFrame,
+    links: dict[str, str],
+    figure: Path,
+    history: tuple[pd.DataFrame, Path] | None = None,
 ) -> str:
-    """The page of a fleet from its tables (`rotorid.fleet.summary`); `links` lead to each set's own page."""
+    """The page of a fleet from its tables (`rotorid.fleet.summary`); `links` lead to each set's own page.
+
+    `history` are the events of `rotorid.fleet.history` and their figure, where they were asked for.
+    """
     rows = [{**row, "link": links.get(row["set"], "")} for row in sets.to_dict("records")]
     words = sets["verdict"].value_counts()
-    drawn = figure.read_text(encoding="utf-8")
     return (
         Environment(autoescape=True, trim_blocks=True)
         .from_string(TEMPLATE)
@@ -79,10 +91,18 @@ def make_page(
             vehicles=sets["vehicle"].nunique(),
             words=", ".join(f"{count} {word.replace('_', ' ')}" for word, count in sorted(words.items())),
             people=int((sets["person"] != "").sum()),
-            figure=Markup(drawn[drawn.index("<svg") :]),
+            figure=drawing(figure),
+            history=drawing(history[1]) if history else "",
+            events=history[0].to_dict("records") if history else [],
             counts=counts.to_dict("records"),
             fleet=fleet.to_dict("records"),
             looked=[row for row in rows if row["person"]],
             alone=[row for row in rows if not row["person"]],
         )
     )
+
+
+def drawing(figure: Path) -> Markup:
+    """An SVG file as it stands within a page."""
+    text = figure.read_text(encoding="utf-8")
+    return Markup(text[text.index("<svg") :])

@@ -1,4 +1,4 @@
-"""Figure of a fleet: in how many sets each effect shows, and how the most frequent numbers change from set to set."""
+"""Figures of a fleet: in how many sets each effect shows, how numbers change from set to set and since the first."""
 
 from __future__ import annotations
 
@@ -82,4 +82,47 @@ def over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> Non
         axis.set_xlim(0.0, count + 1.0)
         axis.set_xlabel("set, in order of day and name")
     if few and len(vehicles) > 1:
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+MOST_HISTORIES = 8
+"""Vehicles whose history is drawn, those with the most events first."""
+
+
+def draw_history(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> None:
+    """Each vehicle's believed values over its sets, as changes since its first ones with intervals (95 %).
+
+    `numbers` and `events` are the tables of `rotorid.fleet.history.history`. A value that some set shows to have
+    changed has a colour, the others are grey; a line stands where an event begins.
+    """
+    counts = events["vehicle"].value_counts()
+    vehicles = sorted(numbers["vehicle"].unique(), key=lambda v: (-counts.get(v, 0), v))[:MOST_HISTORIES]
+    rows = max(1, len(vehicles))
+    fig, axes = style.figure(1.7 * rows + 0.3, rows, 1, squeeze=False)
+    if not vehicles:
+        axes[0, 0].text(0.5, 0.5, "no vehicle has more sets than the good ones", ha="center")
+        axes[0, 0].set_axis_off()
+    for axis, vehicle in zip(axes[:, 0], vehicles, strict=False):
+        one_history(axis, numbers[numbers["vehicle"] == vehicle], events[events["vehicle"] == vehicle])
+        axis.set_title(vehicle, loc="left")
+    style.save(fig, path)
+
+
+def one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
+    """One vehicle's values over its sets."""
+    order = {name: place for place, name in enumerate(dict.fromkeys(numbers["set"]), 1)}
+    changed = [name for name in dict.fromkeys(numbers["name"]) if name in set(events["id"])]
+    for name, own in numbers.groupby("name", sort=False):
+        place = own["set"].map(order).to_numpy()
+        value, low, high = (100 * own[c].to_numpy(float) for c in ("change", "low_95", "high_95"))
+        colour = style.CYCLE[changed.index(name) % len(style.CYCLE)] if name in changed else style.GREY
+        bars = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
+        label = name if name in changed else None
+        axis.errorbar(place, value, bars, fmt=".-", ms=3, color=colour, lw=0.5, elinewidth=0.8, label=label)
+    for name in dict.fromkeys(events["set"]):
+        axis.axvline(order[name] - 0.5, color=style.ORANGE, lw=0.8, ls="--")
+    axis.set_xlim(0.5, len(order) + 0.5)
+    axis.set_ylabel("change (%)")
+    axis.set_xlabel("set after the good ones")
+    if changed:
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))

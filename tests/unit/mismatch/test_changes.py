@@ -10,8 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.mismatch.changes import Changes, changes_between
+from rotorid.errors import InputError
+from rotorid.mismatch.changes import Changes, as_one, changes_between
 from rotorid.mismatch.changes.compare import Change
+from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from tests.unit.mismatch.flights import Flight
@@ -87,3 +89,36 @@ def test_the_command_says_it_and_its_exit_code_is_that_of_a_regression_test(tmp_
     (tmp_path / "friday" / "vehicle.yaml").unlink()
     run = CliRunner().invoke(app, ["compare", *folders, "-q"])
     assert run.exit_code == 1 and "vehicle.yaml" in run.output
+
+
+def test_several_good_sets_are_one_reference_and_their_vehicle_must_be_one():
+    first, second = flights("monday", (1,)), flights("tuesday", (2,))
+    both = as_one([first, second])
+    assert [r.name for r in both.runs] == ["monday-run01", "tuesday-run02"]
+    with pytest.raises(InputError, match="tuesday/vehicle.yaml: differs from that of monday"):
+        as_one([first, replace(second, vehicle=lighter(second.vehicle, 1.1))])
+
+
+def test_every_value_has_its_change_with_an_interval():
+    same = {p.symbol: p for p in compared("same").values}
+    assert same["mass_kg"].low < 0.0 < same["mass_kg"].high
+    assert same["inertia_xx_kg_m2"].low < 0.0 < same["inertia_xx_kg_m2"].high
+    changed = {p.symbol: p for p in compared("believed lighter").values}
+    told = sure(compared("believed lighter"))[0]
+    assert changed[told.id].low == pytest.approx(told.parameters[0].low)
+
+
+def test_a_set_that_goes_farther_than_the_good_one_is_noted():
+    slow, fast = {"airspeed_m_s": 3.0, "tilt_rad": 0.3}, {"airspeed_m_s": 9.0, "tilt_rad": 0.31}
+    (note,) = regime_notes(slow, fast, "monday", "friday")
+    assert "friday reaches" in note and "9" in note and "monday 3" in note
+    assert regime_notes(fast, slow, "friday", "monday") == []
+    assert compared("same").notes == ()
+
+
+def test_what_differs_between_good_flights_is_no_change():
+    """Three good flights, each with another drag: a fourth drag lies within what they differ by."""
+    good = tuple(flights(f"day{k}", (k,), drag=drag) for k, drag in ((1, 0.4), (2, 1.0), (3, 0.7)))
+    fourth = flights("day4", (4,), drag=1.1)
+    assert "rotor_drag" in {i for c in sure(changes_between(good[0], fourth)) for i in (c.id, *c.alternatives)}
+    assert sure(changes_between(as_one(good), fourth)) == []

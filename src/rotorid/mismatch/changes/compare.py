@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorid.mismatch.changes.joint import joint_of
+from rotorid.errors import InputError
+from rotorid.mismatch.changes.joint import Reference, joint_of, reference_of
 from rotorid.mismatch.changes.notes import notes_of
 from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
@@ -15,8 +17,9 @@ from rotorid.mismatch.findings import Estimate, Finding, Status
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import Statement, statements_of
+from rotorid.mismatch.posterior.statements import parameters, statements_of
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
@@ -49,13 +52,20 @@ class Changes:
     """The surest first."""
     limits: tuple[UpperLimit, ...]
     """By how much everything else may have changed at most, with 95 % probability; of a value relative."""
+    values: tuple[Estimate, ...]
+    """Of every believed value its relative change with 95 % interval, changed or not."""
     notes: tuple[str, ...] = ()
     """What keeps the two sets from being compared fully, in sentences."""
 
 
 def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the first set of flights to the second."""
-    joint = joint_of(base, new)
+    return changes_from(reference_of(base), new, prior)
+
+
+def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
+    """What changed from the flights of a reference to another set of flights."""
+    joint, base = joint_of(reference, new), reference.recordings
     usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia)
 
     def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
@@ -64,7 +74,7 @@ def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior(
     found = decide(joint.base, joint.new, spread_of_flights(joint.runs_of_base, decide))
     vehicles = base.vehicle, new.vehicle
     changes = [
-        Change(s.id, s.status, s.alternatives, s.probability, changes_of(s, *vehicles))
+        Change(s.id, s.status, s.alternatives, s.probability, in_percent(s.id, s.parameters, *vehicles))
         for s in statements_of(found)
         if s.status != "not_established"
     ]
@@ -75,20 +85,52 @@ def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior(
         new=new.name,
         changes=(*mistakes_that_differ(joint.mistakes_of_base, joint.mistakes_of_new), *changes),
         limits=tuple(limit for limit in limits_of(found, squares) if limit.id not in changed),
+        values=values_of(found, *vehicles),
         notes=notes_of(joint, base.name, new.name),
     )
 
 
-def changes_of(statement: Statement, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
-    """By how much a statement's parameters changed: those of a value relative to what the second vehicle.yaml says."""
-    key = KEYS.get(statement.id)
+def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:
+    """Several sets of one vehicle as one, each run named after its set.
+
+    Raises
+    ------
+    InputError
+        Their vehicles are not believed to be the same.
+    """
+    first, *others = sets
+    for other in others:
+        if other.vehicle != first.vehicle:
+            raise InputError(
+                f"{other.name}/vehicle.yaml: differs from that of {first.name}; expected one vehicle in all good sets"
+            )
+    if not others:
+        return first
+    runs = tuple(replace(run, name=f"{own.name}-{run.name}") for own in sets for run in own.runs)
+    return replace(first, name=" + ".join(own.name for own in sets), runs=runs, held_out=())
+
+
+def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
+    """By how much each believed value changed, relative, with its 95 % interval, changed or not."""
+    out = []
+    for key, term in found.problem.terms.items():
+        if term.effect not in KEYS or not found.problem.unit[found.problem.columns_of[key]].all():
+            continue
+        at = scored(found.problem, tuple(sorted({*found.model, key})))
+        if at.mode is not None:
+            out += in_percent(term.effect, parameters(found, at, key), base, new)
+    return tuple(out)
+
+
+def in_percent(name: str, changes: tuple[Estimate, ...], base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
+    """Changes of an id's parameters as stated: those of a value relative to what the second vehicle.yaml says."""
+    key = KEYS.get(name)
     if key is None:
-        return statement.parameters
+        return changes
     scale = believed_over(key, base, new)
     ends = ("value", "low", "high")
     return tuple(
-        replace(p, **{end: scale * relative_change(key, getattr(p, end), 0.0)[0] for end in ends})
-        for p in statement.parameters
+        replace(p, **{end: scale * relative_change(key, getattr(p, end), 0.0)[0] for end in ends}) for p in changes
     )
 
 

@@ -59,35 +59,70 @@ class Joint:
     """The same to the key of each believed value."""
 
 
-def joint_of(base: RecordingSet, new: RecordingSet, cutoff_hz: float = 20.0) -> Joint:
+@dataclass(frozen=True)
+class Reference:
+    """The first set, fitted: what other sets are held against."""
+
+    recordings: RecordingSet
+    found: Fitted
+    terms: tuple[Term, ...]
+    segments: tuple[Segment, ...]
+    rows: tuple[Rows, ...]
+    known: np.ndarray
+    mistakes: tuple[Finding, ...]
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of the terms."""
+        return [t.key for t in self.terms]
+
+
+def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
+    """The first set as a verdict fits it, all of its runs."""
+    base, mistakes, _ = find_mistakes(replace(base, held_out=()))
+    found = fitted(prepare(base, cutoff_hz))
+    model = found.model
+    terms = [t for t in model.terms if not t.run]
+    keys = [t.key for t in terms]
+    # As another set's stretches are made: what making them leaves out is left out of both.
+    segments = stretches_of(found, base)
+    rows = as_seen(assemble_rows(model.prepared, terms, segments, model.effects), model, keys)
+    return Reference(base, found, tuple(terms), tuple(segments), tuple(rows), known_effects(model, keys), mistakes)
+
+
+def joint_of(reference: Reference, new: RecordingSet) -> Joint:
     """Two sets of flights on the same columns.
 
     Each is held against its own vehicle.yaml: what was changed on purpose and is written there is no change.
     """
-    base, mistakes_of_base, _ = find_mistakes(replace(base, held_out=()))
-    new, mistakes_of_new, _ = find_mistakes(replace(new, held_out=()))
-    found = fitted(prepare(base, cutoff_hz))
-    model = found.model
-    terms = [t for t in model.terms if not t.run]
+    new, mistakes, _ = find_mistakes(replace(new, held_out=()))
+    found, terms, model = reference.found, list(reference.terms), reference.found.model
     segments = stretches_of(found, new)
     if not segments:
         raise InputError(
-            f"set {new.name}: no stretch has all that {base.name} was fitted by; expected the same columns in both"
+            f"set {new.name}: no stretch has all that {reference.recordings.name} was fitted by; "
+            "expected the same columns in both"
         )
-    keys = [t.key for t in terms]
-    first = as_seen(assemble_rows(model.prepared, terms, model.segments, model.effects), model, keys)
-    second = against_own(assemble_rows(model.prepared, terms, segments, model.effects), model, segments, new)
-    second = as_seen(second, model, keys)
-    known = known_effects(model, keys)
-    block_s = block_seconds(first, model.prepared.thinner.rate_hz)
-    of_base, of_new = (regression_of(rows, terms, model, block_s) for rows in (first, second))
-    held = replace(model, rows=second, regression=of_new)
+    rows = against_own(assemble_rows(model.prepared, terms, segments, model.effects), model, segments, new)
+    rows = as_seen(rows, model, reference.keys)
+    block_s = block_seconds(list(reference.rows), model.prepared.thinner.rate_hz)
+    of_base, of_new = (regression_of(list(own), terms, model, block_s) for own in (reference.rows, rows))
+    held = replace(model, rows=rows, regression=of_new)
     squares = (squares_of(held, [t for t in terms if t.kind == kind]) for kind in ("effect", "value"))
-    in_base, in_new = (with_known_effects(evidence_from(own), known) for own in (of_base, of_new))
-    inertia = inertia_of(new.vehicle, in_base.channels) / inertia_of(base.vehicle, in_base.channels)
-    flown = (how_far(own, model.prepared) for own in (model.segments, segments))
-    runs = by_run(in_base, of_base)
-    return Joint(in_base, in_new, runs, known, inertia, *flown, mistakes_of_base, mistakes_of_new, *squares)
+    in_base, in_new = (with_known_effects(evidence_from(own), reference.known) for own in (of_base, of_new))
+    believed = (inertia_of(v, in_base.channels) for v in (new.vehicle, reference.recordings.vehicle))
+    flown = (how_far(own, model.prepared) for own in (reference.segments, segments))
+    return Joint(
+        in_base,
+        in_new,
+        by_run(in_base, of_base),
+        reference.known,
+        np.divide(*believed),
+        *flown,
+        reference.mistakes,
+        mistakes,
+        *squares,
+    )
 
 
 def how_far(segments: Sequence[Segment], prepared: Prepared) -> dict[str, float]:

@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
-from rotorid.mismatch.posterior.leftover import VARIANCES, Spectrum, spectrum_of, unit_of
+from rotorid.mismatch.posterior.leftover import VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, believed, log_priors
 from rotorid.mismatch.posterior.score import scored
@@ -38,21 +38,47 @@ def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pri
     """The most probable changes between two sets on the same columns.
 
     `spread` (K,) is the one-sigma of each coefficient between flights in which nothing changed, in its unit. The
-    leftover is learnt from both sets with what is common to both: at first all that differs between the sets counts as
-    leftover, then what the changes found do not explain.
+    leftover is learnt from both sets, from two ends: all that differs between them is leftover, and none of it is.
+    Where both ends are about as probable the larger leftover is believed, as in one flight (`posterior.search.decide`).
     """
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    change, starts = np.zeros(len(unit)), [()]
-    variance = leftover_of(spectra, change)
+    nothing, all_of_it = np.zeros(len(unit)), difference_of(spectra)
+    large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
+    gain = joint(spectra, small, spread) - joint(spectra, large, spread)
+    return small if gain > prior.leftover_nats else large
+
+
+def settled(
+    new: Evidence, spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, prior: Prior
+) -> Found:
+    """The most probable changes and their leftover, from a `variance` (C,) of the leftover."""
+    starts = [()]
     for _ in range(ROUNDS):
-        problem = problem_of_changes(new, spectra, variance, spread, prior)
-        found = most_probable(problem, starts)
+        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior), starts)
         starts = [(), found.model]
         before, variance = variance, leftover_of(spectra, change_of(found))
         if np.array_equal(before, variance):
             break
     return found
+
+
+def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) -> float:
+    """Log posterior of changes and leftover together, nats, less a constant."""
+    variance = found.problem.variance
+    base, new = (s.weighed(variance) for s in spectra)
+    rows = spectra[1].rows
+    of_common = integrated(base.gram + new.gram, base.cross + new.cross, np.full(len(base.cross), rows))
+    of_usual = integrated(*difference_products(base, new, rows), in_units(spread, spectra[1].unit) ** 2)
+    return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in spectra)
+
+
+def integrated(gram: np.ndarray, cross: np.ndarray, variance: np.ndarray) -> float:
+    """Log of the integral over coefficients (K,) with normal priors of a `variance` (K,), nats."""
+    root = np.sqrt(variance)
+    inner = np.eye(len(cross)) + root[:, None] * gram * root
+    scaled = root * cross
+    return float(0.5 * scaled @ np.linalg.solve(inner, scaled) - 0.5 * np.linalg.slogdet(inner)[1])
 
 
 def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray) -> np.ndarray:
@@ -65,6 +91,13 @@ def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray) -> np.nd
     common = np.linalg.solve(gram + RIDGE * np.eye(len(gram)), base.cross + new.cross - new.gram @ change)
     gains = spectra[0].gains_of_leftover(common) + spectra[1].gains_of_leftover(common + change)
     return VARIANCES[np.argmax(gains, axis=1)]
+
+
+def difference_of(spectra: tuple[Spectrum, Spectrum]) -> np.ndarray:
+    """Coefficients (K,) of all columns in the second set less those in the first, each fitted alone, scaled."""
+    base, new = (s.weighed(np.zeros(len(s.channels))) for s in spectra)
+    ridge = RIDGE * np.eye(len(base.cross))
+    return np.linalg.solve(new.gram + ridge, new.cross) - np.linalg.solve(base.gram + ridge, base.cross)
 
 
 def change_of(found: Found) -> np.ndarray:
@@ -87,6 +120,11 @@ def problem_of_changes(
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
+    # What one row tells is little next to what flights differ by anyway: a change is wider than that.
+    sd = np.hypot(sd, prior.value_reach * in_units(spread, unit))
+    for key, effect in effects.items():
+        if effect in PARAMETER_NAMES.values() and (own := unit[columns_of[key]]).all():
+            sd[columns_of[key]] = prior.freed_sd[0] / own
     free = [columns_of[key] for key, effect in effects.items() if effect not in PARAMETER_NAMES.values()]
     free = np.concatenate(free) if free else np.zeros(0, int)
     low[free], high[free] = -np.inf, np.inf
@@ -123,13 +161,21 @@ def products_of_changes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """S̃ (K, K) and s̃ (K,) of the module's equations, scaled."""
     base, new = (s.weighed(variance) for s in spectra)
-    unit, rows = spectra[1].unit, spectra[1].rows
-    inverse = np.linalg.inv(base.gram + new.gram + np.eye(len(unit)) / rows)
-    gram = new.gram - new.gram @ inverse @ new.gram
-    cross = new.cross - new.gram @ inverse @ (base.cross + new.cross)
-    usual = np.divide(spread, unit, out=np.zeros(len(unit)), where=unit > 0) ** 2
-    gram, cross = np.hsplit(np.linalg.solve(np.eye(len(unit)) + gram * usual, np.column_stack([gram, cross])), [-1])
+    gram, cross = difference_products(base, new, spectra[1].rows)
+    usual = in_units(spread, spectra[1].unit) ** 2
+    gram, cross = np.hsplit(np.linalg.solve(np.eye(len(cross)) + gram * usual, np.column_stack([gram, cross])), [-1])
     return 0.5 * (gram + gram.T), cross[:, 0]
+
+
+def difference_products(base: Weighed, new: Weighed, rows: float) -> tuple[np.ndarray, np.ndarray]:
+    """S (K, K) and s (K,): products of the second set with what is common to both integrated out, scaled."""
+    inverse = np.linalg.inv(base.gram + new.gram + np.eye(len(base.cross)) / rows)
+    return new.gram - new.gram @ inverse @ new.gram, new.cross - new.gram @ inverse @ (base.cross + new.cross)
+
+
+def in_units(spread: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """Coefficients (K,) scaled; 0 of a column that is never excited."""
+    return np.divide(spread, unit, out=np.zeros(len(unit)), where=unit > 0)
 
 
 def as_change(term: EvidenceTerm) -> EvidenceTerm:

@@ -19,8 +19,11 @@ from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import statements_of
 from rotorid.mismatch.regression import NEVER_EXCITED
 
-SAME_SD = 0.01
-"""Relative one-sigma of a value between two flights in which nothing changed: air, battery and temperature."""
+SAME_SD, SAME_BODY_SD = 0.01, 0.003
+"""Relative one-sigma between two flights in which nothing changed of a rotor's coefficient (3 K of air change
+its density by a hundredth), and of mass, inertia and arm."""
+OF_THE_AIR = ("thrust", "torque")
+"""Values that the air's density changes."""
 FORM_SD = 0.02
 """Share of what the first set's effects contribute to a channel that may differ there by their forms."""
 RIDGE = 1e-6
@@ -33,7 +36,7 @@ def usual_spread(base: Evidence, new: Evidence, known: np.ndarray, inertia: np.n
     """One-sigma (K,) of each coefficient between two flights by values, noise and forms alone, in its unit.
 
     `known` (K,) are the coefficients of the effects that the first set's model holds; `inertia` (C,) is the mass, or
-    the inertia, that the second vehicle.yaml has over the first one's in each channel: the residual noise grows with it.
+    the inertia, of the second vehicle.yaml over the first one's in each channel: residual noise grows with it.
     """
     gram = base.gram.sum(axis=1)
     hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
@@ -45,7 +48,7 @@ def usual_spread(base: Evidence, new: Evidence, known: np.ndarray, inertia: np.n
     for term in base.terms:
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
-            out[at] = np.hypot(SAME_SD, hidden[at])
+            out[at] = np.hypot(SAME_SD if term.key in OF_THE_AIR else SAME_BODY_SD, hidden[at])
         elif term.kind == "effect":
             out[at] = form[at]
     return out

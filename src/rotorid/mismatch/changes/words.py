@@ -82,6 +82,7 @@ def as_json(found: Changes) -> dict:
             }
             for c in found.changes
         ],
+        "values": [{"name": p.symbol, "change": p.value, "interval_95": [p.low, p.high]} for p in found.values],
         "unchanged": [
             {
                 "id": x.id,
