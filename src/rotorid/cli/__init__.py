@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import checking, comparing, effects, exporting, importing, planning, simulating, starting, verdicts
+from rotorid.cli import (
+    checking,
+    comparing,
+    effects,
+    exporting,
+    importing,
+    parameters,
+    planning,
+    simulating,
+    starting,
+    verdicts,
+)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -53,4 +64,5 @@ app.command("init")(starting.init)
 app.command("check")(checking.check)
 app.command("simulate")(simulating.simulate)
 app.command("export")(exporting.export)
+app.command("parameters")(parameters.parameters)
 app.command("effects")(effects.effects)
