@@ -13,6 +13,7 @@ from rotorid.cli import (
     effects,
     exporting,
     importing,
+    modelling,
     parameters,
     planning,
     simulating,
@@ -64,5 +65,6 @@ app.command("init")(starting.init)
 app.command("check")(checking.check)
 app.command("simulate")(simulating.simulate)
 app.command("export")(exporting.export)
+app.command("model")(modelling.model)
 app.command("parameters")(parameters.parameters)
 app.command("effects")(effects.effects)
