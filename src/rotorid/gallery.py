@@ -40,7 +40,7 @@ class Kind:
     commands: tuple[str, ...]
     """As typed in a folder that holds the logs; `set` is the recording set, `answer` the verdict's folder."""
     after: str
-    """What to do next, beside what the verdict proposes."""
+    """What to do next, apart from what the verdict proposes."""
 
 
 KINDS = (

@@ -29,7 +29,7 @@ def model(
 
     Imports the logs, judges them, takes the improved vehicle and writes it in the form of a simulator, with what the
     form cannot express. The exported vehicle is then flown on the log's own rotor speeds in windows of half a second:
-    `next_to_log.csv` and `next_to_log.png` say how far it is off. The verdict's files lie beside them.
+    `next_to_log.csv` and `next_to_log.png` say how far it is off. The verdict's files lie in the same folder.
 
     Examples:
 
