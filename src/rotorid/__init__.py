@@ -15,7 +15,18 @@ Ten lines from a table to a verdict::
 
 from importlib import import_module
 
-__all__ = ["InputError", "Result", "check", "export", "read_log", "read_set", "simulate", "template", "verdict"]
+__all__ = [
+    "InputError",
+    "Result",
+    "check",
+    "export",
+    "parameters",
+    "read_log",
+    "read_set",
+    "simulate",
+    "template",
+    "verdict",
+]
 
 _HOME = {name: "api" for name in __all__} | {"InputError": "errors", "Result": "result", "read_set": "recordings"}
 

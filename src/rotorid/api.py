@@ -232,3 +232,23 @@ def simulate(vehicle: Believed, seconds: float = 20.0, flights: int = 2, seed: i
 def export(vehicle: Believed, to: str) -> Exported:
     """The vehicle for another tool (`rotorid export`): its `text`, and `left_out`, what it cannot express."""
     return export_vehicle(vehicle_from(vehicle), to)
+
+
+def parameters(data: Recorded, to: str, vehicle: Believed | None = None, **options) -> tuple:
+    """What flights say of an autopilot's parameters (`rotorid parameters`).
+
+    Parameters
+    ----------
+    data, vehicle, options
+        As for `verdict`.
+    to
+        `px4`, `ardupilot`, `betaflight` or `crazyflie`.
+
+    Returns
+    -------
+    tuple of rotorid.autopilot.parameters.Parameter
+        Each with `value`, `interval_95`, `determined` and `to_set`.
+    """
+    from rotorid.autopilot.parameters import parameters_of
+
+    return parameters_of(recording_set(data, vehicle, **options), to)

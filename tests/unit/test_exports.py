@@ -27,6 +27,7 @@ def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
 DRAG = ("rotor_drag", "at the hubs", {"k_d": 6e-5})
 OFFSET = ("com_offset", "moment", {"r_x": 0.002, "r_y": -0.001})
 PRODUCTS = ("inertia_products", "products", {"J_xy": 1e-4, "J_xz": 2e-4, "J_yz": -1e-4})
+IN_SPACE = ("com_offset", "moment and accelerometer, in space", {"r_x": 0.002, "r_y": -0.001, "r_z": 0.003})
 FLAP = ("flapping_moment", "at the hubs", {"k_flap": 2e-7})
 
 
@@ -108,6 +109,14 @@ def test_what_a_form_cannot_express_is_named() -> None:
     mjcf = export_vehicle(vehicle, "mjcf")
     assert "rotor_drag" in mjcf.left_out[0] and "Not expressed: rotor_drag" in mjcf.text
     assert any("inertia" in s for s in export_vehicle(vehicle, "px4").left_out)
+
+
+def test_a_centre_of_mass_that_the_accelerometer_showed_moves_the_rotors_as_well() -> None:
+    """The form that real flights are found to have: its moment is that of the plain one."""
+    plain, found = (export_vehicle(with_effects(effect), "rotorpy") for effect in (OFFSET, IN_SPACE))
+    for name, place in plain.parameters["rotor_pos"].items():
+        assert found.parameters["rotor_pos"][name] == pytest.approx(place)
+    assert any("accelerometer stays" in s for s in found.left_out)
 
 
 def test_px4_parameters_say_places_and_senses() -> None:

@@ -7,7 +7,19 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import checking, comparing, effects, exporting, importing, planning, simulating, starting, verdicts
+from rotorid.cli import (
+    checking,
+    comparing,
+    effects,
+    exporting,
+    importing,
+    modelling,
+    parameters,
+    planning,
+    simulating,
+    starting,
+    verdicts,
+)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -53,4 +65,6 @@ app.command("init")(starting.init)
 app.command("check")(checking.check)
 app.command("simulate")(simulating.simulate)
 app.command("export")(exporting.export)
+app.command("model")(modelling.model)
+app.command("parameters")(parameters.parameters)
 app.command("effects")(effects.effects)

@@ -12,7 +12,9 @@ from rotorid.cli.console import one_sentence
 
 def export(
     vehicle_file: Annotated[Path, typer.Argument(metavar="VEHICLE", help="vehicle.yaml or improved_vehicle.yaml.")],
-    to: Annotated[str, typer.Option("--to", help="rotorpy, mjcf, sdf, gym-pybullet-drones or px4.")],
+    to: Annotated[
+        str, typer.Option("--to", help="rotorpy, mjcf, sdf, gym-pybullet-drones, px4, px4-sih or ardupilot-json.")
+    ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write; default by the form.")] = None,
 ) -> None:
     """Write the vehicle, with its effects as far as the form knows them, for another tool.

@@ -31,7 +31,12 @@ def verdict(
     vehicle: VehicleFile = None,
     mapping: MappingFile = None,
     series: Annotated[
-        bool, typer.Option("--series", help="Also write series.parquet: recorded minus simulated, for PlotJuggler.")
+        bool,
+        typer.Option(
+            "--series",
+            help="Also write series.parquet: recorded minus simulated; where mcap or rerun is installed also "
+            "series.mcap with layouts for Foxglove and PlotJuggler, and series.rrd.",
+        ),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print verdict.json on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
@@ -122,7 +127,7 @@ def faults_of(verdict: Verdict, most: float, no_doubts: bool) -> list[str]:
 def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -> Verdict:
     """Analyse the set in `folder`, write the files into `target`, and return the verdict.
 
-    With `series` the residuals are written, too, as `series.parquet`.
+    With `series` the residuals are written, too, as `series.parquet` and for the viewers whose packages are installed.
     """
     from rotorid.recordings.tables import NO_PARQUET, parquet_is_here, write_table
 
@@ -150,6 +155,10 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
             from rotorid.result import residuals_of
 
             write_table(residuals_of(analysis), target / "series.parquet")
+            from rotorid.series_files import write_viewers
+
+            step("writing the series for viewers")
+            write_viewers(analysis, target)
         return verdict
 
 

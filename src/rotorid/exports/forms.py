@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -19,6 +18,8 @@ from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 FLU = np.array([1.0, -1.0, -1.0])
+MOVED_CENTRES = ("moment", "moment and accelerometer", "moment and accelerometer, in space")
+"""Forms of `com_offset` whose moment is that of rotors which sit elsewhere."""
 AT_ONCE_S = 1e-3
 """Time constant of a motor in tools that need one, where the vehicle states none."""
 
@@ -36,6 +37,8 @@ class Exported:
     """gym-pybullet-drones only: which of our rotors, from 0, its links 0 to 3 are."""
     mirrored: bool = False
     """gym-pybullet-drones only: the rotors turn as in its DroneModel.RACE."""
+    companions: dict[str, str] = field(default_factory=dict)
+    """Further files, to each name its text, that stand next to the file."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,8 @@ class Parts:
     lift: float = 0.0
     flap: float = 0.0
     frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of turning about each axis, N m s/rad."""
     curve: float = 0.0
     """Linear share b of T/T_max = b u + (1 − b) u²."""
     taken: tuple[dict, ...] = ()
@@ -130,6 +135,9 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
     if name == "frame_drag" and form in ("isotropic", "per axis"):
         values["frame"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
         return True
+    if name == "rotational_damping" and form in ("one constant", "linear"):
+        values["damping"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
+        return True
     if name == "motor_lag" and form == "one constant":
         values["tau_s"] = (p["tau"], p["tau"])
         return True
@@ -149,9 +157,10 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
     if name == "throttle_curve" and form == "thrust curve of the throttle" and 0 <= p["b"] <= 1:
         values["curve"] = p["b"]
         return True
-    if name == "com_offset" and form == "moment":
+    if name == "com_offset" and form in MOVED_CENTRES:
         values["places"] = values["places"] - np.array([p["r_x"], p["r_y"], 0.0])
-        return "taken as rotors that sit elsewhere, so that their drag acts there, too"
+        arm = "" if form == "moment" else "; the accelerometer stays where it was"
+        return f"taken as rotors that sit elsewhere, so that their drag acts there, too{arm}"
     if name == "inertia_products":
         j = values["inertia"].copy()
         for (a, b), key in (((0, 1), "J_xy"), ((0, 2), "J_xz"), ((1, 2), "J_yz")):
@@ -267,7 +276,7 @@ def mjcf(vehicle: Vehicle) -> Exported:
 def px4(vehicle: Vehicle) -> Exported:
     """Parameters of PX4's control allocation and thrust model, as QGroundControl loads them."""
     parts = parts_of(vehicle, KNOWS["px4"])
-    left = [*parts.left_out, "mass and inertia: PX4 has no parameters for them"]
+    left = [*parts.left_out, "mass and inertia: they are parameters of PX4's own simulator alone (--to px4-sih)"]
     rows: list[tuple[str, float, int]] = [("CA_AIRFRAME", 0, 6), ("CA_ROTOR_COUNT", vehicle.rotor_count, 6)]
     strongest = parts.thrust.max()
     for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
@@ -489,14 +498,15 @@ FORMS: dict[str, Callable[[Vehicle], Exported]] = {
 }
 
 
-def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
-    """The vehicle for another tool; InputError names the forms there are, or why the tool does not take it."""
-    if to not in FORMS:
-        near = get_close_matches(to, list(FORMS), 1)
-        meant = f"; did you mean {near[0]}?" if near else f", expected one of {', '.join(FORMS)}"
-        raise InputError(f"no form is called {to!r}{meant}")
+def check_exportable(vehicle: Vehicle) -> None:
+    """InputError where a vehicle lacks what every form needs."""
     if vehicle.kind == "bench" or vehicle.mass_kg is None or vehicle.inertia_kg_m2 is None:
         raise InputError(f"vehicle {vehicle.name}: only a vehicle with mass, inertia and rotors can be exported")
+
+
+def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
+    """The vehicle for another tool, a form of `FORMS`; InputError says why the tool does not take it."""
+    check_exportable(vehicle)
     if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
         raise InputError(f"{vehicle.name}: {why}")
     return FORMS[to](vehicle)

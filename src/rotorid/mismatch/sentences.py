@@ -260,8 +260,8 @@ def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
         word, best = min(known, key=lambda pair: pair[1])
         if errors.after > (1 + NO_BETTER) * best:
             out.append(
-                f"On the runs held out the {channel_words(name)} is worse with what is delivered: "
-                f"{number(errors.after)} {channel.unit}, {number(best)} with the {word} values alone."
+                f"On the held-out runs the error of the {channel_words(name)} is larger with the improved vehicle: "
+                f"{number(errors.after)} {channel.unit}; with the {word} values alone {number(best)} {channel.unit}."
             )
     return out
 

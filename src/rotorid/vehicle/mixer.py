@@ -30,8 +30,9 @@ def allocation_matrix(vehicle: Vehicle) -> np.ndarray:
     # Scaled rows, so that the rank does not hang on N against N m.
     scaled = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), np.finfo(float).tiny)
     if np.linalg.matrix_rank(scaled, tol=1e-9) < 4:
+        rotors = "1 rotor" if vehicle.rotor_count == 1 else f"{vehicle.rotor_count} rotors"
         raise InputError(
-            f"vehicle {vehicle.name}: its {vehicle.rotor_count} rotors cannot set thrust, roll, pitch and "
+            f"vehicle {vehicle.name}: its {rotors} cannot set thrust, roll, pitch and "
             "yaw independently (check positions, spins and torque_coefficient_n_m_s2)"
         )
     if vehicle.rotor_count == 4:

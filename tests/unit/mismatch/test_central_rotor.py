@@ -43,4 +43,6 @@ def test_one_central_rotor_is_judged_and_what_cannot_be_is_said(tmp_path: Path) 
     assert full_thrust_n(made.vehicle) is None
     assert delivered_value(made.vehicle, made.vehicle, "arm") == 1.0
     analysis = analysis_of(made)
-    assert "cannot set thrust, roll, pitch and yaw independently" in " ".join(analysis.notes), analysis.notes
+    assert "its 1 rotor cannot set thrust, roll, pitch and yaw independently" in " ".join(analysis.notes), (
+        analysis.notes
+    )

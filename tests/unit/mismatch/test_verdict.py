@@ -103,7 +103,7 @@ def test_an_error_that_did_not_get_smaller_is_not_sold_as_a_gain():
     worse = replace(made, traces=tuple(replace(t, after=1.2 * t.before) for t in made.traces))
     found = make_verdict(worse, [], {})
     assert "is not smaller with this" in found.sentence and "goes from" not in " ".join(found.details)
-    assert any("the forward force is worse with what is delivered" in text for text in found.warnings)
+    assert any("the error of the forward force is larger with the improved vehicle" in text for text in found.warnings)
     assert not make_verdict(made, [], {}).warnings
     assert "goes from" in " ".join(make_verdict(made, [], {}).details)
 
@@ -151,7 +151,10 @@ def test_the_simulation_run_forward_is_told_as_it_is():
     said = " ".join(found.details)
     assert "better: position (1.0 before, 0.50 m after)" in said and "no better: attitude (1.3 before" in said
     (warning,) = found.warnings
-    assert "velocity after half a second is worse with what is delivered: 1.4 m, 1.0 with the refitted" in warning
+    assert (
+        "velocity after half a second is larger with the improved vehicle: 1.4 m; with the refitted values alone 1.0 m"
+        in warning
+    )
 
 
 def test_the_sentence_goes_by_size_and_names_what_stays_off():

@@ -1,0 +1,139 @@
+"""Least squares with intervals that hold where residuals are correlated in time.
+
+The residuals of a model of flight are coloured: turbulence, what the model leaves out. They are whitened by an
+autoregressive model of their own (Cochrane and Orcutt's iteration), and the covariance is the larger of the two that
+then stand: the classical one, and the sandwich with scores summed over blocks of time, which holds for what colour is
+left. Source: Hamilton, Time Series Analysis, ch. 8 and 10; Newey and West (1987) for the sandwich.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+from scipy.stats import t as student
+
+LARGEST_ORDER = 20
+BLOCKS = 40
+LEVEL = 0.95
+ROUNDS = 2
+"""Times that the residuals are whitened and the fit repeated."""
+
+Residuals = Callable[[np.ndarray], Sequence[np.ndarray]]
+"""From values (p,) to the residuals of each stretch, (n_i,) each."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval."""
+
+    value: float
+    interval_95: tuple[float, float]
+
+    @property
+    def half_width(self) -> float:
+        return (self.interval_95[1] - self.interval_95[0]) / 2
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Values with what their errors are known by."""
+
+    values: np.ndarray
+    classical: np.ndarray
+    """Covariance (p, p) by whitened residuals taken as independent."""
+    sandwich: np.ndarray
+    """Covariance (p, p) by scores summed over blocks."""
+    blocks: int
+    innovation: float
+    """Standard deviation of the whitened residuals."""
+
+    def of(self, quantity: Callable[[np.ndarray], float]) -> Estimate:
+        """A quantity of the values with its 95 % interval, by its derivative (numerical)."""
+        value = float(quantity(self.values))
+        steps = 1e-3 * np.sqrt(np.maximum(np.diag(self.classical), 1e-24))
+        slope = np.array(
+            [
+                (quantity(self.values + step) - quantity(self.values - step)) / (2 * step.sum())
+                for step in np.diag(steps)
+            ]
+        )
+        free = max(self.blocks - len(self.values), 2)
+        half = max(
+            np.sqrt(slope @ self.classical @ slope) * student.ppf(0.5 + LEVEL / 2, 1000),
+            np.sqrt(slope @ self.sandwich @ slope) * student.ppf(0.5 + LEVEL / 2, free),
+        )
+        return Estimate(value, (value - float(half), value + float(half)))
+
+
+def fit(
+    residuals: Residuals,
+    start: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    scale: np.ndarray,
+    prior: np.ndarray,
+) -> Fit:
+    """Values (p,) that make the residuals small.
+
+    `bounds`, `scale` and `prior` are by value: where it may lie, its usual size, and the standard deviation of what is
+    believed of it about its start (infinite where nothing is).
+    """
+    start = np.asarray(start, float)
+    believed = np.isfinite(prior)
+    values, whiten = start, np.array([1.0])
+    spread = max(float(np.std(np.concatenate([r - r.mean() for r in residuals(start)]))), 1e-12)
+
+    def rows(v: np.ndarray) -> np.ndarray:
+        white = [lfilter(whiten, [1.0], r)[len(whiten) - 1 :] for r in residuals(v)]
+        return np.concatenate([*white, spread * (v - start)[believed] / prior[believed]])
+
+    solved = None
+    for turn in range(ROUNDS + 1):
+        if turn:
+            own = residuals(values)
+            whiten = autoregression(own)
+            white = np.concatenate([lfilter(whiten, [1.0], r)[len(whiten) - 1 :] for r in own])
+            spread = max(float(np.sqrt(np.mean(white**2))), 1e-12)
+        solved = least_squares(rows, values, bounds=bounds, x_scale=scale, max_nfev=60)
+        values = solved.x
+    count = len(solved.fun) - int(believed.sum())
+    white, jacobian = solved.fun[:count], solved.jac[:count]
+    return Fit(values, *covariances(jacobian, white, prior))
+
+
+def covariances(
+    jacobian: np.ndarray, white: np.ndarray, prior: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int, float]:
+    """The two covariances (p, p), the number of blocks and the residuals' deviation, of whitened rows."""
+    freedom = max(len(white) - jacobian.shape[1], 1)
+    variance = float(white @ white) / freedom
+    belief = np.diag(np.where(np.isfinite(prior), 1.0 / prior**2, 0.0))
+    bread = np.linalg.pinv(jacobian.T @ jacobian / variance + belief, hermitian=True)
+    edges = np.linspace(0, len(white), min(BLOCKS, len(white)) + 1).astype(int)[:-1]
+    scores = np.add.reduceat(jacobian * white[:, None], edges, axis=0) / variance
+    blocks = len(edges)
+    meat = blocks / max(blocks - jacobian.shape[1], 1) * scores.T @ scores + belief
+    return bread, bread @ meat @ bread, blocks, float(np.sqrt(variance))
+
+
+def autoregression(stretches: Sequence[np.ndarray]) -> np.ndarray:
+    """Coefficients (1, −φ_1, …) that whiten residuals; the order by Akaike's criterion (Yule and Walker)."""
+    count = sum(len(r) for r in stretches)
+    most = min(LARGEST_ORDER, min(len(r) for r in stretches) // 10)
+    lags = np.array([sum(float(r[: len(r) - k] @ r[k:]) for r in stretches) for k in range(most + 1)]) / count
+    if lags[0] <= 0 or most < 1:
+        return np.array([1.0])
+    best, chosen = count * np.log(lags[0]), np.array([1.0])
+    for order in range(1, most + 1):
+        phi = solve_toeplitz(lags[:order], lags[1 : order + 1])
+        left = lags[0] - phi @ lags[1 : order + 1]
+        if left <= 0:
+            break
+        worth = count * np.log(left) + 2 * order
+        if worth < best:
+            best, chosen = worth, np.concatenate([[1.0], -phi])
+    return chosen

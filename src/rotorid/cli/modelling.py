@@ -1,0 +1,115 @@
+"""`rotorid model`: from logs to a vehicle in a simulator, in one go."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.console import one_sentence, progress
+from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, tell
+from rotorid.errors import InputError
+
+
+def model(
+    paths: Annotated[list[Path], typer.Argument(metavar="SET|LOG", help="A recording set, or logs of one vehicle.")],
+    to: Annotated[
+        str, typer.Option("--to", help="px4-sih, sdf, ardupilot-json, mjcf, rotorpy or gym-pybullet-drones.")
+    ],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for all of it; default NAME-FORM.")] = None,
+    mass_kg: MassKg = None,
+    like: Like = None,
+    vehicle: VehicleFile = None,
+    mapping: MappingFile = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+) -> None:
+    """Identify a vehicle from its logs and write it for a simulator, flown next to the log.
+
+    Imports the logs, judges them, takes the improved vehicle and writes it in the form of a simulator, with what the
+    form cannot express. The exported vehicle is then flown on the log's own rotor speeds in windows of half a second:
+    `next_to_log.csv` and `next_to_log.png` say how far it is off. The verdict's files lie in the same folder.
+
+    Examples:
+
+    `rotorid model flight.ulg --mass-kg 1.52 --to px4-sih -o sih`
+
+    `rotorid model flights --to sdf`
+    """
+    with one_sentence():
+        from rotorid.exports.next_to_log import FLYERS
+
+        if to not in FLYERS:
+            raise InputError(f"no simulator is called {to!r}, expected one of {', '.join(FLYERS)}")
+        from rotorid.importers.logfile import is_bag
+
+        is_set = len(paths) == 1 and (paths[0] / "vehicle.yaml").is_file() and not is_bag(paths[0])
+        name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
+        target = out or Path(f"{name}-{to}")
+        folder = paths[0]
+        if not is_set:
+            made = make_set(paths, target / name, mass_kg, like, vehicle, mapping)
+            folder = made.folder
+            if not quiet:
+                tell(made)
+        written, said = write_model(folder, target, to, quiet)
+        for sentence in said:
+            typer.echo(sentence)
+        typer.echo(", ".join(str(path) for path in written))
+
+
+def write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tuple[list[Path], list[str]]:
+    """Judge the set in `folder`, write verdict, export and comparison into `target`; the files, and what to say."""
+    with progress(None, quiet) as step, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        step(f"reading {folder.name}")
+        from rotorid.recordings import read_set
+
+        recordings = read_set(folder)
+        from rotorid.exports import export_vehicle
+        from rotorid.exports.gazebo_airframe import gazebo_airframe
+        from rotorid.exports.next_to_log import next_to_log
+        from rotorid.mismatch.deliver import analysis_of, write_files
+        from rotorid.recordings import read_vehicle
+        from rotorid.writing import all_or_none
+
+        step(f"{recordings.name}: analysing {len(recordings.runs)} runs")
+        analysis = analysis_of(recordings)
+        files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
+        verdict = write_files(analysis, *files, progress=lambda text: None if text.endswith(".") else step(text))
+        improved = read_vehicle(files[2])
+        exported = gazebo_airframe(improved) if to == "sdf" else export_vehicle(improved, to)
+        texts = {exported.file_name: exported.text, **exported.companions}
+        written = [target / name for name in texts]
+        with all_or_none(*written) as parts:
+            for part, text in zip(parts, texts.values(), strict=True):
+                part.write_text(text, encoding="utf-8")
+        said = [verdict.sentence, *(f"! {doubt.sentence}" for doubt in verdict.doubts)]
+        said += [f"  - not expressed: {sentence}" for sentence in exported.left_out]
+        try:
+            step("flying it next to the log")
+            found = next_to_log(analysis, to, exported)
+        except InputError as error:
+            return written, [*said, f"not flown next to the log: {error}"]
+        written += comparison(found, target)
+        first, *rest = found.sentences()
+        return written, [*said, first, *(f"  - {sentence}" for sentence in rest)]
+
+
+def comparison(found, target: Path) -> list[Path]:
+    """Write `next_to_log.csv` (a row a model and channel) and `next_to_log.png`."""
+    import pandas as pd
+
+    from rotorid.mismatch.forward import UNITS
+    from rotorid.plots.next_to_log import draw
+
+    rows = [
+        (model, channel, found.error(model, channel), UNITS[channel], len(found.windows))
+        for model, channels in found.errors.items()
+        for channel in channels
+    ]
+    table, figure = target / "next_to_log.csv", target / "next_to_log.png"
+    pd.DataFrame(rows, columns=["model", "channel", "rms_error", "unit", "windows"]).to_csv(table, index=False)
+    draw(found, figure)
+    return [table, figure]
