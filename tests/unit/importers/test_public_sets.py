@@ -20,7 +20,7 @@ from rotorid.importers.report import read_report
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MANIFEST = read_manifest(ROOT / "workflow" / "public_data.yaml")
 VEHICLES = ROOT / "workflow" / "vehicles"
 
