@@ -230,9 +230,7 @@ rule chapter_proof:
         next_flight_summary="docs/proof/next_flight_summary.csv",
         releases_named="docs/proof/releases.csv",
         plantings_rows="docs/proof/plantings.csv",
-        plantings_before_rows="docs/proof/plantings_before.csv",
         plantings="docs/proof/plantings_summary.csv",
-        plantings_before="docs/proof/plantings_before_summary.csv",
     output:
         next_flight_figure=report(
             "results/report/proof/next_flight.svg",
