@@ -34,7 +34,7 @@ from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each, without_values
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.motion import full_speed, stretches
+from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.payload_windows import loads, on_board
 from rotorid.mismatch.posterior.limits import UpperLimit
@@ -74,7 +74,7 @@ TIMING_FLOOR = 0.05
 recorded."""
 
 
-def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0, watch: Watch = unwatched) -> Analysis:
+def analyse(recordings: RecordingSet, cutoff_hz: float = HIGHEST_CUTOFF_HZ, watch: Watch = unwatched) -> Analysis:
     """The whole analysis of a set of kind `flight`.
 
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.

@@ -50,7 +50,7 @@ SizeWords = Literal["both", "share", "metres", ""]
 
 
 @dataclass(frozen=True)
-class Told:
+class Contents:
     """What the words are made from."""
 
     analysis: Analysis
@@ -80,7 +80,7 @@ def first_words(text: str, most: int = MOST_WORDS) -> str:
     return f"{short}." if text.endswith(".") else short
 
 
-def headline(told: Told) -> str:
+def headline(told: Contents) -> str:
     """What a pilot is told in at most MOST_WORDS words: where and how much, what was left out, how much better."""
     analysis = told.analysis
     if told.word == "not_judged":
@@ -132,7 +132,7 @@ def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) ->
     return None if before is None else channel_size(analysis, main, before, "before")
 
 
-def _still_off(told: Told, main: str, metres: bool = True) -> str:
+def _still_off(told: Contents, main: str, metres: bool = True) -> str:
     """The channel that stays off most with what was found, as a clause, with or without the metres that it leads off.
 
     Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
@@ -151,7 +151,7 @@ def _still_off(told: Told, main: str, metres: bool = True) -> str:
     return f"; the {channel_words(most)} stays {off} off ({size_words(size, 'both' if metres else 'share')})"
 
 
-def details(told: Told) -> list[str]:
+def details(told: Contents) -> list[str]:
     """What the sentence has no room for: each effect with its numbers and share, values, what is left, what is run
     forward."""
     analysis, out = told.analysis, []
@@ -188,7 +188,7 @@ def _not_found(limits: Sequence[UpperLimit]) -> str:
     return f"Not found: {listed(named)}."
 
 
-def _causes(told: Told) -> str:
+def _causes(told: Contents) -> str:
     """Effects and values that carry nine tenths of the error, in a clause."""
     analysis = told.analysis
     stated = [f for f in one_per_class(with_status(analysis, *CLAIMED)) if not _concerns_the_recording(f)]
@@ -430,7 +430,7 @@ def _said_of(channel: Channel) -> str:
     return "on flights not used for fitting" if held else "on the flight it was fitted to"
 
 
-def _rest(told: Told) -> str:
+def _rest(told: Contents) -> str:
     analysis = told.analysis
     depends = [regime_words(v)[0] for v in analysis.unexplained_depends_on]
     if with_status(analysis, *CLAIMED) or analysis.wrong_values:

@@ -99,7 +99,6 @@ class Noise:
 
     attitude_rad: float = 0.0
     angular_velocity_rad_s: float = 0.0
-    angular_acceleration_rad_s2: float = 0.0
     specific_force_m_s2: float = 0.0
     velocity_m_s: float = 0.0
     position_m: float = 0.0
