@@ -367,7 +367,7 @@ def lag_alone_notes(chain: Chain | None) -> list[str]:
 def run_scale_notes(model: WrenchModel) -> list[str]:
     """What was done about a thrust that differs between runs.
 
-    Told is what a flight shows, thrust over mass: both may move together with anything.
+    Reported is what a flight shows, thrust over mass: both may move together with anything.
     """
     regression = model.search.regression
     terms = [t for t in regression.terms if t.key.startswith(RUN_SCALE)]
@@ -532,7 +532,7 @@ def with_noise_held_out(analysis: Analysis) -> Analysis:
     """Where nothing is stated that a model holds, the analysis with floors that hold on the runs held out, too.
 
     What is left of a channel there and depends on nothing recorded is noise, however much less of it the fitted runs
-    had: a vibration seen through aliasing is louder or not by the rotors' speed.
+    had: a vibration seen through aliasing is larger or smaller by the rotors' speed.
     """
     if analysis.without or analysis.wrong_values:
         return analysis

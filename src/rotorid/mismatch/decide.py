@@ -98,7 +98,7 @@ def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: n
 
 
 class TermReport(NamedTuple):
-    """What is told of a term at work."""
+    """What is reported of a term at work."""
 
     values: np.ndarray
     parameters: tuple[Estimate, ...]
@@ -118,7 +118,7 @@ class TermReport(NamedTuple):
 def findings_of(search: Search, selection: Selection, told: Callable[[str], TermReport]) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive.
 
-    Terms without a name are told as unexplained instead.
+    Terms without a name are reported as unexplained instead.
     """
     effects, findings = catalogue(), []
     for key in selection.active:

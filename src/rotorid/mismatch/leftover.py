@@ -171,7 +171,7 @@ def description(
     slow: Mapping[str, tuple[float, float]],
     depends: Sequence[str],
 ) -> str:
-    """Causes, as far as they can be told, and what a plain empirical term would gain."""
+    """Causes, as far as they can be identified, and what a plain empirical term would gain."""
     causes = list(sentences)
     if slow:
         peaks = [f"{name} around {hz:.1f} Hz, {rms:.2g} {_unit(name)} rms" for name, (rms, hz) in slow.items()]

@@ -81,7 +81,7 @@ def first_words(text: str, most: int = MOST_WORDS) -> str:
 
 
 def headline(told: Contents) -> str:
-    """What a pilot is told in at most MOST_WORDS words: where and how much, what was left out, how much better."""
+    """What a pilot reads in at most MOST_WORDS words: where and how much, what was left out, how much better."""
     analysis = told.analysis
     if told.word == "not_judged":
         first = next(d for d in analysis.doubts if d.stops)
@@ -212,7 +212,7 @@ def _causes(told: Contents) -> str:
 
 
 def _put_right(stated: Sequence[Finding]) -> str:
-    """Faults of the recording, put right before any physics was looked at."""
+    """Faults of the recording, corrected before any physics was looked at."""
     texts = [capital(f.sentence.rstrip(".")) for f in stated]
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
 
@@ -285,7 +285,7 @@ def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
 
 
 def _concerns_the_recording(finding: Finding) -> bool:
-    """Whether a finding is a fault of the recording itself, put right before any physics was looked at."""
+    """Whether a finding is a fault of the recording itself, corrected before any physics was looked at."""
     return finding.form is None and not finding.equation and bool(finding.sentence)
 
 
@@ -418,7 +418,7 @@ def _better(main: str, channels: Mapping[str, Channel], put_right: Sequence[str]
             f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
             f"{number(errors.after)} {channel.unit} after."
         )
-    also = f", and what was believed put right within its trust ({listed(list(put_right))})," if put_right else ""
+    also = f", and believed values corrected within their trust ({listed(list(put_right))})," if put_right else ""
     return (
         f"With this{also} the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
         f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."
@@ -450,7 +450,7 @@ def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
         f"(noise {number(channels[c].noise_floor)})"
         for c in chosen
     ]
-    moved = f", values put right within their trust ({listed(list(analysis.put_right))})" if analysis.put_right else ""
+    moved = f", values corrected within their trust ({listed(list(analysis.put_right))})" if analysis.put_right else ""
     where = _said_of(channels[chosen[0]])
     text = f"The believed vehicle describes these recordings{moved}: {where}, {listed(errors)}."
     return text if len(text.split()) <= MOST_WORDS else text.replace(moved, "")

@@ -381,7 +381,7 @@ def test_intervals_of_a_term_estimated_apart_hold():
     for seed in range(60):
         fit = two_channels(seed, ("error",)).fit(["error", "other"], jackknife=True)
         away.append((fit.beta - [0.05, 0.7]) / np.sqrt(np.diag(fit.covariance)))
-    # Channel 9 alone knows the error: 95 % of 60 are 57 ± 1.7. The other takes up none of what the moment lacks.
+    # Channel 9 alone knows the error: 95 % of 60 are 57 ± 1.7. The other absorbs none of what the moment lacks.
     assert 52 <= int((np.abs(np.array(away)[:, 0]) < 1.96).sum()) <= 60
     assert 52 <= int((np.abs(np.array(away)[:, 1]) < 1.96).sum()) <= 60
 

@@ -105,5 +105,5 @@ def wider(parameters: tuple[Estimate, ...], doubt: np.ndarray) -> tuple[Estimate
 
 
 def alternatives_of(model: ReadingModel, key: str) -> list[str]:
-    """Ids that could stand in for a term on these data."""
+    """Ids that are collinear with a term on these data."""
     return model.search.alternatives(key, model.selection.active)
