@@ -70,7 +70,7 @@ rule conceal:
 
 
 rule judge:
-    """Verdicts of the mismatch stage on a batch of sets, told nothing."""
+    """Verdicts of the mismatch stage on a batch of sets, without their answers."""
     message:
         "Proof: judging, {wildcards.batch}"
     input:
@@ -86,7 +86,7 @@ rule judge:
 
 
 rule ask_peers:
-    """What other methods say of the same sets, told nothing either."""
+    """What other methods say of the same sets, without their answers either."""
     message:
         "Proof: asking other methods, {wildcards.batch}"
     input:

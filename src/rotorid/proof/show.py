@@ -55,8 +55,8 @@ def of_releases(summary: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame
 
     `names` has each release's commit by the date that its cases are drawn from.
 
-    `right` counts the sets in which all that is hidden was told and nothing else, with the 95 % interval of their share
-    (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
+    `right` counts the sets in which all that is hidden was named and nothing else, with the 95 % interval of their
+    share (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
     """
     short = {row_prefix(*key): simulator.short for key, simulator in SIMULATORS.items()}
     groups: dict[tuple[str, str], dict[str, pd.Series]] = {}
