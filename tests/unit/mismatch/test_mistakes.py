@@ -395,6 +395,30 @@ def test_a_vibration_is_seen_with_commands_alone(size, seen):
     assert ("vibration" in ids(findings)) is seen
 
 
+COMMANDS = {f"rotor_speed_{k}_rad_s": f"rotor_command_{k}_rad_s" for k in range(1, 5)}
+
+
+def held_command(table, value):
+    """The set with its speeds as commands, the third of which reads `value(before)` from 8 s to 10 s."""
+    table = table.rename(columns=COMMANDS)
+    name, inside = COMMANDS["rotor_speed_3_rad_s"], (table["time_s"] >= 8.0) & (table["time_s"] <= 10.0)
+    table.loc[inside, name] = value(table.loc[table["time_s"] < 8.0, name])
+    return table
+
+
+def test_a_command_that_stands_still_while_the_others_go_on_dropped_out(sound):
+    spoilt = with_table(sound, lambda table: held_command(table, lambda before: before.iloc[-1]))
+    fixed, findings, _ = find_mistakes(spoilt)
+    finding = one(findings, "sensor_dropout")
+    assert finding.channels == ("rotor_command_3_rad_s",)
+    assert {(round(a), round(b)) for _, a, b in finding.windows} == {(8, 10)}
+
+
+def test_a_command_at_the_end_of_its_range_may_stand_still(sound):
+    saturated = with_table(sound, lambda table: held_command(table, lambda before: 1.3 * before.max()))
+    assert "sensor_dropout" not in ids(find_mistakes(saturated)[1])
+
+
 def test_a_line_at_its_own_frequency_is_no_vibration_of_the_rotors(sound):
     def shake(table):
         table["specific_force_x_m_s2"] += 0.5 * np.cos(2 * np.pi * 31.0 * table["time_s"])

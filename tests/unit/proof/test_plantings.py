@@ -236,7 +236,7 @@ def test_the_list_is_long_drawn_once_and_read_as_it_was_written(tmp_path: Path) 
     for flight_name in {p.flight for p in known}:
         own = [p for p in known if p.flight == flight_name]
         kinds = [sow.kind(n) for n in dict.fromkeys(p.kinds[0] for p in own if p.family != plan.PAIR)]
-        assert sow.of_flight(flight_name, kinds) == own
+        assert sow.planned(flight(flight_name), kinds) == own
 
 
 @pytest.mark.skipif(not (ROOT / "results/recordings/neurobem").is_dir(), reason="the public sets are not imported")

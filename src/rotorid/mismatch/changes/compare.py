@@ -7,11 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.mismatch.changes.joint import joint_of
+from rotorid.mismatch.changes.notes import notes_of
 from rotorid.mismatch.changes.problem import decide_changes
+from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.findings import Estimate, Finding, Status
+from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import Statement, statements_of
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.values import believed_value
@@ -45,12 +49,19 @@ class Changes:
     """The surest first."""
     limits: tuple[UpperLimit, ...]
     """By how much everything else may have changed at most, with 95 % probability; of a value relative."""
+    notes: tuple[str, ...] = ()
+    """What keeps the two sets from being compared fully, in sentences."""
 
 
 def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the first set of flights to the second."""
     joint = joint_of(base, new)
-    found = decide_changes(joint.base, joint.new, prior)
+    usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia)
+
+    def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
+        return decide_changes(flights, other, np.hypot(usual, more), prior)
+
+    found = decide(joint.base, joint.new, spread_of_flights(joint.runs_of_base, decide))
     vehicles = base.vehicle, new.vehicle
     changes = [
         Change(s.id, s.status, s.alternatives, s.probability, changes_of(s, *vehicles))
@@ -58,12 +69,13 @@ def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior(
         if s.status != "not_established"
     ]
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
-    squares = joint.squares | {f"{PARAMETER_NAMES[key]}/changed": own for key, own in joint.value_squares.items()}
+    squares = joint.squares | joint.value_squares
     return Changes(
         base=base.name,
         new=new.name,
         changes=(*mistakes_that_differ(joint.mistakes_of_base, joint.mistakes_of_new), *changes),
         limits=tuple(limit for limit in limits_of(found, squares) if limit.id not in changed),
+        notes=notes_of(joint, base.name, new.name),
     )
 
 

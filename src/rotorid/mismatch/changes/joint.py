@@ -6,26 +6,31 @@ is the same in both sets, and cancels where the second is set against the first.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.mismatch.absent import squares_of
+from rotorid.mismatch.changes.usual import of_environments
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
-from rotorid.mismatch.prepare import assemble_rows, prepare, prepare_like
-from rotorid.mismatch.regression import build
+from rotorid.mismatch.prepare import Prepared, assemble_rows, prepare, prepare_like
+from rotorid.mismatch.regime import regime_variables
+from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.report_runs import as_flown, comparable
-from rotorid.mismatch.rows import Rows
+from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.wrench import WrenchModel, block_seconds, model_filters
-from rotorid.recordings import RecordingSet
+from rotorid.recordings import RecordingSet, Vehicle
 
 FORCES = (0, 1, 2)
 """Channels of the forces."""
+REGIMES = ("airspeed_m_s", "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
+"""Regime variables by which two sets are held against each other."""
 INERTIA_OF = {3: "inertia_xx", 4: "inertia_yy", 5: "inertia_zz"}
 """Channel of each moment to the inertia that it turns."""
 
@@ -36,6 +41,15 @@ class Joint:
 
     base: Evidence
     new: Evidence
+    runs_of_base: tuple[Evidence, ...]
+    """The first set run by run."""
+    known: np.ndarray
+    """(K,) coefficients of the effects that the first set's model holds, 0 of all others."""
+    inertia: np.ndarray
+    """(C,) mass, or inertia, of the second vehicle.yaml over that of the first, in each channel."""
+    flown_by_base: Mapping[str, float]
+    flown_by_new: Mapping[str, float]
+    """How far each set goes: 95th percentile of the magnitude of some regime variables."""
     mistakes_of_base: tuple[Finding, ...]
     mistakes_of_new: tuple[Finding, ...]
     """Mistakes in the recordings of each set, which were undone before."""
@@ -65,11 +79,37 @@ def joint_of(base: RecordingSet, new: RecordingSet, cutoff_hz: float = 20.0) -> 
     second = against_own(assemble_rows(model.prepared, terms, segments, model.effects), model, segments, new)
     second = as_seen(second, model, keys)
     known = known_effects(model, keys)
-    base_evidence, new_evidence = (evidence_of_rows(rows, terms, model) for rows in (first, second))
-    held = replace(model, rows=second, regression=new_evidence[1])
+    block_s = block_seconds(first, model.prepared.thinner.rate_hz)
+    of_base, of_new = (regression_of(rows, terms, model, block_s) for rows in (first, second))
+    held = replace(model, rows=second, regression=of_new)
     squares = (squares_of(held, [t for t in terms if t.kind == kind]) for kind in ("effect", "value"))
-    evidence = (with_known_effects(own, known) for own in (base_evidence[0], new_evidence[0]))
-    return Joint(*evidence, mistakes_of_base, mistakes_of_new, *squares)
+    in_base, in_new = (with_known_effects(evidence_from(own), known) for own in (of_base, of_new))
+    inertia = inertia_of(new.vehicle, in_base.channels) / inertia_of(base.vehicle, in_base.channels)
+    flown = (how_far(own, model.prepared) for own in (model.segments, segments))
+    runs = by_run(in_base, of_base)
+    return Joint(in_base, in_new, runs, known, inertia, *flown, mistakes_of_base, mistakes_of_new, *squares)
+
+
+def how_far(segments: Sequence[Segment], prepared: Prepared) -> dict[str, float]:
+    """95th percentile of the magnitude of each variable in REGIMES that some stretches have."""
+    known = [regime_variables(s, prepared) for s in segments]
+    names = [n for n in REGIMES if all(n in k for k in known)]
+    return {n: float(np.nanquantile(np.abs(np.concatenate([k[n] for k in known])), 0.95)) for n in names}
+
+
+def inertia_of(vehicle: Vehicle, channels: np.ndarray) -> np.ndarray:
+    """What turns each channel's acceleration into a force (kg) or a moment (kg m²), (C,); 1 for sensors' channels."""
+    of_moment = {channel: getattr(vehicle.inertia_kg_m2, name[-2:]) for channel, name in INERTIA_OF.items()}
+    return np.array([vehicle.mass_kg if c in FORCES else of_moment.get(int(c), 1.0) for c in channels])
+
+
+def by_run(evidence: Evidence, regression: Regression) -> tuple[Evidence, ...]:
+    """Evidence run by run: that of the environments in each."""
+    environment, run = regression.by_channel.environment, np.asarray(regression.run)
+    seen = environment >= 0
+    first = {e: r for e, r in zip(environment[seen][::-1], run[seen][::-1], strict=True)}
+    runs = np.array([first[e] for e in range(evidence.gram.shape[1])])
+    return tuple(of_environments(evidence, runs == r) for r in dict.fromkeys(runs.tolist()))
 
 
 def known_effects(model: WrenchModel, keys: list[str]) -> np.ndarray:
@@ -123,16 +163,15 @@ def as_seen(rows: list[Rows], model: WrenchModel, keys: list[str]) -> list[Rows]
     return [replace(r, x=r.x * seen) for r in rows]
 
 
-def evidence_of_rows(rows: list[Rows], terms, model: WrenchModel):
-    """The sums of products of some rows, whitened as the model's, and the regression that holds them."""
+def regression_of(rows: list[Rows], terms: list[Term], model: WrenchModel, block_s: float) -> Regression:
+    """The regression that some rows make, whitened as the model's, with its products by channel."""
     rate_hz = model.prepared.thinner.rate_hz
-    regression = build(
+    return build(
         rows,
         terms,
         model_filters(model),
         lambda run, time_s: True,
-        block_seconds(rows, rate_hz),
+        block_s,
         rate_hz,
         by_channel=True,
     )
-    return evidence_from(regression), regression

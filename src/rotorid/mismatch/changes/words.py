@@ -18,7 +18,7 @@ def sentences(found: Changes) -> list[str]:
     out = [change_words(c) for c in found.changes]
     if not out:
         out.append(f"Nothing changed from {found.base} to {found.new} as far as these recordings can tell.")
-    return [*out, *([unchanged_words(found.limits)] if found.limits else [])]
+    return [*out, *([unchanged_words(found.limits)] if found.limits else []), *found.notes]
 
 
 def change_words(change: Change) -> str:
@@ -68,6 +68,7 @@ def as_json(found: Changes) -> dict:
         "base": found.base,
         "new": found.new,
         "sentences": sentences(found),
+        "notes": list(found.notes),
         "changes": [
             {
                 "id": c.id,

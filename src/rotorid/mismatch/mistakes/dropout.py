@@ -34,6 +34,9 @@ PLAIN_CHANGE = 8.0
 """Times the noise by which a reading should have changed to be called held."""
 PLAIN_STEPS = 2.0
 """The same in steps of a coarse reading, which stands still until the load has changed by one."""
+COMMANDED = ("commands", "throttle")
+OTHERS_GO_ON = 0.5
+"""Share of the samples in which every other rotor's command changes while one stands still."""
 LEAST_JUMP = 5.0
 """A jump is this many of the usual steps of a reading: what was held jumps back at its end."""
 
@@ -93,9 +96,13 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
     found = []
     for sensor, names in sensor_columns(vehicle).items():
         present = [n for n in names if run.has(n)]
-        if sensor in ("commands", "throttle") or not present:
-            continue
         flown = vehicle.kind == "flight"
+        if not present or (sensor in COMMANDED and not flown):
+            continue
+        if sensor in COMMANDED:
+            if len(present) > 1:
+                found += standing_commands(run, sensor, present, noisy)
+            continue
         if sensor == "rotors" and not flown:
             continue  # on a stand rotors rest and turn evenly
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
@@ -114,6 +121,25 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
             for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy), *frozen]:
                 if flown or load_went_on(run, vehicle, values, mask):
                     found += _as_stretches(run, name, sensor, "held", mask, p)
+    return found
+
+
+def standing_commands(run: Run, sensor: str, names: list[str], noisy: set[str]) -> list[Stretch]:
+    """Stretches in which one rotor's command stands still while all others go on.
+
+    A command at the end of its range may truly stand still: its motor gives all that it can. On the ground all commands
+    stand still together.
+    """
+    found = []
+    commands = run.array(tuple(names))
+    moves = np.abs(np.diff(commands, axis=0, prepend=commands[:1])) > 0.0
+    for k, name in enumerate(names):
+        own = commands[:, k]
+        ends = np.nanmin(own), np.nanmax(own)
+        for mask, p in held(run.time_s, own[:, None], noisy=name in noisy):
+            others = np.delete(moves[mask], k, axis=1).mean(axis=0)
+            if own[mask][0] not in ends and others.min() > OTHERS_GO_ON:
+                found += _as_stretches(run, name, sensor, "held", mask, p)
     return found
 
 

@@ -26,11 +26,8 @@ from rotorid.recordings import RecordingSet, Run, Vehicle
 
 COMMANDED = ("commands", "throttle")
 LEAST_ALONE = 0.9
-TELLS_A_DRIFT = 0.95
-"""Share of the motion that commands must explain to tell a drift: disturbances come and go, and their lateness too.
-
-Measured speeds follow commands whatever disturbs the vehicle: there the first limit will do. Where they are compared
-with the motion, the bound on what disturbances can feign (`disturbed_s`) takes the place of both."""
+"""Share of the motion that commands must explain to tell a constant lateness: below it the motors' lag, fitted later,
+tells their dead time better. A growth of it is bounded by what disturbances can feign (`disturbed_s`)."""
 LEAST_SHARE = 0.1
 """A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
 SHARE_STEP_S = 0.004
@@ -288,7 +285,7 @@ def difference(
         drift = likelihood(replace(blocks, x=blocks.x * phase[:, :, None]), found, np.zeros(1)).sum()
         gained = float(drift - likelihood(blocks, found, lags).sum(axis=0).max())
     explained = float(np.min(found.explained))
-    bias = disturbed_s(blocks, found) if over == "rotors" else 0.0
+    bias = disturbed_s(blocks, found) if over == "rotors" or (over in COMMANDED and late != "rotors") else 0.0
     longest = float(blocks.time_s.max()) + lagged.BLOCK_S / 2
     return Difference(
         late,
@@ -353,8 +350,11 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
 def telling_differences(known: list, drifting: bool) -> tuple[list[Difference], list]:
     """Every difference of lateness that a comparison is good enough to tell, and those comparisons."""
     found = [(difference(*c, drifting=drifting), c) for c in known]
-    # What disturbs the vehicle makes its rotors answer late, which is no clock: there commands must explain all.
-    kept = [(d, c) for d, c in found if d.explained > (LEAST_ALONE if d.over in COMMANDED else LEAST_EXPLAINED)]
+    kept = [
+        (d, c)
+        for d, c in found
+        if d.explained > (LEAST_ALONE if d.over in COMMANDED and not drifting else LEAST_EXPLAINED)
+    ]
     return [d for d, _ in kept], [c for _, c in kept]
 
 
@@ -602,8 +602,6 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     periods = own_period_s(signals)
     telling = []
     for d, source in zip(found, sources, strict=True):
-        if d.over in COMMANDED and d.late != "rotors" and d.explained < TELLS_A_DRIFT:
-            continue
         beyond = abs(d.growth) - d.bound(1)
         p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.pieces - 2, 1)))
         slowest = max(periods[n] for n in (d.late, *(name for name, _ in d.shares)))

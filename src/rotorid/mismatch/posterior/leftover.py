@@ -30,7 +30,7 @@ FEWEST_ROWS = 50.0
 """Rows that a flight is taken to have at least."""
 FULL_RIDGE = 1e-6
 """Ridge of the model of all columns, in units of their length."""
-VARIANCES = np.concatenate([[0.0], np.geomspace(1e-1, 1e7, 33)])
+VARIANCES = np.concatenate([[0.0], np.geomspace(1e-1, 1e11, 49)])
 """Variances of the leftover that are tried, of scaled coefficients: as large as white noise is the number of rows."""
 
 

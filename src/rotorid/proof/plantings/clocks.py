@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rotorid.proof.plantings.columns import dense, has, of_sensor, signed
+from rotorid.proof.plantings.columns import command_of, dense, has, of_sensor, signed
 from rotorid.proof.plantings.kinds import Kind, Size, both, named
 from rotorid.recordings import RecordingSet
 
 POSE = ("position", "velocity", "attitude")
+COMMANDED = ("commands", "throttle")
+COMMANDS = frozenset(COMMANDED)
 LEAST_DRIFT_PERIODS = 4.0
 """A clock that is off by less than this many samples at a run's end is not distinguished from a jitter of its
 stamps."""
@@ -90,6 +92,12 @@ def _fits(*sensors: str):
     )
 
 
+def _commanded(recordings: RecordingSet) -> bool:
+    """Whether commands alone say what the rotors do."""
+    driver = command_of(recordings)
+    return driver is not None and dense(recordings, driver) and not has(recordings, "rotors")
+
+
 LATE_S, SKEW = both(0.020, 0.008), both(1.5e-3, 6e-4)
 KINDS = (
     Kind("clocks", "rotors_late", frozenset({"rotors"}), LATE_S, _fits("rotors"), late("rotors")),
@@ -104,6 +112,8 @@ KINDS = (
     ),
     Kind("clocks", "pose_late", frozenset(POSE), LATE_S, _fits(*POSE), late(*POSE)),
     Kind("clocks", "rotors_skewed", frozenset({"rotors"}), SKEW, _fits("rotors"), skewed("rotors")),
+    Kind("clocks", "commands_late", COMMANDS, LATE_S, _commanded, late(*COMMANDED)),
+    Kind("clocks", "commands_skewed", COMMANDS, SKEW, _commanded, skewed(*COMMANDED)),
     Kind("clocks", "gyroscope_skewed", frozenset({"gyroscope"}), SKEW, _fits("gyroscope"), skewed("gyroscope")),
     Kind("clocks", "pose_skewed", frozenset(POSE), SKEW, _fits(*POSE), skewed(*POSE)),
 )

@@ -6,7 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.proof.plantings.columns import dense, direction, has, of_sensor, scaled, signed, smooth
+from rotorid.proof.plantings.columns import (
+    command_of,
+    dense,
+    direction,
+    has,
+    of_sensor,
+    scaled,
+    signed,
+    smooth,
+)
 from rotorid.proof.plantings.kinds import Kind, Size, both, named, once
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
@@ -150,6 +159,16 @@ def stuck(sensor: str, one_column: bool = False):
     return plant
 
 
+def command_stuck(recordings: RecordingSet, lasts_s: float, rng: np.random.Generator):
+    """The command of one rotor stands still in the log while the others go on."""
+    return stuck(command_of(recordings), one_column=True)(recordings, lasts_s, rng)
+
+
+def _commanded(recordings: RecordingSet) -> bool:
+    driver = command_of(recordings)
+    return driver is not None and dense(recordings, driver)
+
+
 def _with(*sensors: str):
     return lambda recordings: has(recordings, *sensors)
 
@@ -197,5 +216,6 @@ KINDS = (
     Kind("stuck", "gyroscope_stuck", GYRO, HELD_S, _dense("gyroscope"), stuck("gyroscope")),
     Kind("stuck", "accelerometer_stuck", ACC, HELD_S, _dense("accelerometer"), stuck("accelerometer")),
     Kind("stuck", "rotor_stuck", frozenset({"rotors"}), HELD_S, _dense("rotors"), stuck("rotors", one_column=True)),
+    Kind("stuck", "command_stuck", frozenset({"commands", "throttle"}), HELD_S, _commanded, command_stuck),
     Kind("stuck", "velocity_stuck", POSE, HELD_S, _dense("velocity"), stuck("velocity")),
 )

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.proof.plantings import air, clocks, commands, geometry, sensors, values
-from rotorid.proof.plantings.flights import FLIGHTS, taken
+from rotorid.proof.plantings.flights import FLIGHTS, Flight, taken
 from rotorid.proof.plantings.kinds import LARGE, SMALL, Kind, Truth
 from rotorid.proof.plantings.plan import PAIR, Planting
 from rotorid.recordings import RecordingSet, read_set
@@ -48,15 +48,22 @@ def fitting(recordings: RecordingSet) -> tuple[Kind, ...]:
     return tuple(k for k in KINDS if k.fits(recordings))
 
 
-def of_flight(name: str, kinds: Sequence[Kind], pairs: int = PAIRS) -> list[Planting]:
-    """All plantings of a flight: each kind in each of its sizes, and `pairs` pairs of kinds in both sizes.
+def of_flight(
+    name: str, kinds: Sequence[Kind], pairs: int = PAIRS, sizes: Sequence[str] = (LARGE, SMALL)
+) -> list[Planting]:
+    """All plantings of a flight: each kind in some of its sizes, and `pairs` pairs of kinds in both of them.
 
     Pairs are of two families and of kinds that change different things; drawn, the same at every start.
     """
-    out = [Planting(name, k.family, (k.name,), size, 0) for size in (LARGE, SMALL) for k in kinds if size in k.sizes]
+    out = [Planting(name, k.family, (k.name,), size, 0) for size in sizes for k in kinds if size in k.sizes]
     apart = [(a.name, b.name) for a, b in combinations(kinds, 2) if a.family != b.family and not a.touches & b.touches]
     drawn = generator(f"{name}/pairs").permutation(len(apart))[:pairs]
-    return out + [Planting(name, PAIR, apart[k], size, 0) for size in (LARGE, SMALL) for k in drawn]
+    return out + [Planting(name, PAIR, apart[k], size, 0) for size in sizes for k in drawn]
+
+
+def planned(flight: Flight, kinds: Sequence[Kind]) -> list[Planting]:
+    """The plantings of a flight; of one that has less recorded than another the large size of each kind, no pairs."""
+    return of_flight(flight.name, kinds, 0, (LARGE,)) if flight.reduced else of_flight(flight.name, kinds)
 
 
 def plant(recordings: RecordingSet, planting: Planting) -> tuple[RecordingSet, tuple[Truth, ...]]:
@@ -78,7 +85,7 @@ def list_text(sets: Path) -> str:
     lines = ["planting"]
     for flight in FLIGHTS:
         kinds = fitting(taken(read_set(sets / flight.set), flight))
-        lines += [p.name for p in of_flight(flight.name, kinds)]
+        lines += [p.name for p in planned(flight, kinds)]
     return "\n".join(lines) + "\n"
 
 

@@ -1,0 +1,52 @@
+"""What keeps two sets of flights from being compared fully: a larger residual, and flight that the first has not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rotorid.mismatch.changes.joint import Joint
+from rotorid.mismatch.changes.usual import left_by_all
+from rotorid.mismatch.rows import CHANNELS
+from rotorid.mismatch.words import channel_words, listed, number, regime_words
+
+LARGER = 2.0
+"""How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""
+FARTHER = 1.5
+"""How many times as far the second set must go in a regime variable."""
+FIRST_SENSOR = 6
+"""Channels from here on are sensors, not forces and moments."""
+
+
+def notes_of(joint: Joint, base: str, new: str) -> tuple[str, ...]:
+    """Notes on a comparison, in sentences."""
+    return (*residual_notes(joint, base, new), *regime_notes(joint.flown_by_base, joint.flown_by_new, base, new))
+
+
+def residual_notes(joint: Joint, base: str, new: str) -> list[str]:
+    """That more is left unexplained in the second set than in the first: something outside the catalogue changed."""
+    per_block = [left_by_all(own) / own.blocks.sum() for own in (joint.base, joint.new)]
+    ratio = np.sqrt(per_block[1] / joint.inertia**2 / np.maximum(per_block[0], 1e-300))
+    larger = [(r, int(c)) for r, c in zip(ratio, joint.base.channels, strict=True) if r > LARGER and c < FIRST_SENSOR]
+    if not larger:
+        return []
+    most = max(r for r, _ in larger)
+    where = listed([f"the {channel_words(CHANNELS[c])}" for _, c in larger])
+    return [
+        f"What no known effect explains is up to {most:.1f} times as large in {new} as in {base} ({where}): something "
+        f"differs there that is outside the catalogue, or noise and vibration are larger."
+    ]
+
+
+def regime_notes(first: Mapping[str, float], second: Mapping[str, float], base: str, new: str) -> list[str]:
+    """In what the second set goes farther than the first."""
+    out = []
+    for name, far in first.items():
+        if name in second and second[name] > FARTHER * far > 0:
+            words, unit = regime_words(name)
+            out.append(
+                f"{new} reaches a {words} of {number(second[name])} {unit}, {base} {number(far)} {unit}: what is "
+                f"beyond is compared by the forms of the effects alone."
+            )
+    return out

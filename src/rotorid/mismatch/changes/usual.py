@@ -1,0 +1,125 @@
+"""By how much flights of one vehicle differ in which nothing changed: the yardstick of a change.
+
+- A believed value differs a little from flight to flight (air, battery, temperature).
+- The form of an effect is a few per cent wrong; seen at other speeds that looks like a little of another effect.
+- What differs between the good flights themselves (a load that swings, a hand that moved the battery) may differ again
+  by as much. It is found by the very decision that finds changes, one good flight against the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.mismatch.posterior.evidence import Evidence
+from rotorid.mismatch.posterior.score import places, scored
+from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.posterior.statements import statements_of
+from rotorid.mismatch.regression import NEVER_EXCITED
+
+SAME_SD = 0.01
+"""Relative one-sigma of a value between two flights in which nothing changed: air, battery and temperature."""
+FORM_SD = 0.02
+"""Share of what the first set's effects contribute to a channel that may differ there by their forms."""
+RIDGE = 1e-6
+"""Ridge of the fit of all columns of a channel, in units of their length."""
+FEWEST_FLIGHTS = 3
+"""Two good flights give one difference alone, of which no variance is known."""
+
+
+def usual_spread(base: Evidence, new: Evidence, known: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """One-sigma (K,) of each coefficient between two flights by values, noise and forms alone, in its unit.
+
+    `known` (K,) are the coefficients of the effects that the first set's model holds; `inertia` (C,) is the mass, or
+    the inertia, that the second vehicle.yaml has over the first one's in each channel: the residual noise grows with it.
+    """
+    gram = base.gram.sum(axis=1)
+    hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
+    own = np.einsum("ckk->ck", gram)
+    explained = np.einsum("k,ckl,l->c", known, gram, known)
+    total = np.maximum(own.sum(axis=0), 1e-300)
+    form = FORM_SD * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
+    out = np.zeros(len(known))
+    for term in base.terms:
+        at = base.start[term.key] + np.arange(term.size)
+        if term.kind == "value":
+            out[at] = np.hypot(SAME_SD, hidden[at])
+        elif term.kind == "effect":
+            out[at] = form[at]
+    return out
+
+
+def hidden_by_noise(evidence: Evidence, inertia: np.ndarray) -> np.ndarray:
+    """The share (K,) of each coefficient that noise of its own column may hide at most, 0 to 1.
+
+    At worst all that the model of all columns leaves in the channel is noise of that column: errors in variables reduce
+    a coefficient by the share that noise has of the column's squares (Fuller, Measurement Error Models, 1987, 1.1.1).
+    """
+    own = np.einsum("cekk->ck", evidence.gram)
+    left = left_by_all(evidence) / inertia**2
+    main = np.argmax(own, axis=0)
+    column = np.arange(own.shape[1])
+    return np.clip(left[main] / np.maximum(own[main, column], NEVER_EXCITED), 0.0, 1.0)
+
+
+def left_by_all(evidence: Evidence) -> np.ndarray:
+    """Whitened squares (C,) that the model of all columns leaves in each channel."""
+    gram, cross = evidence.gram.sum(axis=1), evidence.cross.sum(axis=1)
+    out = np.empty(len(gram))
+    for c, own in enumerate(np.einsum("ckk->ck", gram)):
+        unit = np.where(own > NEVER_EXCITED, 1.0 / np.sqrt(np.maximum(own, NEVER_EXCITED)), 0.0)
+        scaled = gram[c] * np.outer(unit, unit) + RIDGE * np.eye(len(unit))
+        out[c] = evidence.square[c].sum() - (cross[c] * unit) @ np.linalg.solve(scaled, cross[c] * unit)
+    return out
+
+
+def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, Evidence], Found]) -> np.ndarray:
+    """One-sigma (K,) of each coefficient by which the good flights differ among themselves, in its unit.
+
+    Of a class each member gets what makes it contribute as much. A variance of n flights is widened by (n + 1)/(n − 1).
+    """
+    number, squares = len(flights), np.zeros(flights[0].gram.shape[-1])
+    if number < FEWEST_FLIGHTS:
+        return squares
+    for k, flight in enumerate(flights):
+        others = joined([f for j, f in enumerate(flights) if j != k])
+        squares += differences(decide(others, flight), len(squares))
+    return np.sqrt(squares / (number - 1) * (number + 1) / (number - 1))
+
+
+def differences(found: Found, count: int) -> np.ndarray:
+    """Squares (count,) of the changes in a model, each member of a class as large as what it would contribute."""
+    problem, at, out = found.problem, scored(found.problem, found.model), np.zeros(count)
+    for said in statements_of(found):
+        own = problem.columns_of[said.key]
+        beta = at.mode.beta[places(at.columns, own)]
+        out[own] = np.maximum(out[own], (beta * problem.unit[own]) ** 2)
+        size = beta @ problem.channel_gram[:, own[:, None], own].sum(axis=0) @ beta
+        for key, term in problem.terms.items():
+            if term.effect in said.alternatives and key != said.key:
+                others = problem.columns_of[key]
+                energy = np.maximum(np.einsum("ckk->k", problem.channel_gram[:, others[:, None], others]), 1e-300)
+                out[others] = np.maximum(out[others], size / energy * problem.unit[others] ** 2)
+    return out
+
+
+def joined(flights: Sequence[Evidence]) -> Evidence:
+    """The evidence of several flights as one."""
+    parts = {
+        name: np.concatenate([getattr(f, name) for f in flights], axis=axis)
+        for name, axis in (("gram", 1), ("cross", 1), ("square", 1), ("blocks", 0))
+    }
+    return replace(flights[0], **parts)
+
+
+def of_environments(evidence: Evidence, chosen: np.ndarray) -> Evidence:
+    """Evidence of some environments, a mask (E,)."""
+    return replace(
+        evidence,
+        gram=evidence.gram[:, chosen],
+        cross=evidence.cross[:, chosen],
+        square=evidence.square[:, chosen],
+        blocks=evidence.blocks[chosen],
+    )
