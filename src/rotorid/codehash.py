@@ -1,7 +1,7 @@
 """The code of the library as part of a rule's identity.
 
 Snakemake watches a script, not what the script imports. `Code.of` hashes the syntax tree of a script and of
-every `rotorid` module that it reaches, so that a changed formula reruns exactly what uses it, while comments,
+every module of the library that it reaches, so that a changed formula reruns exactly what uses it, while comments,
 docstrings and layout change nothing.
 
 What a file reaches: every `import` in it, wherever it stands (also inside functions), and each name given to
@@ -17,13 +17,15 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-PACKAGE = "rotorid"
+PACKAGES = {"rotorid": "src"}
+"""Each package of the project and the folder, from the top, that holds it."""
 RESOURCES = "importlib.resources"
+OPEN = "OPEN"
 
 
 class Code:
@@ -32,7 +34,7 @@ class Code:
     Parameters
     ----------
     root
-        Top of the project: holds `src/rotorid`.
+        Top of the project: holds the folders of `PACKAGES`.
     memory
         File that keeps what was found, so that the next start need not parse what has not changed since (by
         size and time of change). None keeps nothing.
@@ -40,7 +42,7 @@ class Code:
 
     def __init__(self, root: str | Path, memory: str | Path | None = None) -> None:
         self.root = Path(root).resolve()
-        self._source = self.root / "src"
+        self._homes = {package: self.root / folder for package, folder in PACKAGES.items()}
         self._facts: dict[Path, _Facts] = {}
         self._files: dict[str, list[Path]] = {}
         self._codes: dict[Path, str] = {}
@@ -118,14 +120,14 @@ class Code:
                     self._facts[path] = _Facts(stamp, hashlib.sha256(path.read_bytes()).hexdigest(), [])
                     return self._facts[path]
                 tree = _parse(path)
-                names = sorted(set(_imported_names(tree, _package_of(path, self._source))))
+                names = sorted(set(_imported_names(tree, _package_of(path, self._homes))))
                 digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()
                 self._facts[path] = _Facts(stamp, digest, names)
         return self._facts[path]
 
     def _files_of(self, name: str) -> list[Path]:
         if name not in self._files:
-            self._files[name] = list(_files_of(name, self._source))
+            self._files[name] = list(_files_of(name, self._homes))
         return self._files[name]
 
 
@@ -156,7 +158,7 @@ def _imported_names(tree: ast.Module, package: str) -> Iterator[str]:
             continue
         if "pkgutil" in names and package:
             yield f"{package}.*"
-        yield from (name for name in names if name.split(".")[0] == PACKAGE or name == RESOURCES)
+        yield from (name for name in names if name.split(".")[0] in PACKAGES or name == RESOURCES)
 
 
 def _from_names(node: ast.ImportFrom, package: str) -> list[str]:
@@ -172,14 +174,20 @@ def _called(node: ast.Call) -> str:
     return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
 
 
-def _package_of(path: Path, source: Path) -> str:
+def _package_of(path: Path, homes: Mapping[str, Path]) -> str:
     """Dotted package that a library file belongs to; empty outside of the library."""
-    return ".".join(path.parent.relative_to(source).parts) if path.is_relative_to(source) else ""
+    for package, home in homes.items():
+        if path.is_relative_to(home / package):
+            return ".".join(path.parent.relative_to(home).parts)
+    return ""
 
 
-def _files_of(name: str, source: Path) -> Iterator[Path]:
+def _files_of(name: str, homes: Mapping[str, Path]) -> Iterator[Path]:
     """Files that importing `name` runs: the packages on the way and the module itself, where they exist."""
     parts = name.removesuffix(".*").split(".")
+    if parts[0] not in homes:
+        return
+    source = homes[parts[0]]
     for depth in range(1, len(parts) + 1):
         place = source.joinpath(*parts[:depth])
         for file in (place / "__init__.py", place.with_suffix(".py")):
@@ -200,4 +208,10 @@ def _parse(path: Path) -> ast.Module:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if ast.get_docstring(node, clean=False) is not None:
                 node.body = node.body[1:] or [ast.Pass()]
+    tree.body = [node for node in tree.body if not _opens_modules(node)]
     return tree
+
+
+def _opens_modules(node: ast.stmt) -> bool:
+    """Whether a statement is the list of a package's modules that others may import, which only a test reads."""
+    return isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == [OPEN]

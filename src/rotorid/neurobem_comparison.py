@@ -38,7 +38,7 @@ POINT_COLUMNS = ["flight", "airspeed_m_s", *CHANNELS]
 
 
 @dataclass(frozen=True)
-class Comparison:
+class NeurobemTables:
     """Summary and tables; forces in N, moments in N m."""
 
     summary: dict
@@ -47,10 +47,10 @@ class Comparison:
     points: pd.DataFrame
 
 
-def nothing() -> Comparison:
+def nothing() -> NeurobemTables:
     """Tables without a row, for recordings that are not there."""
     tables = (pd.DataFrame(columns=names) for names in (FLIGHT_COLUMNS, BIN_COLUMNS, POINT_COLUMNS))
-    return Comparison({}, *tables)
+    return NeurobemTables({}, *tables)
 
 
 def residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.ndarray]:
@@ -98,7 +98,7 @@ def _bin_rows(model: str, found: Binned) -> list[tuple]:
 
 def compare(
     recordings: RecordingSet, cutoff_hz: float, airspeed_bin_m_s: float, block_s: float, seed: int
-) -> Comparison:
+) -> NeurobemTables:
     """RMS of every flight and model, and against airspeed with block-bootstrap intervals."""
     vehicle = recordings.vehicle
     left = {run.name: residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
@@ -125,4 +125,4 @@ def compare(
     cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::POINT_STEP] for flight, models in left.items()]
     points = pd.DataFrame(np.concatenate(cloud), columns=POINT_COLUMNS[1:])
     points.insert(0, "flight", np.repeat(list(left), [len(part) for part in cloud]))
-    return Comparison(summary, pd.DataFrame(rows)[FLIGHT_COLUMNS], pd.DataFrame(bins, columns=BIN_COLUMNS), points)
+    return NeurobemTables(summary, pd.DataFrame(rows)[FLIGHT_COLUMNS], pd.DataFrame(bins, columns=BIN_COLUMNS), points)

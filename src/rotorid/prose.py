@@ -328,7 +328,7 @@ def unit(value: Any) -> str:
 
 
 def text(value: Any) -> str:
-    """A result's text with markdown's own signs made harmless; a whole number without its decimals."""
+    """A result's text with markdown's own signs escaped; a whole number without its decimals."""
     if value is None:
         return "–"
     if isinstance(value, float) and value.is_integer():

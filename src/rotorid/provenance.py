@@ -12,6 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import rotorid
+
 
 def gather(raw: Sequence[str | Path], lock: str | Path, config: Mapping[str, Any]) -> dict[str, Any]:
     """Everything needed to make the same report again.
@@ -46,6 +48,20 @@ def commit(folder: str | Path) -> str:
     except (OSError, subprocess.CalledProcessError):
         return "unknown: not a git checkout"
     return done.stdout.strip()
+
+
+def own_commit() -> str:
+    """The commit that the running library comes from, as `commit` says it; empty where it was not started from a clone.
+
+    A library installed into another project's folder lies in that project's repository, which does not track it.
+    """
+    folder = Path(rotorid.__file__).parent
+    tracked = ["git", "-C", str(folder), "ls-files", "--error-unmatch", "__init__.py"]
+    try:
+        subprocess.run(tracked, capture_output=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return commit(folder)
 
 
 def commit_date(folder: str | Path) -> str:

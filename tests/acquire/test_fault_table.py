@@ -172,7 +172,7 @@ def session_free(path: Path, frames: list[tuple[int, bytes]]) -> None:
 
 
 class Script:
-    """A transport on a virtual line: answers `?`, `G` and `X`, and sends what it is told in the midst."""
+    """A transport on a virtual line: answers `?`, `G` and `X`, and sends what it is given in the midst."""
 
     name, baud_rate = "script", None
 
@@ -387,7 +387,7 @@ def until(condition, seconds: float = 30.0) -> None:
         time.sleep(0.01)
 
 
-@seen("a motor told to turn with the watchdog off", "it turned: there was no watchdog")
+@seen("a motor commanded to turn with the watchdog off", "it turned: there was no watchdog")
 def test_nothing_moves_without_its_watchdog(loopback):
     _, recorder = loopback("rotor", timings=Timings(watchdog_s=None))
     with pytest.raises(AcquireError, match="switch the watchdog on first"):

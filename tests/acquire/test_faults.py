@@ -322,7 +322,7 @@ def test_disk_full(plugged, recorder_on):
     log = read_log(recorder.log_path)
     assert log.cut_at is not None and len(log.table) > 1000 and log.missing == 0
     assert log.session.ended == Ended.DISK_FULL
-    # the device was told to stop, and its answer was still listened to
+    # the device got the command to stop, and its answer was still listened to
     assert recorder.ended is not None
 
 

@@ -161,7 +161,7 @@ def test_an_instrument_is_told_to_stop_whatever_the_end(line, tmp_path):
     assert os.read(master, 100) == b"S\r\n"
 
 
-@seen("a bit of a log of plain lines flipped", "two halves made a line of a wrong number, and nothing was told")
+@seen("a bit of a log of plain lines flipped", "two halves made a line of a wrong number, and nothing was reported")
 def test_damage_joins_no_halves_of_lines_and_is_told(tmp_path):
     description = Description(name="x", **FORMS["csv"][0])
     parts = [b"0.0,1.5\n0.1,2", b".5\n0.2,3.", b"5\n0.3,4.5\n"]

@@ -1,4 +1,5 @@
-"""Metadata of raw logs and their index carry a checksum: a changed bit is told, an edit can be meant, old ones read."""
+"""Metadata of raw logs and their index carry a checksum: a changed bit is reported, an edit can be meant, old ones
+read."""
 
 from __future__ import annotations
 

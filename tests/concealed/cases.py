@@ -324,7 +324,7 @@ PAIRS = (
 
 
 def confusable() -> list[Case]:
-    """Pairs that imitate each other, recorded so that they can be told apart, and so that they cannot."""
+    """Pairs that imitate each other, recorded so that they can be distinguished, and so that they cannot."""
     out = []
     for p, (first, second, without, with_) in enumerate(PAIRS):
         for effect, form in (first, second):

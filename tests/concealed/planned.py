@@ -65,7 +65,7 @@ def look_alikes() -> list[Case]:
 
 
 def ambiguous() -> list[Case]:
-    """The listed cases recorded so that a pair cannot be told apart."""
+    """The listed cases recorded so that a pair cannot be distinguished."""
     return [c for c in all_cases() if c.name.startswith("confusable/") and "/without/" in c.name]
 
 

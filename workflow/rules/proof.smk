@@ -70,7 +70,7 @@ rule conceal:
 
 
 rule judge:
-    """Verdicts of the mismatch stage on a batch of sets, told nothing."""
+    """Verdicts of the mismatch stage on a batch of sets, without their answers."""
     message:
         "Proof: judging, {wildcards.batch}"
     input:
@@ -86,7 +86,7 @@ rule judge:
 
 
 rule ask_peers:
-    """What other methods say of the same sets, told nothing either."""
+    """What other methods say of the same sets, without their answers either."""
     message:
         "Proof: asking other methods, {wildcards.batch}"
     input:
@@ -230,9 +230,7 @@ rule chapter_proof:
         next_flight_summary="docs/proof/next_flight_summary.csv",
         releases_named="docs/proof/releases.csv",
         plantings_rows="docs/proof/plantings.csv",
-        plantings_before_rows="docs/proof/plantings_before.csv",
         plantings="docs/proof/plantings_summary.csv",
-        plantings_before="docs/proof/plantings_before_summary.csv",
     output:
         next_flight_figure=report(
             "results/report/proof/next_flight.svg",

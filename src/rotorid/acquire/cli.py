@@ -188,7 +188,7 @@ def quadrotor_command(
     *,
     shared: Shared,
 ) -> None:
-    """Send the quadrotor a programme and record what its motors are told."""
+    """Send the quadrotor a programme and record the commands of its motors."""
     if dynamics not in quadrotor.DYNAMICS:
         raise typer.BadParameter(f"--dynamics is one of {', '.join(quadrotor.DYNAMICS)}, not {dynamics!r}")
     if shape not in ("trapezoid", "sine"):

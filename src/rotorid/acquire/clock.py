@@ -31,7 +31,7 @@ class SystemClock:
 
 
 class VirtualClock:
-    """A clock that stands still unless it is told to advance; the world's emulators follow it."""
+    """A clock that stands still unless it is advanced; the world's emulators follow it."""
 
     def __init__(self, start: datetime) -> None:
         self._start = start

@@ -66,7 +66,7 @@ def record_lines(
         failure = error
         raise
     finally:
-        if holder.begun and description.end:  # whatever the end was, the instrument is told to stop
+        if holder.begun and description.end:  # whatever the end was, the instrument is stopped
             with suppress(AcquireError):
                 transport.write(description.end.encode())
                 holder._write(rawlog.SENT, description.end.encode())

@@ -1,4 +1,4 @@
-"""What the quadrotor is told for an experiment of table A.1."""
+"""Commands of the quadrotor for an experiment of table A.1."""
 
 from rotorid.io.experiments import Experiment
 from rotorid.io.wire.quadrotor import SINE, TRAPEZOID, Programme

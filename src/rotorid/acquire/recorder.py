@@ -125,7 +125,7 @@ class Recorder:
         self.resume: Callable[[], None] | None = None
         self.on_row: Callable[[Row], None] | None = None
         self.stop_asked = stop_asked or threading.Event()
-        self.ends_by_itself = False  # a programme that the device finishes without being told
+        self.ends_by_itself = False  # a programme that the device finishes without a command
         self.over = False  # the stream has ended
         self.ended: wire.EndRecord | None = None
         self.identity: wire.StartRecord | None = None
@@ -362,7 +362,7 @@ class Recorder:
         self._say(text)
 
     def note(self, what: str, text: str) -> None:
-        """Something happened that belongs into log and metadata; the person is told as well."""
+        """Something happened that belongs into log and metadata; the person is informed as well."""
         self._event(what, text)
         self._say(text)
 
@@ -654,7 +654,7 @@ class Recorder:
             self._say(f"{self._transport.name} is back; going on")
             self._last_sample_ns = self._clock.now_ns()
             if self._streaming:
-                self._restarted = True  # whatever it was: it has to be told to go on
+                self._restarted = True  # whatever it was: it needs the command to go on
             return
         self._streaming = False
         raise PortLost(

@@ -32,7 +32,7 @@ Watch = Callable[[list[Recorder], Callable[[], None]], None]
 
 @dataclass(frozen=True)
 class Desk:
-    """Who sits there: how they are told, asked and waited for."""
+    """Who sits there: how they are informed, asked and waited for."""
 
     say: Say
     ask: Ask  # a question; the answer is "", or a word

@@ -83,7 +83,7 @@ class Metrology:
 
 
 def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> Metrology:
-    """Line and figures of one cell from its rows of `readings` and its slopes where it carried nothing (V/s)."""
+    """Line and figures of one cell from its rows of `readings` and its slopes where it was not loaded (V/s)."""
     weight, reading = table["weight_gf"].to_numpy(float), table["reading_10uv"].to_numpy(float)
     line = fit_line(reading, weight)
     force = line.a0 + line.a1 * reading

@@ -2,7 +2,7 @@
 
 - Stress is force over the section, strain displacement over the distance between grips.
 - Modulus: slope of the straight part. It begins where the specimen is taut and is extended for as long as the
-  line's largest residual stays within the noise; the foot where slack was taken up is left out.
+  line's largest residual stays within the noise; the foot, where the slack is removed, is left out.
 - Strain is then counted from where that line meets zero stress (toe compensation).
 - Yield: where the curve meets the line of the modulus moved by 0.2 % of strain. Strength: the largest stress.
 """
@@ -21,7 +21,7 @@ from rotorid.io.tables import by_recording
 
 OFFSET_STRAIN = 0.002
 FOOT_SHARE = 0.04
-"""The straight part is looked for from this share of the strength on: below it the slack is still being taken up."""
+"""The straight part is looked for from this share of the strength on: below it the slack is still being removed."""
 FIRST_SHARE = 0.12
 """… and reaches at least up to this share."""
 NOISE_FACTOR = 4.0

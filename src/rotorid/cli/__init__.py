@@ -40,17 +40,21 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from rotorid.provenance import own_commit
+
         try:
-            typer.echo(f"rotorid {version('rotorid')}")
+            known = f"rotorid {version('rotorid')}"
         except PackageNotFoundError:
-            typer.echo("rotorid (not installed)")
+            known = "rotorid (not installed)"
+        source = own_commit()
+        typer.echo(f"{known}, commit {source}" if source else known)
         raise typer.Exit()
 
 
 @app.callback()
 def main(
     show_version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print version and commit, and leave.")
     ] = False,
 ) -> None:
     """From a flight log to what your model leaves out."""

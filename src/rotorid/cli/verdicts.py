@@ -149,7 +149,7 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
         warnings.simplefilter("ignore")
         step(f"{recordings.name}: analysing {len(recordings.runs)} runs")
         analysis = analysis_of(recordings)
-        # The last step told is the verdict's own sentence, which the caller prints.
+        # The last step reported is the verdict's own sentence, which the caller prints.
         verdict = write_files(analysis, *files, progress=lambda text: None if text.endswith(".") else step(text))
         if series:
             from rotorid.result import residuals_of

@@ -70,7 +70,13 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
     j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
     gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * DAMPING * stiffness * j))
     most = (np.inf, np.inf, most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
-    noise = Noise(0.0, 0.01, 0.0, 0.1, 0.02, 0.01, 0.003)
+    noise = Noise(
+        angular_velocity_rad_s=0.01,
+        specific_force_m_s2=0.1,
+        velocity_m_s=0.02,
+        position_m=0.01,
+        rotor_speed_relative=0.003,
+    )
     start = Start()
     if vehicle.ground_z_m is not None:
         start = Start(position_m=np.array([[0.0, 0.0, vehicle.ground_z_m - START_HEIGHT_M]]))

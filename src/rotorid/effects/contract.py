@@ -58,7 +58,7 @@ class Motion:
     voltage: np.ndarray | None = None
     """Battery voltage, (n,), V."""
     carried: np.ndarray | None = None
-    """Share of a payload that is on board, (n,), 0 or 1; None where it is carried all the time."""
+    """Share of a payload that is on board, (n,), 0 or 1; None where it is on board all the time."""
     hung: np.ndarray | None = None
     """How a slung payload hung at some instants, (k, 7): time in s, direction of the cable downward and its rate in
     1/s, both in world axes; None for one that starts at rest."""
@@ -328,13 +328,13 @@ class Effect:
     feels_air: bool = False
     """Whether its force hangs on the velocity through the air."""
     drag: bool = False
-    """Whether its force opposes the velocity through the air: by it a force can be told as a wind's velocity."""
+    """Whether its force opposes the velocity through the air: with it a force can be stated as a wind's velocity."""
     would_change: tuple[str, ...] = ()
     """Believed values (keys of vehicle.yaml) that it would change by itself."""
     like_on_heavier: tuple[str, ...] = ()
     """Ids that on a vehicle heavier than believed may be this one; those after the first only beside the first."""
     same_on_commands: str = ""
-    """Id from which it cannot be told where rotor speeds are known from their commands alone."""
+    """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     curves_thrust: bool = False
     """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
     curve_of_load: bool = False

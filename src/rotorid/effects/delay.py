@@ -44,7 +44,7 @@ def late_reading(loading, vehicle, values):
 
 
 def reading_forms(instrument):
-    """A reading late by more than two samples; what is less is a nuisance or cannot be told from a filter."""
+    """A reading late by more than two samples; what is less is a nuisance or cannot be distinguished from a filter."""
     dt = 1.0 / instrument.rate_hz
     starts = (1.5 * dt, 4 * dt, 12 * dt, -1.5 * dt, -4 * dt)
     late = Parameter(

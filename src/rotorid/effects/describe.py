@@ -103,7 +103,7 @@ effects:
   - {id: rotor_drag, form: at the hubs, parameters: {k_d: 6.0e-5}}
 ```
 
-How they are told from each other: [the mismatch stage](mismatch.md).
+How they are distinguished: [the mismatch stage](mismatch.md).
 """
 
 

@@ -72,7 +72,7 @@ EFFECT = Effect(
     source="Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., ch. 4; catalogue F23",
     sign=("positive b and s make the reading larger about the axis; θ is a right-handed turn of the reading"),
     validity=(
-        "constant over a recording and small turns; told by the attitude recorded beside it, so attitude "
+        "constant over a recording and small turns; identified by the attitude that is recorded, too, so attitude "
         "must not come from the same gyroscope alone"
     ),
     excited_by=("angular_velocity", "angular_acceleration"),

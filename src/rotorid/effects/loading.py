@@ -59,7 +59,7 @@ class Instrument:
     returns: tuple[int, ...] = ()
     """Channels whose load also comes back from above to values that are not zero."""
     by_hand: bool = False
-    """Whether loads were put on by hand, so that nothing that happens within seconds can be told from that."""
+    """Whether loads were put on by hand, so that nothing that happens within seconds can be distinguished from that."""
     distance: str = ""
     """Name of an unknown column that is a distance to a wall or fixture."""
 

@@ -63,7 +63,7 @@ def aboard(motion):
 
 
 def rigid(motion, vehicle, values):
-    """F = -m_p a, M = -(m_p r) × a: added mass m_p at (x, y) carried along; a the specific force."""
+    """F = -m_p a, M = -(m_p r) × a: added mass m_p at (x, y) that moves with the body; a the specific force."""
     mass_kg, moment_x, moment_y = values
     lever = np.array([moment_x, moment_y, 0.0])
     moved = aboard(motion) * motion.specific_force

@@ -120,7 +120,7 @@ def _leapfrog(hanging, start, dt, length_m, damping):
         x, y, z = x + dt * u, y + dt * v, z + dt * w
         longer = sqrt(x * x + y * y + z * z)
         x, y, z = x / longer, y / longer, z / longer
-        # The rate is carried along the sphere: it turns with the direction and keeps its size.
+        # The rate is transported along the sphere: it turns with the direction and keeps its size.
         u, v, w = u * longer - dt * after * x, v * longer - dt * after * y, w * longer - dt * after * z
     return states
 

@@ -43,7 +43,7 @@ class Limits(BaseModel):
     tilt_deg: float = Field(25.0, gt=0, le=70)
     yaw_rate_deg_s: float = Field(120.0, gt=0, le=2000)
     duration_s: float = Field(60.0, ge=10, le=1200)
-    """In the air, all told; what the battery allows."""
+    """In the air, in total; what the battery allows."""
     attitude_bandwidth_rad_s: float = Field(9.0, gt=0.5, le=100)
     """Natural frequency of the vehicle's attitude loop: faster changes are not followed."""
     position_bandwidth_rad_s: float | None = Field(None, gt=0.1, le=50)

@@ -13,6 +13,7 @@ from rotorid.mismatch.analyse import findings_inside, findings_outside
 from rotorid.mismatch.findings import CLAIMED, Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ
 from rotorid.mismatch.next_flight import CURVES, beyond_flying
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
 from rotorid.mismatch.regression import Regression
@@ -69,7 +70,7 @@ class Known:
         return self.fitted.model.search.regression if self.whitened is None else self.whitened
 
 
-def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: float = 20.0) -> Known:
+def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: float = HIGHEST_CUTOFF_HZ) -> Known:
     """The set fitted, and its open questions: classes left open, and ids in `suggested` that may as well be nothing.
 
     Raises

@@ -117,7 +117,7 @@ def words_of(effect: str) -> str:
 def outcome(separation: Separation, target: float) -> str:
     """What it would mean if one of the models came out."""
     low, high = separation.interval_95
-    sure = "would be told from" if separation.sigma >= target else "would probably not be told from"
+    sure = "would be distinguished from" if separation.sigma >= target else "would probably not be distinguished from"
     return (
         f"If {words_of(separation.true)} is at work it {sure} its nearest rival, {words_of(separation.rival)}: "
         f"{separation.sigma:.1f} standard errors ({low:.1f} to {high:.1f}); the recordings so far give "
@@ -198,7 +198,7 @@ def text(plan: Plan) -> list[str]:
 
 
 def open_ids(plan: Plan) -> list[tuple[str, ...]]:
-    """Ids of every class that is open, told by a flight or not."""
+    """Ids of every class that is open, whether a flight can settle it or not."""
     return [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
 
 

@@ -270,7 +270,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
 
 
 BULLET_DAMPING = 0.04
-"""c of the deceleration c (1 + |v|) v, and the same for turning, that Bullet gives to a body unless told otherwise."""
+"""c of the deceleration c (1 + |v|) v, and the same for turning, that Bullet gives to a body by default."""
 
 
 def in_pybullet(

@@ -367,7 +367,7 @@ def sdf(vehicle: Vehicle) -> Exported:
       <rotorVelocitySlowdownSim>10</rotorVelocitySlowdownSim>
       <motorType>velocity</motorType>
     </plugin>""")
-    # What the rotors' links carry must not be carried twice.
+    # What the rotors' links carry must not be counted twice.
     body = parts.mass_kg - share * len(parts.places)
     off = -share * (parts.places * FLU).sum(0) / body
     spread = np.zeros((3, 3))

@@ -44,8 +44,6 @@ class Leg:
     """Fixed to the table."""
     seat_m: float
     """Height of the surface that bears the load above the plate's top."""
-    seat_area_m2: float
-    """Area of the whole of that surface."""
 
 
 def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Leg:
@@ -107,7 +105,7 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
         Bond("C", "upper cell", hung),
         Bond("C", "D", top),
     )
-    return Leg(parts, frames, bonds, base, sizes.boss_height_m, assumed.pressed_area_m2)
+    return Leg(parts, frames, bonds, base, sizes.boss_height_m)
 
 
 def _other_end(place: placement.Place, sizes: Sizes) -> np.ndarray:

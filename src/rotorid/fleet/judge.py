@@ -50,7 +50,7 @@ def judge_sets(
     memory
         Folder that remembers verdicts by content and code.
     progress
-        Told one line a set.
+        Called with one line a set.
 
     Raises
     ------

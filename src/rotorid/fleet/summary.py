@@ -82,7 +82,7 @@ def reasons(verdict: dict[str, Any]) -> list[str]:
         out.append("a mismatch that nothing of the catalogue explains")
     elif verdict["verdict"] == "partly_explained":
         out.append(f"{verdict['unexplained']['share']:.0%} of the mismatch unexplained")
-    for status, words in (("ambiguous", "cannot be told from another cause"), ("suggested", "only suggested")):
+    for status, words in (("ambiguous", "cannot be distinguished from another cause"), ("suggested", "only suggested")):
         named = [e["id"] for e in verdict["effects"] if e["status"] == status]
         if named:
             out.append(f"{words}: {', '.join(named)}")

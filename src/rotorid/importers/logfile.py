@@ -1,4 +1,4 @@
-"""Any log that rotorid knows, told by its first bytes, as flights in contract columns."""
+"""Any log that rotorid knows, recognised by its first bytes, as flights in contract columns."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BY_FIRST_BYTES = (
     (b"SQLite format 3", "ros"),
 )
 TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
-"""Template vehicle that stands in for what a log of an autopilot or format does not say."""
+"""Template vehicle that supplies what a log of an autopilot or format does not say."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from rotorid.errors import InputError
 from rotorid.importers.clean import drop_repeated_times
 from rotorid.importers.report import Fault
 from rotorid.recordings import columns as c
-from rotorid.rotor.coefficients import lost_speed
+from rotorid.recordings.lost_speeds import lost_speed
 
 GRAM_FORCE_N = 9.80665e-3
 RPM = 2 * np.pi / 60

@@ -114,7 +114,7 @@ class StreamDecoder:
             self.pending = self.pending[-MAX_WIRE:]
         found = []
         for block in blocks:
-            if not block:  # two zeros in a row: an empty block is a harmless way to flush a line
+            if not block:  # two zeros in a row: an empty block is a usual way to flush a line
                 continue
             try:
                 found.append(decode(block))

@@ -1,4 +1,4 @@
-"""YAML files that fill a pydantic model: read with limits, faults told in one sentence."""
+"""YAML files that fill a pydantic model: read with limits, faults reported in one sentence."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class KnownKeys(BaseModel):
-    """A part of a file that has these keys and no others: what is misspelled is told, not passed over."""
+    """A part of a file that has these keys and no others: what is misspelled is reported, not passed over."""
 
     model_config = ConfigDict(extra="forbid")
 

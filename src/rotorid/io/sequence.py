@@ -131,7 +131,7 @@ class Tracker:
         self.boot_id = boot_id
 
     def _take_flags(self, frame: Frame) -> Quality:
-        """Gaps and resets are told by the next sample, whatever frames come between."""
+        """Gaps and resets are reported by the next sample, whatever frames come between."""
         if frame.kind != DATA:
             return Quality.GOOD
         flags, self._flags = self._flags, Quality.GOOD

@@ -139,7 +139,7 @@ class Session(KnownKeys):
     port: str | None = None
     baud_rate: int | None = None
     setup: Setup = Setup()
-    procedure: dict[str, Any] = {}  # what the recorder was told to do
+    procedure: dict[str, Any] = {}  # what the recorder was asked to do
     marks: dict[str, int] = {}  # step: value of the table's column `index` at its first (or last) sample
     tare: dict[str, Number] | None = None  # column: mean of the 25 tare samples
     promised_rate_hz: float | None = None

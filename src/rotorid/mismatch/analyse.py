@@ -34,7 +34,7 @@ from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each, without_values
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.motion import full_speed, stretches
+from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.payload_windows import loads, on_board
 from rotorid.mismatch.posterior.limits import UpperLimit
@@ -74,7 +74,7 @@ TIMING_FLOOR = 0.05
 recorded."""
 
 
-def analyse(recordings: RecordingSet, cutoff_hz: float = 20.0, watch: Watch = unwatched) -> Analysis:
+def analyse(recordings: RecordingSet, cutoff_hz: float = HIGHEST_CUTOFF_HZ, watch: Watch = unwatched) -> Analysis:
     """The whole analysis of a set of kind `flight`.
 
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
@@ -367,7 +367,7 @@ def lag_alone_notes(chain: Chain | None) -> list[str]:
 def run_scale_notes(model: WrenchModel) -> list[str]:
     """What was done about a thrust that differs between runs.
 
-    Told is what a flight shows, thrust over mass: both may move together with anything.
+    Reported is what a flight shows, thrust over mass: both may move together with anything.
     """
     regression = model.search.regression
     terms = [t for t in regression.terms if t.key.startswith(RUN_SCALE)]
@@ -532,7 +532,7 @@ def with_noise_held_out(analysis: Analysis) -> Analysis:
     """Where nothing is stated that a model holds, the analysis with floors that hold on the runs held out, too.
 
     What is left of a channel there and depends on nothing recorded is noise, however much less of it the fitted runs
-    had: a vibration seen through aliasing is louder or not by the rotors' speed.
+    had: a vibration seen through aliasing is larger or smaller by the rotors' speed.
     """
     if analysis.without or analysis.wrong_values:
         return analysis

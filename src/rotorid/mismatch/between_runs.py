@@ -19,7 +19,7 @@ SMALLEST_SHARE_OF_NOISE = 0.5
 
 
 @dataclass(frozen=True)
-class Apart:
+class DifferingMeans:
     """Means of a channel that differ between runs."""
 
     means: Mapping[str, float]
@@ -31,12 +31,12 @@ class Apart:
         return float(np.average([self.means.get(run, 0.0) ** 2 for run in runs], weights=counts))
 
 
-def apart(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float, noise: float) -> Apart | None:
+def apart(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float, noise: float) -> DifferingMeans | None:
     """Means of stretches (n,), each of a run, where runs differ beyond doubt and matter; None where they do not."""
     means, p_value = compared(runs, parts, rate_hz)
     if p_value > ALARM_P or np.ptp(list(means.values())) < 2 * SMALLEST_SHARE_OF_NOISE * noise:
         return None
-    return Apart(means, p_value)
+    return DifferingMeans(means, p_value)
 
 
 def compared(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float) -> tuple[dict[str, float], float]:

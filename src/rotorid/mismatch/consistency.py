@@ -80,7 +80,7 @@ def missing_places(
             there.add(own[0])
     if not there and not analysis.wrong_values:
         out |= {c: analysis.p_values.get(c, (1.0, 1.0))[1] for c in analysis.unexplained_channels if c in channels}
-    # Where nothing is stated, values put right within their trust may be all that it takes.
+    # Where nothing is stated, values corrected within their trust may be all that it takes.
     stated = with_status(analysis, *CLAIMED) or analysis.wrong_values
     for name, channel in channels.items():
         both = (channel.rmse.held_out, channel.rmse.training)

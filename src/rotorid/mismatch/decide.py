@@ -97,8 +97,8 @@ def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: n
     return [int(c) for c in order if size[c] > 0.33 * size[order[0]]]
 
 
-class Told(NamedTuple):
-    """What is told of a term at work."""
+class TermReport(NamedTuple):
+    """What is reported of a term at work."""
 
     values: np.ndarray
     parameters: tuple[Estimate, ...]
@@ -115,10 +115,10 @@ class Told(NamedTuple):
         return "ambiguous" if self.alternatives else "established"
 
 
-def findings_of(search: Search, selection: Selection, told: Callable[[str], Told]) -> list[Finding]:
+def findings_of(search: Search, selection: Selection, told: Callable[[str], TermReport]) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive.
 
-    Terms without a name are told as unexplained instead.
+    Terms without a name are reported as unexplained instead.
     """
     effects, findings = catalogue(), []
     for key in selection.active:
@@ -166,7 +166,7 @@ def wrench_findings(
     `delivered` the fit whose numbers are stated."""
     beside = search.beside(selection.active)
 
-    def told(key: str) -> Told:
+    def told(key: str) -> TermReport:
         term = search.terms[key]
         beta, _ = coefficients(regression, delivered, key)
         channels = main_channels(contributions.rows, regression.columns([key]), beta, noise)
@@ -187,7 +187,7 @@ def wrench_findings(
         names = tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels)
         stated = selection.statements.get(key)
         others = search.alternatives(key, selection.active) if stated is None else stated.alternatives
-        return Told(values, parameters, names, others, stated)
+        return TermReport(values, parameters, names, others, stated)
 
     return findings_of(search, selection, told)
 

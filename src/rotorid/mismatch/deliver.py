@@ -69,7 +69,7 @@ def analysis_of(recordings: RecordingSet, off: Collection[str] = (), watch: Watc
         analysis = analyse(usable, watch=watch) if flight else analyse_instrument(usable)
     without = tuple(f"Judged without the rule {name}: {rules.RULES[name].decides}" for name in sorted(asked.off))
     analysis = replace(analysis, fired=dict(asked.fired), notes=(*without, *analysis.notes))
-    recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with mistakes put right are made anew
+    recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with corrected mistakes are made anew
     analysis = replace(analysis, recordings=recordings, notes=(*usable.left_out, *analysis.notes))
     return with_rounded_model(with_doubts(analysis, usable))
 

@@ -57,7 +57,7 @@ def widely(values: Values) -> dict[str, float]:
 
 
 def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tuple[list[str], Fit]:
-    """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values at their told numbers.
+    """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values at their stated numbers.
 
     What the whole balance would make of those values is another number where slow moments of the air bias it, and
     effects fitted beside that would be those of a vehicle that nobody states.
@@ -111,7 +111,8 @@ def residuals_of(model: FittedModel, fit: Fit) -> list[np.ndarray]:
 
 
 def believed_residuals(prepared: Prepared, rows: list[Rows], commanded: bool) -> list[np.ndarray]:
-    """What the believed vehicle leaves of every stretch of a flight, (n, 12); if `commanded`, rotors turn as told."""
+    """What the believed vehicle leaves of every stretch of a flight, (n, 12); if `commanded`, rotors turn as
+    commanded."""
     if not commanded:
         return [r.y for r in rows]
     out = []

@@ -16,12 +16,13 @@ from rotorid.mismatch.rows import Thinner, baseline_wrench, residual
 from rotorid.recordings import Vehicle
 
 NOISE_BAND = (0.5, 0.85)
-"""Band, as shares of the cutoff, in which noise is told from motion."""
+"""Band, as shares of the cutoff, in which noise is distinguished from motion."""
 MOSTLY_NOISE = 0.3
 """Share of a side's power in the band that must be noise before it says how much noise there is."""
 SHORTEST_ROWS = 32
 LEAST_LOUDER, MOST_LOUDER = 1.2, 10.0
-"""A sensor louder than that was filtered before it was recorded: what is left in the band may be the model's own."""
+"""A sensor with more noise than that was filtered before it was recorded: what is left in the band may be the model's
+own."""
 
 
 def noise_factors(

@@ -41,7 +41,7 @@ strongest are looked at."""
 RESTLESS_SHARE = 0.5
 """A wind that never rests must take away more than this share of the energy left in the horizontal force."""
 LASTING_S = 12.0
-"""A wind that changes for longer has no one height: its root mean square is told."""
+"""A wind that changes for longer has no one height: its root mean square is stated."""
 MOST_EXTRAPOLATION = 1.05
 """Speed in a window, beside the fastest that is fitted, up to which the drag is known."""
 GUST_P = 1e-6
@@ -240,7 +240,7 @@ def beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -
 
 
 def feels_wind(model: WrenchModel) -> bool:
-    """Whether a wind can be told: a drag is in the model, and the velocity over ground is known."""
+    """Whether a wind is identifiable: a drag is in the model, and the velocity over ground is known."""
     drag = any(model.search.terms[k].effect in ids_of("drag") for k in model.selection.active)
     return drag and all(s.motion.velocity is not None for s in model.segments)
 

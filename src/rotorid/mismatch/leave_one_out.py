@@ -81,7 +81,7 @@ def without_values(
     model, seen
         What was chosen, and the same with the rows of every run.
     values, moved
-        The values called wrong, and those that were put right within their trust.
+        The values called wrong, and those that were corrected within their trust.
     names
         Name of a value to the keys of `values` that it stands for.
     traces

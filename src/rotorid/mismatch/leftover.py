@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.mismatch.between_runs import Apart, apart
+from rotorid.mismatch.between_runs import DifferingMeans, apart
 from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, left_by, standardised
 from rotorid.mismatch.rows import CHANNELS
 from rotorid.mismatch.slow_changes import slow_excess
@@ -38,7 +38,7 @@ class Channel:
     """What a flexible regression on all inputs still explains."""
     slow: float
     """Slow changes that no sensor makes."""
-    between: Apart | None
+    between: DifferingMeans | None
     """Means that differ between runs."""
     shifted: float
     """Energy of those means."""
@@ -171,7 +171,7 @@ def description(
     slow: Mapping[str, tuple[float, float]],
     depends: Sequence[str],
 ) -> str:
-    """Causes, as far as they can be told, and what a plain empirical term would gain."""
+    """Causes, as far as they can be identified, and what a plain empirical term would gain."""
     causes = list(sentences)
     if slow:
         peaks = [f"{name} around {hz:.1f} Hz, {rms:.2g} {_unit(name)} rms" for name, (rms, hz) in slow.items()]
@@ -196,7 +196,7 @@ def kept_by_values(delivered: float, fitted: float, noise: float, least: float =
     return kept if kept > least * noise else 0.0
 
 
-def _differing(channel: str, between: Apart) -> str:
+def _differing(channel: str, between: DifferingMeans) -> str:
     """The runs with the lowest and the highest mean, in words."""
     low, high = (pick(between.means, key=between.means.get) for pick in (min, max))
     values = " and ".join(f"{between.means[run]:.2g} {_unit(channel)} in {run}" for run in (low, high))

@@ -9,8 +9,8 @@ Three sources, in this order of trust:
    `after` allows. Findings at work for most of the flight are listed only where nothing is confined in time:
    their place is a regime, not a time.
 3. What the findings leave, `after`, is whitened, evened out (noise that grows with how hard it is flown is no
-   mismatch) and scanned over windows of 0.5 to 4 s for energy (of what moves: the same noise, only louder, is a
-   sensor's matter) and for a mean other than zero. The threshold is
+   mismatch) and scanned over windows of 0.5 to 4 s for energy (of what moves: the same noise with a higher variance is
+   a sensor's matter) and for a mean other than zero. The threshold is
    Bonferroni's over every window of every channel of every run; the spread of both statistics is measured on the
    blocks of the residual themselves, so that colour that whitening left, or noise that comes in bouts, raises the
    threshold. Edges are those of the most likely segment. A force that the accelerometer reads and the velocity does
@@ -61,14 +61,14 @@ AT_WORK = 0.03
 """Local size beside its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
 LOUDER = 4.0
-"""Energy of a window beside the usual, below which louder noise is not called a mismatch."""
+"""Energy of a window beside the usual, below which noise of higher variance is not called a mismatch."""
 MOVES_S = 0.2
-"""Lags over which louder residuals may follow each other."""
+"""Lags over which larger residuals may follow each other."""
 FIRST_LAGS = 4
 LIKE = 0.999
 """Largest correlation that Fisher's transform is taken of."""
 MOVES_Z = 4.0
-"""Standard errors (Fisher's transform) by which louder residuals must follow each other otherwise than usual."""
+"""Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual."""
 WILD = 4.0
 """Whitened residual beyond which a single sample counts no more."""
 SHIFTED = 0.4
@@ -333,7 +333,7 @@ def _energy_p(values: np.ndarray, noise: float, freedom: float) -> float:
 
 
 def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
-    """Stretches in which the residual after the effects is louder or shifted."""
+    """Stretches in which the residual after the effects is larger or shifted."""
     channels = _by_channel(analysis)
     windows = sum(
         2 * len(_window_starts(len(t.after), length)) for ts in channels.values() for t in ts for length in _lengths(t)
@@ -458,10 +458,11 @@ def _louder(traces, white, limit) -> list[Interval]:
 
 
 def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
-    """Whether a whitened residual moves in one part otherwise than in the whole, and is not the same noise, louder.
+    """Whether a whitened residual moves in one part otherwise than in the whole, and is not the same noise with a
+    higher variance.
 
-    What bodies and air do lasts longer than a sample; a sensor that is shaken or badly received is louder, no more.
-    Told by the correlations at one of the first lags, or at all up to `most` together.
+    What bodies and air do lasts longer than a sample; a sensor that is shaken or badly received has a higher variance,
+    no more. Decided by the correlations at one of the first lags, or at all up to `most` together.
     """
     count = len(part)
     lags = np.arange(1, min(most, count - 5) + 1)
@@ -489,7 +490,7 @@ def _shifted(traces, white, parts, limit) -> list[Interval]:
         count = sum(len(w) // length for w in white)
         least = max(least, float(np.median(np.concatenate(sums) ** 2)) / 0.4549)
         for k, total in enumerate(sums):
-            # Where noise is louder for a while its means are, too.
+            # Where noise has a higher variance for a while its means are, too.
             spread = (_window_sums(white[k] ** 2, length) - total**2) / (length - 1)
             p = f.sf(total**2 / (least * np.maximum(spread, 1.0)), 1, max(count - 1, 1))
             for j in np.flatnonzero((p < limit) & (np.abs(local[k]) > SHIFTED * noise)):

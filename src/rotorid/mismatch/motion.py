@@ -165,6 +165,10 @@ def rates_from_attitude(quaternion: np.ndarray, derivative_of: np.ndarray) -> np
     )
 
 
+HIGHEST_CUTOFF_HZ = 20.0
+"""Cutoff of an analysis where the sensors' rates allow it."""
+
+
 def analysis_rate_hz(runs: tuple[Run, ...], vehicle: Vehicle, highest_cutoff_hz: float) -> tuple[float, float]:
     """Rate of the common grid and cutoff of the analysis, Hz, for all runs of a set."""
     rates, cutoffs = [], []

@@ -1,10 +1,10 @@
-"""When a payload is on board, where it is taken up or dropped in flight.
+"""When a payload is on board, where it is picked up or dropped in flight.
 
 Added mass is seen in every half second by itself: by it the thrust exceeds what the accelerometer accounts for, and
 beside the centre it turns the vehicle. Where these loads are two plateaus with a sudden change between them in the
-midst of a run, the higher one is a payload that is carried for so long. What drifts is none (a battery, ice), and what
+midst of a run, the higher one is a payload on board for so long. What drifts is none (a battery, ice), and what
 differs between whole runs alone may be anything (other propellers, denser air). As for a gust, the instants are found
-in held-out runs too; what is carried is learnt from the others.
+in held-out runs too; what is on board is learnt from the others.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ MOST_DRIFT = 0.2
 EDGE_S = 1.5
 """Distance from the border of two blocks within which the instant is looked for."""
 Windows = tuple[tuple[float, float], ...]
-"""(start_s, stop_s) of what is carried in a stretch, without end where it is on board from or to its end."""
+"""(start_s, stop_s) of what is on board in a stretch, without end where it is on board from or to its end."""
 
 
 def carried_windows(model: WrenchModel) -> list[Windows]:
-    """When a payload seems to be on board in every stretch; empty where none is taken up or dropped in one's midst."""
+    """When a payload seems to be on board in every stretch; empty where none is picked up or dropped in one's midst."""
     if not loads(model) or not np.isfinite(model.rows[0].y[:, SEEN_IN[0][0]]).all():
         return []
     left, columns = unexplained_loads(model)
@@ -164,12 +164,12 @@ def laden(segments: Sequence[Segment], windows: Sequence[Windows]) -> list[Segme
 
 
 def changes(segments: Sequence[Segment]) -> int:
-    """How often a payload is taken up or dropped inside a segment."""
+    """How often a payload is picked up or dropped inside a segment."""
     return sum(int(np.abs(np.diff(s.motion.carried)).sum()) for s in segments)
 
 
 def on_board(segments: Sequence[Segment]) -> tuple[tuple[str, float, float], ...]:
-    """(run, start_s, stop_s) of a payload as segments say it; empty where they say nothing (carried throughout)."""
+    """(run, start_s, stop_s) of a payload as segments say it; empty where they say nothing (on board throughout)."""
     found = []
     for s in segments:
         if s.motion.carried is not None:

@@ -180,8 +180,6 @@ class Regression:
     """Run number of each block."""
     training: np.ndarray
     """Mask of the blocks to fit."""
-    held_out: np.ndarray
-    """Mask of the blocks held out (some blocks between the two may be in neither)."""
     precision: np.ndarray
     """Prior precision of every column, (K,)."""
     bias_gram: np.ndarray
@@ -898,7 +896,6 @@ def build(
         square,
         np.array(runs),
         fitted,
-        np.array([t is False for t in training]),
         precision,
         bias_gram,
         bias_cross,

@@ -278,7 +278,7 @@ class Search:
     def values_alone(self, selection: Selection) -> Regression | None:
         """The regression with more room for believed values, where those alone explain as much as a selection does.
 
-        A value that is off by many times its trust is held back in the search, and something else takes up the rest.
+        A value that is off by many times its trust is held back in the search, and something else absorbs the rest.
         """
         reg, fit = self.regression, selection.fit
         limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
@@ -412,7 +412,7 @@ class Search:
     def imitates_values(self, active: list[str]) -> str | None:
         """The least significant term of those that are not significant once believed values are free.
 
-        The search holds values by their trust. Where one is off by many times that, an effect may take up the rest: a
+        The search holds values by their trust. Where one is off by many times that, an effect may absorb the rest: a
         thrust curve stands for a wrong mass or arm.
         """
         values = {t.key: VALUE_LIMITS[1] for t in self.regression.terms if t.kind == "value"}
@@ -489,7 +489,7 @@ class Search:
         return None
 
     def alternatives(self, key: str, active: list[str]) -> list[str]:
-        """Ids that could stand in for a term: with one of them in its place the term is no longer needed."""
+        """Ids that are collinear with a term: with one of them in its place the term is no longer needed."""
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
         base = self.without(key, active)

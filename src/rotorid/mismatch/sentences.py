@@ -50,7 +50,7 @@ SizeWords = Literal["both", "share", "metres", ""]
 
 
 @dataclass(frozen=True)
-class Told:
+class Contents:
     """What the words are made from."""
 
     analysis: Analysis
@@ -80,8 +80,8 @@ def first_words(text: str, most: int = MOST_WORDS) -> str:
     return f"{short}." if text.endswith(".") else short
 
 
-def headline(told: Told) -> str:
-    """What a pilot is told in at most MOST_WORDS words: where and how much, what was left out, how much better."""
+def headline(told: Contents) -> str:
+    """What a pilot reads in at most MOST_WORDS words: where and how much, what was left out, how much better."""
     analysis = told.analysis
     if told.word == "not_judged":
         first = next(d for d in analysis.doubts if d.stops)
@@ -132,7 +132,7 @@ def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) ->
     return None if before is None else channel_size(analysis, main, before, "before")
 
 
-def _still_off(told: Told, main: str, metres: bool = True) -> str:
+def _still_off(told: Contents, main: str, metres: bool = True) -> str:
     """The channel that stays off most with what was found, as a clause, with or without the metres that it leads off.
 
     Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
@@ -151,7 +151,7 @@ def _still_off(told: Told, main: str, metres: bool = True) -> str:
     return f"; the {channel_words(most)} stays {off} off ({size_words(size, 'both' if metres else 'share')})"
 
 
-def details(told: Told) -> list[str]:
+def details(told: Contents) -> list[str]:
     """What the sentence has no room for: each effect with its numbers and share, values, what is left, what is run
     forward."""
     analysis, out = told.analysis, []
@@ -188,7 +188,7 @@ def _not_found(limits: Sequence[UpperLimit]) -> str:
     return f"Not found: {listed(named)}."
 
 
-def _causes(told: Told) -> str:
+def _causes(told: Contents) -> str:
     """Effects and values that carry nine tenths of the error, in a clause."""
     analysis = told.analysis
     stated = [f for f in one_per_class(with_status(analysis, *CLAIMED)) if not _concerns_the_recording(f)]
@@ -212,7 +212,7 @@ def _causes(told: Told) -> str:
 
 
 def _put_right(stated: Sequence[Finding]) -> str:
-    """Faults of the recording, put right before any physics was looked at."""
+    """Faults of the recording, corrected before any physics was looked at."""
     texts = [capital(f.sentence.rstrip(".")) for f in stated]
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
 
@@ -285,7 +285,7 @@ def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
 
 
 def _concerns_the_recording(finding: Finding) -> bool:
-    """Whether a finding is a fault of the recording itself, put right before any physics was looked at."""
+    """Whether a finding is a fault of the recording itself, corrected before any physics was looked at."""
     return finding.form is None and not finding.equation and bool(finding.sentence)
 
 
@@ -418,7 +418,7 @@ def _better(main: str, channels: Mapping[str, Channel], put_right: Sequence[str]
             f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
             f"{number(errors.after)} {channel.unit} after."
         )
-    also = f", and what was believed put right within its trust ({listed(list(put_right))})," if put_right else ""
+    also = f", and believed values corrected within their trust ({listed(list(put_right))})," if put_right else ""
     return (
         f"With this{also} the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
         f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."
@@ -430,7 +430,7 @@ def _said_of(channel: Channel) -> str:
     return "on flights not used for fitting" if held else "on the flight it was fitted to"
 
 
-def _rest(told: Told) -> str:
+def _rest(told: Contents) -> str:
     analysis = told.analysis
     depends = [regime_words(v)[0] for v in analysis.unexplained_depends_on]
     if with_status(analysis, *CLAIMED) or analysis.wrong_values:
@@ -450,7 +450,7 @@ def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
         f"(noise {number(channels[c].noise_floor)})"
         for c in chosen
     ]
-    moved = f", values put right within their trust ({listed(list(analysis.put_right))})" if analysis.put_right else ""
+    moved = f", values corrected within their trust ({listed(list(analysis.put_right))})" if analysis.put_right else ""
     where = _said_of(channels[chosen[0]])
     text = f"The believed vehicle describes these recordings{moved}: {where}, {listed(errors)}."
     return text if len(text.split()) <= MOST_WORDS else text.replace(moved, "")

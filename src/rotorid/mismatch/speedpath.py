@@ -30,9 +30,9 @@ SMALLEST_SIZE = 0.15
 LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
 LIFT_SD = 0.02
-"""One-sigma of mean thrust over mean weight with the values as fitted: who flies is carried by his rotors. Whitened
-residuals of a hover say little of their mean, and a curve of too little thrust would explain moments that do not
-respond. Two percent are an accelerometer's scale."""
+"""One-sigma of mean thrust over mean weight with the values as fitted: a vehicle in flight is supported by its rotors.
+Whitened residuals of a hover say little of their mean, and a curve of too little thrust would explain moments that do
+not respond. Two percent are an accelerometer's scale."""
 PLAINLY_LESS = 0.98
 """Share of the squares that commands which hold leave, below which commands are smooth: a lag imitates either."""
 LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)

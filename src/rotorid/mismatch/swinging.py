@@ -53,7 +53,7 @@ class Cable:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class HangingStretch:
     """What a payload hung by, and the sideways force that other effects leave."""
 
     hanging: np.ndarray
@@ -68,10 +68,10 @@ class Stretch:
     def squares(self) -> float:
         return float((self.force**2).sum())
 
-    def part(self, start_s: float, stop_s: float) -> Stretch:
+    def part(self, start_s: float, stop_s: float) -> HangingStretch:
         """What lies from `start_s` to before `stop_s`."""
         inside, seen = ((t >= start_s) & (t < stop_s) for t in (self.time_s, self.at_s))
-        return Stretch(self.hanging[inside], self.time_s[inside], self.at_s[seen], self.force[seen])
+        return HangingStretch(self.hanging[inside], self.time_s[inside], self.at_s[seen], self.force[seen])
 
     def pull(self, cable: Cable, state: np.ndarray) -> np.ndarray:
         """Sideways pull of a kilogram that sets out from a state (6,) on this cable, (m, 2), N."""
@@ -152,7 +152,7 @@ def price(segments: Sequence[Segment]) -> float:
     return COST_PER_EFFECT + COST_PER_PARAMETER * UNKNOWNS_OF_A_STATE * sum(len(s.motion.hung) for s in segments)
 
 
-def stretches_of(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows]) -> list[Stretch]:
+def stretches_of(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows]) -> list[HangingStretch]:
     """Every stretch with what effects that do not swing leave of its sideways force; empty where it is not known."""
     terms, fit = model.search.terms, model.selection.fit
     if any(s.motion.rotation is None for s in segments) or not all(np.isfinite(r.y[:, :3]).all() for r in rows):
@@ -168,11 +168,11 @@ def stretches_of(model: WrenchModel, segments: Sequence[Segment], rows: Sequence
         count = len(world) // per
         at_s = r.time_s[: count * per].reshape(count, per).mean(axis=1)
         force = world[: count * per].reshape(count, per, 2).mean(axis=1)
-        out.append(Stretch(hanging_acceleration(s.motion), s.motion.time_s, at_s, force))
+        out.append(HangingStretch(hanging_acceleration(s.motion), s.motion.time_s, at_s, force))
     return out
 
 
-def loudest(stretches: Sequence[Stretch], cable: Cable) -> list[Stretch]:
+def loudest(stretches: Sequence[HangingStretch], cable: Cable) -> list[HangingStretch]:
     """The LOUDEST pieces of stretches with the largest force."""
     pieces = [
         s.part(start, start + cable.piece_s)
@@ -182,13 +182,13 @@ def loudest(stretches: Sequence[Stretch], cable: Cable) -> list[Stretch]:
     return sorted(pieces, key=lambda p: -p.squares)[:LOUDEST]
 
 
-def shows(pieces: Sequence[Stretch], cable: Cable) -> bool:
+def shows(pieces: Sequence[HangingStretch], cable: Cable) -> bool:
     """Whether a swing explains enough of the force of pieces, each by itself."""
     left = sum(swing_in(p, cable, None).left_n2 for p in pieces)
     return bool(pieces) and left <= (1.0 - LEAST_SHARE) * sum(p.squares for p in pieces)
 
 
-def swing_in(stretch: Stretch, cable: Cable, mass_kg: float | None) -> Swing:
+def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> Swing:
     """How a payload hung in a stretch; its mass is free in each piece where it is None.
 
     Each piece starts from where the one before ends and is moved to what explains most of its force.
@@ -209,7 +209,7 @@ def swing_in(stretch: Stretch, cable: Cable, mass_kg: float | None) -> Swing:
     return Swing(np.array(states), np.array(masses), left)
 
 
-def fitted_piece(piece: Stretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
+def fitted_piece(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
     """The state near `state` whose swing explains most of a piece's force; its mass, kg, and the squares left, N2.
 
     One-sigma of the state is a radian, and a radian in 1/ω: what is not excited stays where it was.

@@ -26,7 +26,7 @@ from rotorid.mismatch.consistency import (
 from rotorid.mismatch.delivery.doubts import stopping
 from rotorid.mismatch.findings import Analysis, Finding, Trace, ValueRow, one_per_class, with_status
 from rotorid.mismatch.sentences import (
-    Told,
+    Contents,
     details,
     first_words,
     headline,
@@ -303,7 +303,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     left = share_left(inverse, located)
     shares = analysis.shares
     word = "not_judged" if stopping(analysis) else verdict_word(analysis, locations, left)
-    told = Told(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
+    told = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,
         kind=analysis.recordings.vehicle.kind,

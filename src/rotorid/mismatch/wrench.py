@@ -152,7 +152,7 @@ def block_seconds(rows: list[Rows], rate_hz: float) -> float:
 
 
 def channel_floor(segments: list[Segment], vehicle: Vehicle) -> np.ndarray:
-    """One-sigma per channel (12,) below which nothing is told apart.
+    """One-sigma per channel (12,) below which nothing is distinguished.
 
     Of a force or moment a share (SAME_WRENCH) of how the rotors' own changes: held commands and the steps of an
     integrator are so much off in simulators without any noise.

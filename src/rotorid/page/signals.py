@@ -9,9 +9,9 @@ import numpy as np
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.findings import Analysis, Trace
 from rotorid.mismatch.instrument.setup import averaged
-from rotorid.mismatch.motion import Segment, analysis_rate_hz
+from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
 from rotorid.mismatch.rows import Thinner, at_centre
-from rotorid.mismatch.shares import HIGHEST_CUTOFF_HZ, fitted_part
+from rotorid.mismatch.shares import fitted_part
 
 Pieces = list[tuple[np.ndarray, dict[str, np.ndarray]]]
 """Of each stretch of a run its instants (n,), s, and the channels' values (n,) by name."""

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 SIGNS = {1: (1, -1), 2: (-1, 1), 3: (-1, 1), 4: (1, 1), 5: (1, 1), 6: (1, -1)}
 """Signs of the cells' x and y: those for which the three cells of each ring lie 120 degrees apart about the foot."""
-SENSES_DEG = {1: -30.0, 2: 60.0, 3: 90.0, 4: 0.0, 5: 30.0, 6: -60.0}
-"""Direction across the vehicle's x axis that each cell gives way along, from the factors of table 2.2."""
 
 
 def cell_places_mm(distances_mm: Mapping[str, float]) -> dict[int, tuple[float, float]]:

@@ -176,41 +176,6 @@ def _span(sizes, run: str) -> tuple[float, float]:
     return (start, stop) if stop > start else (start - STRIP_CELL_S / 2, stop + STRIP_CELL_S / 2)
 
 
-def against_regime(
-    values: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
-    noise: float | None,
-    variable: str,
-    label: str,
-    shown: tuple[float, float] | None,
-    bins: int = 10,
-) -> Figure:
-    """Size of half-second stretches against the variable that separates them best; lines: root mean square by bin."""
-    fig, ax = style.figure(2.5)
-    if shown:
-        ax.axvspan(*shown, color=SHADE, lw=0, zorder=0)
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, bins + 1)))
-    for size, name, colour in (
-        (before, "as believed", style.COLOUR["before"]),
-        (after, "improved", style.COLOUR["after"]),
-    ):
-        ax.plot(values, size, ".", color=colour, ms=2.5, alpha=0.3, mew=0, rasterized=True)
-        if len(edges) > 2:
-            which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-            kept = [b for b in range(len(edges) - 1) if np.any(which == b)]
-            centre = [float(values[which == b].mean()) for b in kept]
-            level = [float(np.sqrt(np.mean(size[which == b] ** 2))) for b in kept]
-            ax.plot(centre, level, "o-", color=colour, label=name)
-    if noise:
-        ax.axhline(noise, color=style.GREY, lw=1, ls="--", label="sensors' noise")
-    ax.set_ylim(0, 1.05 * float(np.quantile(np.concatenate([before, after]), 0.995)))
-    ax.set_xlabel(variable)
-    ax.set_ylabel(label)
-    ax.legend(loc="upper left", ncols=3)
-    return fig
-
-
 def gains(labels: Sequence[str], before, refitted, after) -> Figure:
     """Error over noise of every channel: as believed, refitted, improved (each (n,), NaN where unknown)."""
     fig, ax = style.figure(0.75 + 0.2 * len(labels))

@@ -1,4 +1,4 @@
-"""Verdicts on concealed sets: the mismatch stage, told nothing."""
+"""Verdicts on concealed sets: the mismatch stage, which gets no answer."""
 
 from __future__ import annotations
 

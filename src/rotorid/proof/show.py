@@ -55,8 +55,8 @@ def of_releases(summary: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame
 
     `names` has each release's commit by the date that its cases are drawn from.
 
-    `right` counts the sets in which all that is hidden was told and nothing else, with the 95 % interval of their share
-    (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
+    `right` counts the sets in which all that is hidden was named and nothing else, with the 95 % interval of their
+    share (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
     """
     short = {row_prefix(*key): simulator.short for key, simulator in SIMULATORS.items()}
     groups: dict[tuple[str, str], dict[str, pd.Series]] = {}
@@ -118,11 +118,11 @@ PLANTED = {
 """Scores of the planted sets that the report shows, and their columns."""
 
 
-def of_plantings(now: pd.DataFrame, before: pd.DataFrame) -> pd.DataFrame:
+def of_plantings(now: pd.DataFrame) -> pd.DataFrame:
     """What was planted in real flights at the larger size, as text: by flight, and by family of cause.
 
-    `told`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set; `before` is what was told
-    before anything was mended. Below the row of all stand their targets and whether these hold.
+    `told`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set. Below the row of all
+    stand their targets and whether these hold.
     """
     rows = []
     for group, own in now[now["size"] == "large"].groupby("group", sort=False):
@@ -134,14 +134,12 @@ def of_plantings(now: pd.DataFrame, before: pd.DataFrame) -> pd.DataFrame:
             score = own[own["what"] == what].iloc[0]
             share = what in ("told", "size covered")
             row[column] = _of(score) if share else f"{score['value']:.2f}"
-        earlier = before[(before["group"] == group) & (before["what"] == "told") & (before["size"] == "large")]
-        row["before"] = _of(earlier.iloc[0]) if len(earlier) else "–"
         rows.append(row)
     whole = now[(now["size"] == "large") & (now["group"] == "all")].set_index("what")
     for name, cell in (("target", _target_of_planting), ("verdict", lambda score: score["state"])):
-        rows.append({"group": name, "kind": name, "before": ""})
+        rows.append({"group": name, "kind": name})
         rows[-1].update({column: cell(whole.loc[what]) for what, column in PLANTED.items()})
-    out = pd.DataFrame(rows, columns=["group", "kind", *PLANTED.values(), "before"]).fillna("")
+    out = pd.DataFrame(rows, columns=["group", "kind", *PLANTED.values()]).fillna("")
     order = out["kind"].map({"all": 0, "target": 1, "verdict": 2, "flight": 3, "family": 4})
     return out.loc[order.sort_values(kind="stable").index].drop(columns="kind")
 

@@ -1,4 +1,4 @@
-"""Verdicts on sets with rules of the decision left out, told nothing of what is hidden in them."""
+"""Verdicts on sets with rules of the decision left out, without knowing what is hidden in them."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def _lacks_of_flight(has, count: int) -> list[str]:
     elif not speeds:
         lacks.append(
             "No measured rotor speeds: a lag of the motors shows only through the forces, and battery sag, "
-            "throttle curve and thrust curve cannot be told apart well."
+            "throttle curve and thrust curve can hardly be distinguished."
         )
     elif not commands and not throttles:
         lacks.append("No commands: motor lag, throttle curve, saturation and delays of the motors cannot be tested.")
@@ -114,7 +114,7 @@ def _lacks_of_flight(has, count: int) -> list[str]:
             else "Neither body rates nor attitude: moment channels are missing."
         )
     if not attitude:
-        lacks.append("No attitude: wind and forces in world axes cannot be told from forces in body axes.")
+        lacks.append("No attitude: wind and forces in world axes cannot be distinguished from forces in body axes.")
     if not moving:
         lacks.append(
             "No velocity or position: rotor drag, frame drag, translational lift, axial inflow and wind "
@@ -138,7 +138,7 @@ def slow_speeds(recordings: RecordingSet) -> list[str]:
         return []
     return [
         f"Rotor speeds come {rate:.2g} times a second only: a lag or delay of the motors shorter than "
-        f"{1 / rate:.2g} s, and what the vehicle does within that time, cannot be told from them."
+        f"{1 / rate:.2g} s, and what the vehicle does within that time, cannot be distinguished from them."
     ]
 
 
@@ -164,7 +164,7 @@ def contents(recordings: RecordingSet) -> SetCheck:
         if not any(has(name) for name in c.FORCE + c.MOMENT):
             lacks.append("No force or moment: nothing can be compared.")
         if not has(*c.rotor_columns("rotor_speed", vehicle.rotor_count)):
-            lacks.append("No rotor speeds: unequal rotors and a displaced sensor cannot be told apart.")
+            lacks.append("No rotor speeds: unequal rotors and a displaced sensor cannot be distinguished.")
         if not has(*c.MOUNT):
             lacks.append("No roll and pitch of the mount: it is taken as level.")
         if not has(c.BATTERY_VOLTAGE):

@@ -151,7 +151,7 @@ def flown(run: Run, vehicle: Vehicle) -> Flown | None:
     force = _on(run, clock, c.SPECIFIC_FORCE)
     lift = None if force is None else -float(np.nanmedian(force[:, 2]))
     if lift is None or not LIFT_M_S2[0] < lift < LIFT_M_S2[1]:
-        lift = 9.81  # On average a flight is carried; a wrong accelerometer is a doubt of its own.
+        lift = 9.81  # On average thrust balances weight in a flight; a wrong accelerometer is a doubt of its own.
     kinds = ("rotor_speed", "rotor_command", "throttle")
     column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
     return Flown(
@@ -504,7 +504,7 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
         "attitude": c.QUATERNION,
     }
     costs = {
-        "rotor speeds": "a lag of the motors, of some 50 ms, cannot be told from a delay",
+        "rotor speeds": "a lag of the motors, of some 50 ms, cannot be distinguished from a delay",
         "body rates": "moments are known only below a few hertz",
         "accelerometer": "forces are known only below a few hertz",
         "attitude": "wind and drag are known only below a few hertz",

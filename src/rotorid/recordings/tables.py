@@ -1,4 +1,4 @@
-"""Tables of runs, CSV (plain or gzipped) and Parquet, read strictly: what is not a table of numbers is told where."""
+"""Tables of runs, CSV (plain or gzipped) and Parquet, read strictly: the place of what is not a number is reported."""
 
 from __future__ import annotations
 

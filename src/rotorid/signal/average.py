@@ -6,7 +6,7 @@ import numpy as np
 
 
 def mean_and_error(values: np.ndarray, blocks: int | None = None) -> tuple[float, float]:
-    """Mean and its standard error, from the means of consecutive blocks, about √n of them unless told.
+    """Mean and its standard error, from the means of consecutive blocks, about √n of them by default.
 
     Means of blocks are nearly independent where single samples are not: noise that is slow, drift and ringing
     widen the error as they should. Of a periodic signal a block is one period. Fewer than 16 samples are taken

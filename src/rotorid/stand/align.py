@@ -140,7 +140,7 @@ def skew(pairs: list[Pair], thrust_of: Callable) -> tuple[float, float]:
     """Relative skew of the two clocks and its standard error, from the sines' delays over time."""
     lags = [lift_delay(pair, thrust_of, with_skew=True) for pair in pairs if pair.sine]
     if not lags:
-        raise InputError("no experiment with a sine, so the clocks' skew cannot be told from the motors' lag")
+        raise InputError("no experiment with a sine, so the clocks' skew cannot be distinguished from the motors' lag")
     weight = np.array([1 / lag.skew_error**2 for lag in lags])
     return float(weight @ [lag.skew for lag in lags] / weight.sum()), float(weight.sum() ** -0.5)
 

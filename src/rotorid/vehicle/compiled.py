@@ -88,7 +88,7 @@ def _follow(m, v, w, x):
 
 @compiled(error_model="numpy")
 def _implicit(m, v, w, x, addresses, explicit, offsets, values, shift):
-    """Accelerations `x.own` that follow where the effects that read accelerations are told `x.at`."""
+    """Accelerations `x.own` that follow where the effects that read accelerations are given `x.at`."""
     _tell(m, v, w, x)
     for e in range(explicit, addresses.shape[0]):
         call_kernel(addresses[e], m, v, values, offsets[e] + shift, w)
@@ -161,7 +161,7 @@ def _base(m, v, x, pushes, p, j):
 
 @compiled(error_model="numpy")
 def _stepped(x):
-    """Step to better accelerations `x.now`, exact where effects are linear in them; whether those told were right."""
+    """Step to better accelerations `x.now`, exact where effects are linear in them; whether those given were right."""
     turning = linear = 0.0
     most_turning = most_linear = 1.0
     for i in range(3):

@@ -99,7 +99,7 @@ def fly(
 
     `commands` are rotor speeds (steps + 1, k) for all or (n, steps + 1, k), or a controller; `values` (n, p) are the
     kernels' values where they differ between vehicles; `lags_s` time constants up and down, (2,) or (n, 2), 0 follows
-    at once; `following`, shaped as they, what effects are told of the rotors' acceleration then. `reading_errors`
+    at once; `following`, shaped as they, what effects are given of the rotors' acceleration then. `reading_errors`
     (n, steps + 1, 3), rad, are added to the attitude read by the controller, `pushes` (n, steps + 1, 6) to force and
     moment. `wind_m_s` is (3,) or (n, 3), world axes. `first_s` is the time of the first instant, s.
     """

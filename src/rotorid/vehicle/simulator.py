@@ -56,7 +56,7 @@ class Controller(Protocol):
 class Commands:
     """A controller that plays commanded rotor speeds (m, k), rad/s, each held until the next time (m,), s.
 
-    `rotor_acceleration` (m, k), rad/s2, is what effects are told where the motors follow at once; None for zero.
+    `rotor_acceleration` (m, k), rad/s2, is what effects are given where the motors follow at once; None for zero.
     """
 
     time_s: np.ndarray
@@ -99,7 +99,6 @@ class Noise:
 
     attitude_rad: float = 0.0
     angular_velocity_rad_s: float = 0.0
-    angular_acceleration_rad_s2: float = 0.0
     specific_force_m_s2: float = 0.0
     velocity_m_s: float = 0.0
     position_m: float = 0.0
@@ -310,7 +309,7 @@ class _Flight:
         """The same a step at a time, the controller called at each.
 
         `move(i, state, command, following, push)` gives the accelerations (n, 6) at instant `i` and the state a step
-        later; `following` (n, k), rad/s², is what effects are told of rotors that follow at once.
+        later; `following` (n, k), rad/s², is what effects are given of rotors that follow at once.
         """
         steps, k = len(pushes) - 1, self.vehicle.rotor_count
         state = self._start()
@@ -395,7 +394,7 @@ class _Flight:
         rotation = rotation_from_quaternion(state[:, 3:7])
         out = np.empty_like(state)
         acceleration = self._rotor_acceleration(rotors)
-        # Motors that follow at once hold their speed over a step, whatever the effects are told.
+        # Motors that follow at once hold their speed over a step, whatever the effects are given.
         out[:, 13:] = acceleration if self.motors.time_up_s > 0.0 else 0.0
         around = {}
         if self.dynamics.effects:

@@ -356,7 +356,7 @@ def stand_runs(c: Card, seed: int, tared: bool, level: bool):
         top = rng.uniform(0.65, 0.9)
         command = VEHICLE["top"] * top * np.sqrt(common)[:, None] * (1 + 0.12 * wave * rng.choice([0.0, 1.0]))
         command = command * (1 + 0.08 * rng.uniform(-1, 1, 4))
-        # motors: a lag; where it is not what is hidden, of 20 ms, and only speeds are told
+        # motors: a lag; where it is not what is hidden, of 20 ms, and only speeds are recorded
         real = lag or (0.02 if "command" not in c.columns else 0.0)
         speed = np.stack([sensor.warming(x, real, dt) for x in command.T], axis=1) if real else command
         tilt = TILTS[i]

@@ -1,4 +1,5 @@
-"""Calibration readings that do not match their loads: named with the reason, told in log and result, never left out."""
+"""Calibration readings that do not match their loads: named with the reason, reported in log and result, never left
+out."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""The campaign's bench, from its raw logs: what is found against what the emulators were told."""
+"""The campaign's bench, from its raw logs: what is found against what the emulators were given."""
 
 from pathlib import Path
 

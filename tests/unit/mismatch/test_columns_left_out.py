@@ -16,7 +16,7 @@ from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
 from tests.concealed import build as concealed
 from tests.concealed import cases
-from tests.unit.test_public_sets import MANIFEST, REAL, VEHICLES, needs_data
+from tests.unit.importers.test_public_sets import MANIFEST, REAL, VEHICLES, needs_data
 
 from .flights import recorded, with_table
 

@@ -18,7 +18,7 @@ def channel(before: float, after: float):
     ("before", "after", "wrong_values", "located"),
     [
         (1.6, 1.6, {}, ["moment_x"]),
-        (1.6, 1.0, {}, []),  # put right within what was believed: no mismatch
+        (1.6, 1.0, {}, []),  # corrected within what was believed: no mismatch
         (1.6, 1.0, {"mass_kg": (1.0, 1.1, 1.05, 1.15)}, ["moment_x"]),
         (1.2, 1.2, {}, []),
     ],

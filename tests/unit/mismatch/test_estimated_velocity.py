@@ -1,4 +1,4 @@
-"""A velocity that an autopilot made from its accelerometer is told from one that another sensor measured."""
+"""A velocity that an autopilot made from its accelerometer is distinguished from one that another sensor measured."""
 
 from __future__ import annotations
 

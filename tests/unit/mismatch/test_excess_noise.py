@@ -1,4 +1,4 @@
-"""Noise of the rotors and the gyroscope in the band analysed, told from the balance of their two sides."""
+"""Noise of the rotors and the gyroscope in the band analysed, found by forward and inverse regression."""
 
 from __future__ import annotations
 

@@ -429,7 +429,7 @@ def test_a_line_at_its_own_frequency_is_no_vibration_of_the_rotors(sound):
 
 @pytest.fixture(scope="module")
 def short() -> RecordingSet:
-    """Four runs of nine seconds, each too short to be told by its own blocks of spectra."""
+    """Four runs of nine seconds, each too short to be judged by its own blocks of spectra."""
     return recorded(61, 62, 63, 64, flight={"duration_s": 9.0})
 
 

@@ -1,4 +1,4 @@
-"""A payload that is taken up or dropped in flight."""
+"""A payload that is picked up or dropped in flight."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .flights import COLUMNS, quad, recorded
 PARCEL_KG = 0.05
 DROPPED_S = 12.0
 CARRIED = {"run00": (15.0, 20.0), "run01": (0.0, DROPPED_S), "run02": (30.0, 30.0)}
-"""Most of the time nothing is on board, and in the run that is held out it is taken up and dropped."""
+"""Most of the time nothing is on board, and in the run that is held out it is picked up and dropped."""
 
 
 def with_parcel(recordings):

@@ -87,7 +87,7 @@ def test_the_noise_is_measured_not_believed():
 
 
 def test_each_axis_has_its_own_noise_and_rotors_are_alike():
-    """Rotors shake the roll axis alone: yaw, which hardly turns, is told by the gyroscope's own small noise."""
+    """Rotors shake the roll axis alone: yaw, which hardly turns, is read with the gyroscope's own small noise."""
     rng = np.random.default_rng(5)
 
     def shaken(table):

@@ -1,4 +1,4 @@
-"""The search over candidates, on rows made by hand: what enters, what must not, and what cannot be told apart."""
+"""The search over candidates, on rows made by hand: what enters, what must not, and what cannot be distinguished."""
 
 from __future__ import annotations
 
@@ -188,7 +188,8 @@ def imitated_value(change: float, own: float, copied: float = 0.98) -> Search:
 
 
 def test_a_value_far_beyond_its_trust_is_not_taken_up_by_an_effect_that_looks_like_it():
-    """Held to 0.15 in the search, 0.3 in truth: with a free value the effect that took up the rest says nothing."""
+    """Held to 0.15 in the search, 0.3 in truth: with a free value the effect that absorbed the rest is not
+    identifiable."""
     found = imitated_value(0.3, 0.0).run()
     assert found.active == []
     assert found.not_established["unequal_rotors"].rule == "free_values"

@@ -1,4 +1,4 @@
-"""Slow changes that no column follows: told where no sensor can have made them, measured rotor speeds or not."""
+"""Slow changes that no column follows: reported where no sensor can have made them, measured rotor speeds or not."""
 
 from __future__ import annotations
 

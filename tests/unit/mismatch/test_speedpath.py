@@ -176,7 +176,7 @@ def test_a_curve_at_the_edge_of_what_is_physical_is_no_estimate():
 
 
 def test_a_curve_without_thrust_costs_as_much_as_the_weight_is_sure():
-    """Weight 6.06 N, carried at the commanded 900 and 1100 rad/s: at half the speed a quarter of it is."""
+    """Weight 6.06 N, supported at the commanded 900 and 1100 rad/s: at half the speed a quarter of it is."""
     segment = replace(recorded(2), command=np.repeat([[900.0] * 4, [1100.0] * 4], 200, axis=0))
 
     def residual_of(moving, speed, columns):

@@ -1,4 +1,4 @@
-"""Stands: what lies between throttle and speed, what is not claimed, and what cannot be told."""
+"""Stands: what lies between throttle and speed, what is not claimed, and what is not identifiable."""
 
 import numpy as np
 import pandas as pd

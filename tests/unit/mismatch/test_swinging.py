@@ -5,7 +5,7 @@ import pytest
 
 from rotorid.effects.pendulum import cable_pull, swing
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.swinging import Cable, Stretch, loudest, moved, shows, swing_in
+from rotorid.mismatch.swinging import Cable, HangingStretch, loudest, moved, shows, swing_in
 
 from .flights import recorded
 
@@ -37,7 +37,7 @@ def sideways(hanging, time_s, start, noise_n: float, seed: int):
 def test_the_states_of_a_load_that_swings_far_are_read_piece_by_piece():
     hanging, time_s = shaken(1)
     at_s, force = sideways(hanging, time_s, moved(np.array([0.0, 0, 1, 0, 0, 0]), [0.7, -0.4, 0.5, 0.3], 4.0), 0.05, 2)
-    stretch = Stretch(hanging, time_s, at_s, force)
+    stretch = HangingStretch(hanging, time_s, at_s, force)
     assert np.median(swing_in(stretch, CABLE, None).masses_kg) == pytest.approx(MASS_KG, rel=0.03)
     found = swing_in(stretch, CABLE, MASS_KG)
     assert found.states.shape == (5, 7) and found.left_n2 == pytest.approx(0.05**2 * force.size, rel=0.2)
@@ -50,7 +50,7 @@ def test_noise_swings_not():
     hanging, time_s = shaken(3)
     at_s = time_s[10::20]
     force = 0.2 * np.random.default_rng(4).standard_normal((len(at_s), 2))
-    pieces = loudest([Stretch(hanging, time_s, at_s, force)], CABLE)
+    pieces = loudest([HangingStretch(hanging, time_s, at_s, force)], CABLE)
     assert len(pieces) == 3 and not shows(pieces, CABLE)
     assert not shows([], CABLE)
 
@@ -58,7 +58,7 @@ def test_noise_swings_not():
 def test_a_piece_goes_on_where_the_one_before_ends():
     hanging, time_s = shaken(5, 4.0)
     start = moved(np.array([0.0, 0, 1, 0, 0, 0]), [0.3, 0.2, 0.1, -0.2], 4.0)
-    middle = Stretch(hanging[:401], time_s[:401], time_s[:0], np.zeros((0, 2))).end(CABLE, start)
+    middle = HangingStretch(hanging[:401], time_s[:401], time_s[:0], np.zeros((0, 2))).end(CABLE, start)
     whole, _ = swing(hanging, time_s, LENGTH_M, RATIO, G, np.array([[0.0, *start]]))
     rest, _ = swing(hanging[400:], time_s[400:], LENGTH_M, RATIO, G, np.array([[time_s[400], *middle]]))
     assert np.abs(rest - whole[400:]).max() < 0.02

@@ -55,7 +55,7 @@ def test_a_wrong_inertia_is_told_though_the_rotors_make_up_for_a_slow_moment(siz
 
 
 def test_the_told_inertia_is_the_one_delivered():
-    """The whole balance, which the slow moment biases, would deliver another one beside the told number."""
+    """The whole balance, which the slow moment biases, would deliver another one next to the stated number."""
     made = found(0.03)
     model, (change, sd) = made.model, made.values["inertia_xx"]
     fit, moved = settled(model, made.values, model.selection.active)

@@ -1,4 +1,4 @@
-"""Every form of the catalogue that the search may choose can be told: parameters, gain and channels."""
+"""Every form of the catalogue that the search may choose can be reported: parameters, gain and channels."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ import pytest
 
 from rotorid.proof import delivered
 from rotorid.proof.delivered import COLUMNS, not_flown_by, refused_by, table
-from tests.unit.test_exports import FLAT, six_rotors, with_effects
+from tests.unit.vehicle.test_exports import FLAT, six_rotors, with_effects
 
 
 def test_what_a_tool_does_not_take_is_told_from_what_it_does_not_fly():

@@ -320,7 +320,7 @@ def test_of_mass_and_thrust_only_their_ratio_is_held_against_the_verdict() -> No
     assert score.score_truth(strong, verdict(), truth)["told"] == score.IN_CLASS
     wrong = verdict(mass_kg=(1.2, 1.44, 0.02))
     assert score.score_truth(wrong, verdict(), truth)["told"] == score.NOT_TOLD
-    # What was planted puts right what the untouched flight calls wrong: silence is the answer.
+    # What was planted corrects what the untouched flight calls wrong: silence is the answer.
     assert score.score_truth(verdict(), verdict(mass_kg=(1.0, 1.2, 0.02)), truth)["told"] == score.ALONE
     little = verdict(mass_kg=(1.2, 1.05, 0.02))
     assert score.score_truth(little, verdict(), truth)["covered"] is False

@@ -19,7 +19,7 @@ class TensilePhysics:
     at 0.2 % plastic strain is the yield strength; it breaks a little after the ultimate strength."""
 
     def __init__(self, plastic: PlasticTruth, scale: float, slack_mm: float, rng: np.random.Generator) -> None:
-        """`scale` multiplies all strengths and the modulus; `slack_mm` is taken up before the force rises."""
+        """`scale` multiplies all strengths and the modulus; the crosshead moves `slack_mm` before the force rises."""
         self._rng = rng
         stress = np.linspace(0, plastic.ultimate_pa * scale, 2000)
         limit = ELASTIC_SHARE * plastic.yield_pa * scale

@@ -45,7 +45,7 @@ class BenchTruth(_Truth):
     resonance_hz: float = 40.0
     damping: float = 0.05
     misalignment_rad: list[float] = [0.0, 0.0, 0.0]  # spread of the load's direction, loads along x, y, z
-    pulley_loss: float = 0.0  # loads along x and y hang over a pulley that takes up to this share of them
+    pulley_loss: float = 0.0  # loads along x and y hang over a pulley that removes at most this share of them
 
 
 class BatteryTruth(_Truth):

@@ -87,7 +87,7 @@ class WireHalf:
         return self.due_s is not None or bool(self._out) or self.unplugged
 
     def falls_due(self, time_s: float) -> bool:
-        """Whether a sample is to be taken up to this time; a device without a cable has no power."""
+        """Whether a sample is due until this time; a device without a cable has no power."""
         return self.due_s is not None and self.due_s <= time_s and not self.unplugged
 
     # ---- time ----------------------------------------------------------------------------------------
@@ -149,7 +149,7 @@ class WireHalf:
         status, text = OK, ""
         try:
             if letter in self._faults.refuse:
-                raise CommandRefused("this device was told to refuse it")
+                raise CommandRefused("this device is set to refuse it")
             if letter == KEEP and letter in self.device.instrument.commands:
                 self._watchdog_s = unpack_keep(arguments)
             elif self.device.needs_watchdog and self._watchdog_s is None and self.device.moves(letter, arguments):

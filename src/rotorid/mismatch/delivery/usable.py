@@ -1,6 +1,6 @@
 """Whether a vehicle is a body that hovers and flies: what the fit of its values alone does not ask.
 
-A value can leave every channel better and still be that of no vehicle: a thrust coefficient that takes up a drag may
+A value can leave every channel better and still be that of no vehicle: a thrust coefficient that absorbs a drag may
 leave a maximum thrust below the weight.
 """
 

@@ -267,7 +267,7 @@ class Problem:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
         for _, form in chain:
-            # Rotors do not turn before they are told: a wrench that is early beyond a sample is on another clock.
+            # Rotors do not turn before their command: a wrench that is early beyond a sample is on another clock.
             delays = form.stage == DELAY and not self.measured
             early = -SUB_SAMPLE / self.setup.instrument.rate_hz if delays else -np.inf
             low += [max(p.low, early) for p in form.parameters]

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch import rules
-from rotorid.mismatch.decide import Told, estimates, findings_of
+from rotorid.mismatch.decide import TermReport, estimates, findings_of
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.instrument.approximate import LeftOfForm
 from rotorid.mismatch.instrument.model import (
@@ -43,11 +43,11 @@ def reading_findings(model: ReadingModel, leftovers: tuple[LeftOfForm, ...] = ()
     alternative to it.
     """
 
-    def told(key: str) -> Told:
+    def told(key: str) -> TermReport:
         channels = tuple(CHANNELS[c] for c in main_channels(model, key))
         either = [c.effect for c in leftovers if c.stronger == key and c.either]
         alternatives = [*alternatives_of(model, key), *either]
-        return Told(active_values(model, key), parameters_of(model, key), channels, alternatives)
+        return TermReport(active_values(model, key), parameters_of(model, key), channels, alternatives)
 
     return findings_of(model.search, model.selection, told)
 
@@ -105,5 +105,5 @@ def wider(parameters: tuple[Estimate, ...], doubt: np.ndarray) -> tuple[Estimate
 
 
 def alternatives_of(model: ReadingModel, key: str) -> list[str]:
-    """Ids that could stand in for a term on these data."""
+    """Ids that are collinear with a term on these data."""
     return model.search.alternatives(key, model.selection.active)

@@ -49,7 +49,7 @@ ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
 MOST_AT_ONCE = 6
-"""More causes than this at once are not told apart by six channels: what they leave is stated as unexplained."""
+"""More causes than this at once are not distinguished by six channels: what they leave is stated as unexplained."""
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
@@ -83,7 +83,7 @@ class ReadingSearch(Search):
         return None
 
     def alternatives(self, key, active):
-        """Of what could stand in for a term by all runs together, what is worth about as much where it was not fitted.
+        """Of what is collinear with a term over all runs together, what is worth about as much where it was not fitted.
 
         A stand's runs differ in their tilt: one of them may tell a weight's moment from a tare. What has numbers of its
         own for every run says nothing of one that was left out, and what explains as much by more numbers is no rival.
@@ -134,7 +134,7 @@ class ReadingModel:
         return [*self.regression.keys_of("nuisance"), *keys]
 
     def values_beside(self, active: Sequence[str]) -> list[str]:
-        """Keys of the believed values that no form at work takes up."""
+        """Keys of the believed values that no form at work absorbs."""
         kept = kept_values(self.search, active)
         return [k for k in self.regression.keys_of("value") if k in kept]
 
@@ -148,7 +148,7 @@ class ReadingModel:
 
 
 def kept_values(search: Search, active: Sequence[str]) -> list[str]:
-    """Terms that stand beside effects always, less believed values that a form at work takes up."""
+    """Terms that stand beside effects always, less believed values that a form at work absorbs."""
     taken = {v for k in active for v in search.terms[k].form.takes_up}
     return [k for k in search.always if k not in taken]
 

@@ -19,7 +19,7 @@ LEAST_EXPLAINED = 0.4
 """Share of an axis that the other sensor must explain before anything is said of it."""
 LEAST_T = 8.0
 DOMINANCE = 3.0
-"""The largest entry of a row over the next, for an axis to be told."""
+"""The largest entry of a row over the next, for an axis to be identified."""
 LEAST_GRAVITY = 0.6
 """Share of gravity that the mean specific force must show along an axis for its sign to count."""
 
@@ -184,7 +184,7 @@ def find(recordings: RecordingSet) -> Result:
 
 
 def _gravity(recordings: RecordingSet) -> Result:
-    """The accelerometer's z axis by gravity: a flying vehicle is carried by thrust along −z."""
+    """The accelerometer's z axis by gravity: a flying vehicle is supported by thrust along −z."""
     mean = mean_gravity(signals_of(recordings), recordings.vehicle.gravity_m_s2)
     if mean is None or not np.isfinite(mean).all():
         return Result(recordings)

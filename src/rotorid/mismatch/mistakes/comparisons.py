@@ -7,12 +7,10 @@ believed vehicle.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rotorid.mismatch.mistakes import lagged
-from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit, Signal
+from rotorid.mismatch.mistakes.lagged import Blocks, Signal
 from rotorid.mismatch.mistakes.signals import Signals
 from rotorid.mismatch.motion import rates_from_attitude
 from rotorid.recordings import Vehicle
@@ -23,16 +21,6 @@ MOMENT_BAND_HZ = (2.0, 25.0)
 FORCE_BAND_HZ = (1.5, 15.0)
 NYQUIST_SHARE = 0.35
 """Highest frequency used, as a share of the slower sensor's own rate."""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """`later` (Y) against `earlier` (X): names of the two sensors and their spectra."""
-
-    later: str
-    earlier: str
-    blocks: Blocks | None
-    fit: LaggedFit | None
 
 
 def speeds_of(signals: Signals) -> str | None:

@@ -32,7 +32,7 @@ LONGEST_LAG_S = 0.15
 MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
 UNDECIDED = 12.0
-"""Motor lags within this log-likelihood are not told apart."""
+"""Motor lags within this log-likelihood are not distinguished."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ LEAST_ADVANTAGE = 1.5
 LEAST_STEP = 0.6
 P_LIMIT = 1e-6
 TIED_LIKELIHOOD, TIED_SHARE = 12.0, 0.02
-"""Layouts within this log-likelihood, or this share of what is explained, are not told apart."""
+"""Layouts within this log-likelihood, or this share of what is explained, are not distinguished."""
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ def _turned_gyroscope(
             best = (changes, Turn(source, signs))
     if best is None or best[0] == cost and best[1].source == (0, 1, 2):
         return None
-    note = "No attitude is recorded: the gyroscope's axes were told from the believed rotors' moments."
+    note = "No attitude is recorded: the gyroscope's axes were identified from the believed rotors' moments."
     finding = axis_finding(recordings, "gyroscope", best[1], p_value)
     if best[0] == cost:
         words = "; or else rotors are in another order than vehicle.yaml has them, which nothing recorded tells apart."

@@ -1,4 +1,4 @@
-"""Columns in the wrong unit, told from size alone: gravity, weight, and what a throttle or a battery can be."""
+"""Columns in the wrong unit, recognised from size alone: gravity, weight, and what a throttle or a battery can be."""
 
 from __future__ import annotations
 

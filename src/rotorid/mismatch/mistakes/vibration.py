@@ -180,7 +180,7 @@ def demodulated(
 ) -> tuple[np.ndarray, ...]:
     """Squared amplitude at the order, beside it, number of rotors that share the line, and noise: (windows, rotors).
 
-    NaN where it cannot be told. Of no more than `most` windows spread over the run, if stated.
+    NaN where it is not identifiable. Of no more than `most` windows spread over the run, if stated.
     """
     count = len(s.time_s) // length
     rows = np.unique(np.linspace(0, count - 1, min(count, most or count)).astype(int))

@@ -62,7 +62,7 @@ def collect(
     how
         Who chooses the effects while it judges: another one's evidence is other evidence, and `engine` says so.
     progress
-        Told one line a set judged.
+        Called with one line a set judged.
     """
     stems = []
     for item in items:

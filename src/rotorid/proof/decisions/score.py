@@ -1,6 +1,6 @@
 """A decision on one set against what is true of it, in counts that can be added up over sets.
 
-What counts as named, false, told, new or lost is what the proof says (`rotorid.proof.score`) and the plantings
+What counts as named, false, new or lost is what the proof says (`rotorid.proof.score`) and the plantings
 (`rotorid.proof.plantings.score`).
 """
 

@@ -13,7 +13,8 @@ POSE = ("position", "velocity", "attitude")
 COMMANDED = ("commands", "throttle")
 COMMANDS = frozenset(COMMANDED)
 LEAST_DRIFT_PERIODS = 4.0
-"""A clock that is off by less than this many samples at a run's end is not told from a jitter of its stamps."""
+"""A clock that is off by less than this many samples at a run's end is not distinguished from a jitter of its
+stamps."""
 
 
 def _period_s(recordings: RecordingSet) -> float:
@@ -74,7 +75,7 @@ def skewed(*sensors: str):
         drift = share * longest / _period_s(recordings)
         unseen = "" if drift > LEAST_DRIFT_PERIODS else f"the clock is off by {drift:.1f} samples at a run's end"
         sizes = tuple((Size("clock_skew", symbol, skew, added=False),) for symbol in ("skew", "e"))
-        # A clock that gains was off at the start of the run: a delay is told beside it, and rightly.
+        # A clock that gains was off at the start of the run: a delay is reported as well, and rightly.
         return out, named("clock_skew", fair=("delay",) if skew < 0 else (), sizes=sizes, unseen=unseen)
 
     return plant

@@ -10,6 +10,7 @@ import pandas as pd
 
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
+from rotorid.signal import kernels
 
 SENSORS = {
     "gyroscope": c.ANGULAR_VELOCITY,
@@ -103,3 +104,18 @@ def direction(rng: np.random.Generator, dimensions: int) -> np.ndarray:
         vector /= np.linalg.norm(vector)
         if np.abs(vector).min() > 0.25:
             return vector
+
+
+SMOOTH_CUTOFF_HZ = 40.0
+"""Cutoff of the low-pass of `smooth`, where the recording's rate allows it."""
+
+
+def smooth(run: Run, values: np.ndarray, slope: bool = False) -> np.ndarray:
+    """Columns (n, m) low-passed, or the derivative of that (1/s); the ends, which the filter does not reach, held."""
+    t = run.time_s
+    rate_hz = 1.0 / float(np.median(np.diff(t)))
+    cutoff = min(SMOOTH_CUTOFF_HZ, 0.2 * rate_hz)
+    kernel = (kernels.derivative if slope else kernels.low_pass)(rate_hz, cutoff)
+    half = kernels.half_length(rate_hz, cutoff)
+    filled = np.stack([np.interp(t, t[good := np.isfinite(v)], v[good]) for v in values.T], axis=1)
+    return np.pad(kernels.apply(kernel, filled), ((half, half), (0, 0)), mode="edge")

@@ -9,26 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.proof.plantings.columns import command_of, dense, has, names_of, of_sensor
+from rotorid.proof.plantings.columns import command_of, dense, has, names_of, of_sensor, smooth
 from rotorid.proof.plantings.kinds import Kind, Size, both, named
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.signal import kernels
 
-COMMAND_CUTOFF_HZ = 40.0
 CHAIN = frozenset({"motor_lag", "delay", "throttle_curve", "battery_sag", "command_saturation"})
 TOUCHES = frozenset({"commands", "throttle"})
-
-
-def smooth(run: Run, values: np.ndarray, slope: bool = False) -> np.ndarray:
-    """Columns (n, m) low-passed, or the derivative of that (1/s); the ends, which the filter does not reach, held."""
-    t = run.time_s
-    rate_hz = 1.0 / float(np.median(np.diff(t)))
-    cutoff = min(COMMAND_CUTOFF_HZ, 0.2 * rate_hz)
-    kernel = (kernels.derivative if slope else kernels.low_pass)(rate_hz, cutoff)
-    half = kernels.half_length(rate_hz, cutoff)
-    filled = np.stack([np.interp(t, t[good := np.isfinite(v)], v[good]) for v in values.T], axis=1)
-    return np.pad(kernels.apply(kernel, filled), ((half, half), (0, 0)), mode="edge")
 
 
 def commanded(recordings: RecordingSet) -> tuple[RecordingSet, str]:

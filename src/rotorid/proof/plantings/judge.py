@@ -58,7 +58,7 @@ def judge_plantings(
     memory
         Folder that remembers results by code, so that a batch that was stopped, or is cut anew, judges nothing twice.
     progress
-        Told one line a set.
+        Called with one line a set.
     """
     out.mkdir(parents=True, exist_ok=True)
     recordings = cut(folder, plantings[0].flight)

@@ -44,10 +44,10 @@ class Truth:
     fair: frozenset[str]
     """Further names that no flight of this kind tells from it: a class of these and `names` is a fair answer."""
     sizes: tuple[tuple[Size, ...], ...] = ()
-    """True numbers, one tuple for each form in which the effect may be told."""
+    """True numbers, one tuple for each form in which the effect may be reported."""
     ratio: Ratio | None = None
     form_bound: bool = False
-    """Whether an effect told in a form that has none of `sizes` is told with a wrong size."""
+    """Whether an effect reported in a form that has none of `sizes` counts as one of wrong size."""
     unseen: str = ""
     """Why the columns of this flight cannot show it at all; empty where they can."""
     shown_by: frozenset[str] = frozenset()

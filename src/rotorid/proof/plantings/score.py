@@ -1,4 +1,5 @@
-"""A verdict on a planted set against the one on the flight untouched: what was told, its size, what is new or lost."""
+"""A verdict on a planted set against the one on the flight untouched: what was reported, its size, what is new or
+lost."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from rotorid.proof.score import CLAIMED
 
 ALONE, IN_CLASS, NOT_TOLD, UNSEEN = "alone", "in a fair class", "not told", "cannot be seen"
 MOVED = 0.5
-"""A cause that the untouched flight states too is told where the statement moves by this share of what was planted."""
+"""A cause that the untouched flight states too counts as named where the statement moves by this share of what was
+planted."""
 
 
 def classes(verdict: Mapping[str, Any]) -> list[frozenset[str]]:
@@ -54,7 +56,8 @@ def log_ratio(verdict: Mapping[str, Any], ratio: Ratio) -> tuple[float, float]:
 
 
 def score_truth(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth: Truth) -> dict[str, Any]:
-    """How one planted cause was told: `told`, `covered` (None where no size can be compared), and the first size."""
+    """How one planted cause was reported: `told`, `covered` (None where no size can be compared), and the first
+    size."""
     unseen = truth.unseen
     before = set().union(*classes(untouched)) if classes(untouched) else set()
     if not unseen and truth.shown_by and not truth.shown_by & before:

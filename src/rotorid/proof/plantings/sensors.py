@@ -6,17 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.proof.plantings.columns import command_of, dense, direction, has, of_sensor, scaled, signed
+from rotorid.proof.plantings.columns import (
+    command_of,
+    dense,
+    direction,
+    has,
+    of_sensor,
+    scaled,
+    signed,
+    smooth,
+)
 from rotorid.proof.plantings.kinds import Kind, Size, both, named, once
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
-from rotorid.signal import kernels
 
 NO_ATTITUDE = "no attitude: a gyroscope that reads a share off is the same as inertias that are off"
 NO_POSE = "no velocity or attitude: nothing but the accelerometer says what force there is"
 AXES = "xyz"
-RATE_CUTOFF_HZ = 40.0
-"""Low-pass of the body rates whose derivative is the angular acceleration that a lever arm feels."""
 
 
 def _gyroscope_alone(recordings: RecordingSet) -> str:
@@ -71,20 +77,6 @@ def accelerometer_turned(recordings: RecordingSet, angle: float, rng: np.random.
     return of_sensor(recordings, "accelerometer", lambda run, values: values + np.cross(theta, values)), truth
 
 
-def angular_acceleration(run: Run) -> np.ndarray:
-    """Derivative of the low-passed body rates, (n, 3), rad/s²; the ends, which the filter does not reach, are held."""
-    rates = run.array(c.ANGULAR_VELOCITY).copy()
-    t = run.time_s
-    for k in range(3):
-        good = np.isfinite(rates[:, k])
-        rates[:, k] = np.interp(t, t[good], rates[good, k])
-    rate_hz = 1.0 / float(np.median(np.diff(t)))
-    cutoff = min(RATE_CUTOFF_HZ, 0.2 * rate_hz)
-    half = kernels.half_length(rate_hz, cutoff)
-    inside = kernels.apply(kernels.derivative(rate_hz, cutoff), rates)
-    return np.pad(inside, ((half, half), (0, 0)), mode="edge")
-
-
 def lever_arm(recordings: RecordingSet, length_m: float, rng: np.random.Generator):
     """a_m = a + dΩ × r + Ω × (Ω × r); `length_m` for a vehicle with arms of 0.1 m, in proportion for others."""
     arm = float(np.abs(recordings.vehicle.rotor_positions_m()[:, :2]).mean())
@@ -92,7 +84,11 @@ def lever_arm(recordings: RecordingSet, length_m: float, rng: np.random.Generato
 
     def change(run, values):
         rates = run.array(c.ANGULAR_VELOCITY)
-        return values + np.cross(angular_acceleration(run), r) + np.cross(rates, np.cross(rates, r))
+        return (
+            values
+            + np.cross(smooth(run, run.array(c.ANGULAR_VELOCITY), slope=True), r)
+            + np.cross(rates, np.cross(rates, r))
+        )
 
     truth = named("imu_lever_arm", sizes=_vector("imu_lever_arm", "r", r), form_bound=True)
     return of_sensor(recordings, "accelerometer", change), truth

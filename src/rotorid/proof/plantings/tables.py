@@ -93,7 +93,7 @@ def state(value: float | None, low: float, high: float, at_least: float | None, 
 
 
 def summary(rows: pd.DataFrame, code: str) -> pd.DataFrame:
-    """Shares told, sizes covered and ids new or lost a set: over all, by family, by kind and by flight.
+    """Shares named, sizes covered and ids new or lost a set: over all, by family, by kind and by flight.
 
     Causes that a flight's columns cannot show are counted apart. `code` is the hash of the code of now: `older_rows` of
     a line were judged by another.

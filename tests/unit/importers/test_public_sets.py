@@ -20,7 +20,7 @@ from rotorid.importers.report import read_report
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MANIFEST = read_manifest(ROOT / "workflow" / "public_data.yaml")
 VEHICLES = ROOT / "workflow" / "vehicles"
 
@@ -249,7 +249,7 @@ def test_rotors_stand_and_spin_where_the_vehicle_file_says(name: str, real) -> N
     x, y, _ = recordings.vehicle.rotor_positions_m().T
     assert (np.sign(np.median(signs["x"], axis=0)) == np.sign(-y)).all()
     assert (np.sign(np.median(signs["y"], axis=0)) == np.sign(x)).all()
-    if name != "neurobem":  # its yaw is told by the speeds' derivatives only
+    if name != "neurobem":  # its yaw is known by the speeds' derivatives only
         assert (np.sign(np.median(signs["z"], axis=0)) == recordings.vehicle.yaw_signs()).all()
 
 

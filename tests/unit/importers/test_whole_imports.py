@@ -22,7 +22,7 @@ from rotorid.importers.report import read_report
 from rotorid.importers.set_of_logs import SetOfLogs
 from rotorid.recordings import list_sets, read_set, write_set
 from rotorid.recordings.manifest import FILE_NAME
-from tests.unit.wrong_inputs import RUN, VEHICLE, sound, table
+from tests.unit.recordings.wrong_inputs import RUN, VEHICLE, sound, table
 
 MOST_STEPS = 80
 

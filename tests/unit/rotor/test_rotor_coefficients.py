@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
+from rotorid.recordings.lost_speeds import lost_speed
 from rotorid.rotor.coefficients import (
     Points,
     fit_coefficient,
     fit_exponent,
-    lost_speed,
     modified_z_scores,
     pool,
     rest_reading,

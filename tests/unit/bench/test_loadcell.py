@@ -8,7 +8,7 @@ import pytest
 from rotorid.bench.loadcell import check_weights, fit_line, read_calibration_table
 from rotorid.errors import InputError
 
-THESIS = Path(__file__).parents[2] / "raw" / "thesis"
+THESIS = Path(__file__).parents[3] / "raw" / "thesis"
 
 # Least squares on tables 2.6 and 2.7 as printed, from the project's map of the thesis.
 EXPECTED_A1 = [39.7564, 37.2655, 40.8995, 39.9265, 42.4705, 39.4702]

@@ -68,6 +68,31 @@ def test_a_docstring_added_where_there_was_none_does_not(project: Path) -> None:
     assert changed(project, "src/rotorid/fit.py", "(x):\n", '(x):\n    """Say what."""\n') == set()
 
 
+def test_the_list_of_modules_that_others_may_import_does_not(project: Path) -> None:
+    effects = "src/rotorid/effects/__init__.py"
+    assert changed(project, effects, "import pkgutil", 'OPEN = ("drag",)\nimport pkgutil') == set()
+    assert changed(project, effects, "import pkgutil", "CLOSED = ()\nimport pkgutil") == {"choose"}
+
+
+def test_a_second_package_of_the_project_is_followed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rotorid.codehash.PACKAGES", {"rotorid": "src", "second": "beside"})
+    for name, text in {
+        "__init__": "",
+        "one": "from .two import X",
+        "two": "from rotorid.constants import G as X",
+    }.items():
+        path = project / f"beside/second/{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    script = project / "workflow/scripts/second.py"
+    script.write_text("from second.one import X\n")
+    reached = [str(path.relative_to(project)) for path in Code(project).reached_modules(script)]
+    assert [name for name in reached if name.startswith("beside")] == [
+        f"beside/second/{n}.py" for n in ("__init__", "one", "two")
+    ]
+    assert "src/rotorid/constants.py" in reached
+
+
 def test_an_import_inside_a_function_counts(project: Path) -> None:
     assert changed(project, "src/rotorid/plots/style.py", "3", "4") == {"draw"}
 

@@ -11,7 +11,7 @@ import pytest
 from rotorid.errors import InputError
 from rotorid.recordings import read_set
 from rotorid.recordings.sufficient import sufficient
-from tests.unit.wrong_inputs import Wrong, all_wrong, sound
+from tests.unit.recordings.wrong_inputs import Wrong, all_wrong, sound
 
 TABLE = all_wrong()
 MOST_S = 10.0

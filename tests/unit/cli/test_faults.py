@@ -18,7 +18,7 @@ import pytest
 from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
 from rotorid.recordings import columns as c
 
-SOURCE = Path(__file__).parents[2] / "src"
+SOURCE = Path(__file__).parents[3] / "src"
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
 PLAIN = {"PATH": os.environ["PATH"], "HOME": str(Path.home()), "LC_ALL": "C.UTF-8"}
 

@@ -363,7 +363,7 @@ def test_a_pipe_or_a_folder_among_the_metadata_is_passed_over(tmp_path: Path) ->
 
 
 def test_logs_of_the_campaign_are_still_read_whole() -> None:
-    raw = Path(__file__).parents[2] / "raw"
+    raw = Path(__file__).parents[3] / "raw"
     rows = [row for row in read_index(raw) if row["kind"] == "thrust"][:3]
     samples, recordings = read_tables(raw / row["file"] for row in rows)
     assert recordings["complete"].all() and len(samples) == recordings["samples"].sum() > 100

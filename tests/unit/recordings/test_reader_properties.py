@@ -23,7 +23,7 @@ from rotorid.recordings import RecordingSet, Run, Vehicle, read_run, read_set, r
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
 from rotorid.writing import rounded
-from tests.unit.wrong_inputs import RUN, VEHICLE, sound
+from tests.unit.recordings.wrong_inputs import RUN, VEHICLE, sound
 
 LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"
 

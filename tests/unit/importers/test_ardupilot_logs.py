@@ -12,7 +12,7 @@ from rotorid.importers import ardupilot
 from rotorid.importers.in_the_air import off_the_ground
 from rotorid.recordings import columns as c
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 _named = os.environ.get("ROTORID_PUBLIC_DATA")
 LOGS = ((ROOT / _named).resolve() if _named else ROOT / ".." / "shared" / "data") / "logs" / "ardupilot"
 THROTTLES = list(c.rotor_columns("throttle", 4))

@@ -16,7 +16,7 @@ from rotorid.recordings.body import body_of, impossible
 from rotorid.recordings.check import doubts_of
 from rotorid.recordings.doubts import Doubt
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 RPM = 2 * np.pi / 60
 GF = 9.80665e-3
 SPEED = "rotor_speed_1_rad_s"

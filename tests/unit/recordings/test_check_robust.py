@@ -15,7 +15,7 @@ from rotorid.cli import app, console
 from rotorid.recordings import RecordingSet, Run, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.check import check_folder, doubts_of
-from tests.unit.wrong_inputs import RUN, SPEEDS, sound, table
+from tests.unit.recordings.wrong_inputs import RUN, SPEEDS, sound, table
 
 
 def turning(seconds: float = 30.0, seed: int = 0):

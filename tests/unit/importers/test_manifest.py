@@ -6,7 +6,7 @@ from pathlib import Path
 from rotorid.importers import public_sets
 from rotorid.importers.manifest import read_manifest
 
-MANIFEST = Path(__file__).parents[2] / "workflow" / "public_data.yaml"
+MANIFEST = Path(__file__).parents[3] / "workflow" / "public_data.yaml"
 
 
 def test_the_manifest_names_the_sets_that_the_recipes_make() -> None:

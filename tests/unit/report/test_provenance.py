@@ -50,3 +50,20 @@ def test_a_changed_file_marks_the_commit_dirty(tmp_path: Path) -> None:
         f"Made from commit {head[:10]} of {day}, with changes that are not committed. "
         "The code that judges recordings has the hash 0123456 (0123456789ab)."
     )
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
+def test_the_librarys_commit_is_that_of_its_clone_and_not_of_a_project_that_holds_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "rotorid"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    monkeypatch.setattr("rotorid.__file__", str(package / "__init__.py"))
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=t", "-c", "user.email=t@example.org"]
+    subprocess.run([*git, "init", "-q"], check=True)
+    subprocess.run([*git, "commit", "-q", "--allow-empty", "-m", "another project"], check=True)
+    assert provenance.own_commit() == ""
+    subprocess.run([*git, "add", "rotorid"], check=True)
+    subprocess.run([*git, "commit", "-q", "-m", "its clone"], check=True)
+    assert provenance.own_commit() == provenance.commit(tmp_path) != ""

@@ -16,7 +16,7 @@ from rotorid.errors import InputError
 from rotorid.importers.guessing.guess import guess
 from rotorid.importers.mapping import Mapping, read_by_mapping, read_columns
 from rotorid.recordings import read_set
-from tests.unit.wrong_inputs import LINES, RUN, SPEEDS, WIDTH, table
+from tests.unit.recordings.wrong_inputs import LINES, RUN, SPEEDS, WIDTH, table
 
 WORDS = table().assign(angular_velocity_x_rad_s="oops").to_csv(index=False)
 DECIMAL_COMMAS = "\n".join([LINES[0], *(line.replace(".", ",") for line in LINES[1:])]) + "\n"
