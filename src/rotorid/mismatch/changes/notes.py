@@ -40,13 +40,12 @@ def residual_notes(joint: Joint, base: str, new: str) -> list[str]:
 
 
 def regime_notes(first: Mapping[str, float], second: Mapping[str, float], base: str, new: str) -> list[str]:
-    """In what the second set goes farther than the first."""
-    out = []
+    """In what the second set goes farther than the first; one sentence or none."""
+    farther = []
     for name, far in first.items():
         if name in second and second[name] > FARTHER * far > 0:
             words, unit = regime_words(name)
-            out.append(
-                f"{new} reaches a {words} of {number(second[name])} {unit}, {base} {number(far)} {unit}: what is "
-                f"beyond is compared by the forms of the effects alone."
-            )
-    return out
+            farther.append(f"{words} {number(second[name])} {unit} where {base} has {number(far)} {unit}")
+    if not farther:
+        return []
+    return [f"{new} goes farther ({listed(farther)}): what is beyond is compared by the forms of the effects alone."]
