@@ -315,6 +315,7 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
         found = [words(row["found"])] if pd.notna(row["found"]) else []
         found += [f"wrong {'values' if len(wrong) > 1 else 'value'}: {words(', '.join(wrong))}"] if wrong else []
         error = " / ".join("–" if pd.isna(s) else f"{s:.{digits}f}" for s in stages) + f" {unit}"
+        error = "–" if row["word"] == "stopped" else error
         share = row["unexplained_share"]
         expected, confirmed = (
             [] if pd.isna(row[name]) else [words(one) for one in str(row[name]).split("; ")]
@@ -324,7 +325,7 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
             {
                 "study": row["study"],
                 "about": row["about"],
-                "found": "; ".join(found) or "nothing",
+                "found": "the stage stopped" if row["word"] == "stopped" else "; ".join(found) or "nothing",
                 "expected": "; ".join(f"{one}: {'found' if one in confirmed else 'no'}" for one in expected) or "–",
                 "confirmed": len(confirmed) if expected else "",
                 "error": error.replace(" ", "\u00a0"),

@@ -26,6 +26,7 @@ def test_a_wrong_value_is_named_without_its_unit() -> None:
     row = {
         "study": "a",
         "about": "b",
+        "word": "explained",
         "found": "rotor_drag",
         "expected": None,
         "expected_found": None,
@@ -110,13 +111,15 @@ def test_the_figure_of_the_targets_has_every_target() -> None:
 
 
 def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> None:
-    row = {"study": "a", "about": "cut", "found": None, "values": None, "unexplained_share": 1}
+    row = {"study": "a", "about": "cut", "word": "explained", "found": None, "values": None, "unexplained_share": 1}
     row |= {f"force_{stage}": 0.1 for stage in ("before", "refitted", "after")}
     rows = [row | {"expected": "unequal_rotors; com_offset", "expected_found": None}]
     rows += [row | {"expected": "motor_lag", "expected_found": "motor_lag"}, row | {"expected": None}]
     shown = show.of_studies(pd.DataFrame(rows))
     assert shown["expected"].tolist() == ["unequal rotors: no; com offset: no", "motor lag: found", "–"]
     assert shown["confirmed"].tolist() == [0, 1, ""]
+    halted = show.of_studies(pd.DataFrame([rows[0] | {"word": "stopped"}])).iloc[0]
+    assert (halted["found"], halted["error"], halted["confirmed"]) == ("the stage stopped", "–", 0)
 
 
 def test_plantings_are_counted_by_flight_and_family_beside_what_was_told_before():
