@@ -27,6 +27,7 @@ MADE_OF = {
     "simulated": "Simulated.",
     "public": "Real recordings of other laboratories.",
     "thesis": "Real, printed in the thesis.",
+    "stated": "Stated in the thesis.",
     "mixed": "Real and simulated recordings.",
     "campaign_simulated": "Recorded on the instruments, and simulated.",
     "emulated_simulated": "Emulated instruments, and simulated.",

@@ -6,6 +6,7 @@ import hashlib
 import platform
 import re
 import subprocess
+import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -76,6 +77,14 @@ def installed_versions(lock: str) -> dict[str, str]:
         except PackageNotFoundError:  # locked for another platform or Python
             continue
     return found
+
+
+def asked_for(project: str) -> list[str]:
+    """Packages that the text of a pyproject.toml asks for by name, its extras included, in their order there."""
+    table = tomllib.loads(project)["project"]
+    groups = [table.get("dependencies", []), *table.get("optional-dependencies", {}).values()]
+    names = [re.match(r"[A-Za-z0-9._-]+", entry)[0] for group in groups for entry in group]
+    return [name for name in dict.fromkeys(names) if name != table["name"]]
 
 
 def sha256(path: str | Path) -> str:

@@ -50,3 +50,14 @@ def test_a_changed_file_marks_the_commit_dirty(tmp_path: Path) -> None:
         f"Made from commit {head[:10]} of {day}, with changes that are not committed. "
         "The code that judges recordings has the hash 0123456 (0123456789ab)."
     )
+
+
+def test_the_packages_asked_for_are_named_once_and_without_their_bounds() -> None:
+    project = """
+[project]
+name = "own"
+dependencies = ["numpy>=2", "scipy"]
+[project.optional-dependencies]
+all = ["own[logs]", "ros-bags[x]>=0.1,!=0.2", "numpy"]
+"""
+    assert provenance.asked_for(project) == ["numpy", "scipy", "ros-bags"]

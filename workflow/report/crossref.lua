@@ -36,8 +36,11 @@ local function with_number(word, number, inlines)
 end
 
 -- First sentence of a caption, without the words that say what the figure is made of.
+-- What is emulated stays marked, since a list has nothing else that says so.
 local function first_sentence(inlines)
   local out, started, open = pandoc.Inlines({}), false, 0
+  local first = inlines[1]
+  local emulated = first and first.t == "Emph" and pandoc.utils.stringify(first):match("^Emulated")
   for position, inline in ipairs(inlines) do
     if inline.t ~= "RawInline" and not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
       started = true
@@ -50,6 +53,9 @@ local function first_sentence(inlines)
         break
       end
     end
+  end
+  if emulated then
+    out:extend(pandoc.Inlines({ pandoc.Space(), pandoc.Str("(emulated)") }))
   end
   return out
 end

@@ -353,6 +353,31 @@ LEAST_WORSE = 5e-4
 """Growth of an error that its three printed digits may show."""
 
 
+def power_of(value: float) -> int:
+    """The power of ten, a multiple of three, in whose units a small number is written; 0 for others."""
+    return 3 * math.floor(math.log10(abs(value)) / 3) if 0 < abs(value) < 1e-3 else 0
+
+
+def of_effects(effects: pd.DataFrame) -> pd.DataFrame:
+    """Effects of a verdict as text: names with their class and status, each number with its interval in one cell."""
+    rows = []
+    for row in effects.itertuples():
+        known = pd.notna(row.value)
+        power = power_of(row.value) if known else 0
+        value, low, high = (f"{x / 10**power:.3g}" if known else "" for x in (row.value, row.low_95, row.high_95))
+        others = words(row.alternatives)
+        rows.append(
+            {
+                "effect": words(row.effect) + (f" (or: {others})" if others else ""),
+                "status": words(row.status),
+                "symbol": row.symbol if isinstance(row.symbol, str) else "",
+                "value": f"{value} ({low} to {high})" if known else "",
+                "unit": ((f"1e{power} " if power else "") + str(row.unit)) if known else "",
+            }
+        )
+    return pd.DataFrame(rows, columns=["effect", "status", "symbol", "value", "unit"])
+
+
 def of_campaign_sets(sets: pd.DataFrame) -> pd.DataFrame:
     """The campaign's sets as text: verdict, what is at work, and what of it was named, rightly or wrongly."""
     return sets.apply(lambda column: column.map(words)).replace({"right": {"": "–"}, "wrong": {"": "–"}})
@@ -362,7 +387,7 @@ def of_campaign_numbers(numbers: pd.DataFrame) -> pd.DataFrame:
     """A row a set and effect as text: how many numbers are inside, and the one furthest out."""
     rows = []
     for row in numbers.itertuples():
-        power = 3 * math.floor(math.log10(abs(row.found)) / 3) if 0 < abs(row.found) < 1e-3 else 0
+        power = power_of(row.found)
         true, found, low, high = (f"{x / 10**power:.4g}" for x in (row.truth, row.found, row.low_95, row.high_95))
         rows.append(
             {
@@ -391,7 +416,7 @@ def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
     """Coefficients found beside published ones, as text: small ones in units of a power of ten."""
     rows = []
     for row in coefficients.itertuples():
-        power = 3 * math.floor(math.log10(abs(row.found)) / 3) if 0 < abs(row.found) < 1e-3 else 0
+        power = power_of(row.found)
         found, low, high, published = (
             f"{x / 10**power:.3g}" for x in (row.found, row.low_95, row.high_95, row.published)
         )

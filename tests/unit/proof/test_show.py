@@ -165,3 +165,16 @@ def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
         "-510 (-520 to -500)",
         "1e-6 m",
     ]
+
+
+def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
+    effects = pd.DataFrame(
+        [
+            ("rotor_drag", "established", "", "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
+            ("axial_inflow", "suggested", "axial_inflow or frame_drag", None, None, None, None, None),
+        ],
+        columns=["effect", "status", "alternatives", "symbol", "value", "low_95", "high_95", "unit"],
+    )
+    shown = show.of_effects(effects)
+    assert shown.iloc[0].tolist() == ["rotor drag", "established", "k_d", "40.8 (39 to 43.4)", "1e-6 N s2"]
+    assert shown.iloc[1].tolist() == ["axial inflow (or: axial inflow or frame drag)", "suggested", "", "", ""]
