@@ -59,6 +59,16 @@ def commit_date(folder: str | Path) -> str:
     return done.stdout.strip()
 
 
+def stored_with(folder: str | Path, path: str) -> str:
+    """The commit that last changed a file of a checkout, and its day: `09827fa, 2026-11-23`; or `not known`."""
+    command = ["git", "-C", str(folder), "log", "-1", "--format=%h, %cs", "--abbrev=7", "--", path]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return "not known"
+    return done.stdout.strip() or "not known"
+
+
 def in_words(folder: str | Path, judging: str) -> str:
     """Commit, its date and the hash of the code that judges recordings, in one sentence for a title page."""
     made, day = commit(folder), commit_date(folder)

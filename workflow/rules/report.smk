@@ -36,6 +36,9 @@ QUOTED = {
 PRINTED = {
     "targets": rules.chapter_proof.output.rows,
     "plantings": rules.chapter_proof.output.planted,
+    "planned_flights": rules.chapter_proof.output.flights,
+    "proof_real": f"{CONFIG.proof.tables}/real.csv",
+    "proof_coefficients": f"{CONFIG.proof.tables}/coefficients.csv",
     "proof_cases": f"{CONFIG.proof.tables}/cases.csv",
 }
 QUOTED_BY = {

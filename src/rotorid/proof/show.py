@@ -26,6 +26,8 @@ RELEASE_ROW = re.compile(r"(?P<simulator>\w+)_(?P<date>\d{4}-\d\d-\d\d)_(?P<scor
 
 
 NOT_KEPT = "not kept"
+DEVELOPMENT = "development"
+"""In the place of a release's date: the commit that stored the development cases, of which no hash was kept."""
 
 
 def short_code(code: object) -> str:
@@ -34,14 +36,18 @@ def short_code(code: object) -> str:
     return " ".join(part[:7] for part in known) or NOT_KEPT
 
 
-def codes_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
-    """Beginnings of the hashes of the code that judged each stored table's rows, in words."""
+def codes_of(tables: Mapping[str, pd.DataFrame], stored_with: str = "") -> dict[str, str]:
+    """Beginnings of the hashes of the code that judged each stored table's rows, in words.
+
+    Where no hash was kept, `stored_with` is the commit that stored the rows: no later code judged them.
+    """
+    unknown = f"{NOT_KEPT} (of commit {stored_with} or before)" if stored_with else NOT_KEPT
     found = {}
     for name, table in tables.items():
         column = "judged_by" if "judged_by" in table else "code"
         rows = table[column] if column in table else pd.Series([None])
         codes = sorted({short_code(code) for code in rows}, key=lambda code: (code == NOT_KEPT, code))
-        found[name] = ", ".join(codes)
+        found[name] = ", ".join(unknown if code == NOT_KEPT else code for code in codes)
     return found
 
 

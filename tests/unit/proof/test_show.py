@@ -1,5 +1,7 @@
 """The proof's tables as text: wrong values without their units, small coefficients in a power of ten."""
 
+from pathlib import Path
+
 import pandas as pd
 
 from rotorid.plots import proof
@@ -100,6 +102,19 @@ def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
 def test_codes_of_stored_tables() -> None:
     tables = {"a": pd.DataFrame({"judged_by": ["c87a46b88923cd47", None]}), "b": pd.DataFrame({"x": [1]})}
     assert show.codes_of(tables) == {"a": "c87a46b, not kept", "b": "not kept"}
+    assert show.codes_of(tables, "24d4ace")["a"] == "c87a46b, not kept (of commit 24d4ace or before)"
+
+
+def test_every_stored_table_of_the_repository_has_a_code_or_a_commit() -> None:
+    stored = Path(__file__).parents[3] / "docs" / "proof"
+    names = show.commits(pd.read_csv(stored / "releases.csv"))
+    tables = {name: pd.read_csv(stored / f"{name}.csv") for name in ("cases", "confusion", "power", "peers", "real")}
+    codes = show.codes_of(tables, names[show.DEVELOPMENT])
+    assert codes["confusion"] == codes["power"] == codes["peers"] == "not kept (of commit 24d4ace or before)"
+    assert codes["cases"].endswith(codes["power"]) and "not kept" not in codes["real"]
+    drawn = tables["cases"].dropna(subset="released")
+    by_release = pd.read_csv(stored / "releases.csv").set_index("released")["code"]
+    assert (drawn["judged_by"] == drawn["released"].map(by_release)).all()
 
 
 def test_the_figure_of_the_targets_has_every_target() -> None:
