@@ -30,6 +30,8 @@ def main(files: Mapping[str, str], stored: Mapping[str, str], out: Mapping[str, 
     tables = {
         name: first_table(Path(files[name]).read_text(), columns, files[name]) for name, columns in COLUMNS.items()
     }
+    for column in ("found_by", "found"):
+        tables["selection"][column] = tables["selection"][column].str.replace("_", " ")
     for name, table in tables.items():
         table.to_csv(out[name], index=False)
     numbers = tables["mismatch"][["samples", "analysis_s", "memory_mb"]].apply(pd.to_numeric)
