@@ -42,6 +42,7 @@ PRINTED = {
     "proof_cases": f"{CONFIG.proof.tables}/cases.csv",
 }
 QUOTED_BY = {
+    "fem": {"both_meshes": rules.chapter_speed.output.fem},
     "white_box": {"truth": rules.score_campaign.output.state},
     "abstract": QUOTED | PRINTED,
     "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},

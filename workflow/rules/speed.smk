@@ -19,6 +19,7 @@ rule chapter_speed:
         mismatch="benchmarks/mismatch.md",
         rebuild="benchmarks/rebuild.md",
         fleet="benchmarks/fleet.md",
+        fem="benchmarks/fem.md",
     output:
         simulator="results/report/speed/simulator.csv",
         selection="results/report/speed/selection.csv",
@@ -26,6 +27,7 @@ rule chapter_speed:
         mismatch="results/report/speed/mismatch.csv",
         rebuild="results/report/speed/rebuild.csv",
         fleet="results/report/speed/fleet.csv",
+        fem="results/report/speed/fem.csv",
         stored="results/report/speed/stored.json",
         growth=report(
             "results/report/speed/growth.svg",

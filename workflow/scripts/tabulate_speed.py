@@ -22,6 +22,7 @@ COLUMNS = {
     "mismatch": ["recording", "samples", "analysis_s", "per_second", "memory_mb", "found"],
     "rebuild": ["what", "processor", "wall"],
     "fleet": ["what", "amount"],
+    "fem": ["what", "coarse", "full"],
 }
 
 

@@ -170,9 +170,11 @@ def with_target(summary: pd.DataFrame, names: Mapping[str, str] | None = None) -
 
 
 def in_words(what: str, names: Mapping[str, str]) -> str:
-    """What a row is about, a release called by its commit instead of the date that its cases are drawn from."""
+    """What a row is about in few words; a release is called by its commit, not by the date its cases are drawn from."""
     for date, commit in names.items():
-        what = what.replace(f"released {date}", f"release of {commit}")
+        what = what.replace(f"released {date}", commit)
+    for simulator in SIMULATORS.values():
+        what = what.replace(simulator.what, f"Drawn {simulator.short}")
     return what
 
 
@@ -207,10 +209,10 @@ def _shown(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def provenance(row: pd.Series) -> str:
-    """The code that judged a row's cases, and how many of them are development cases."""
+    """The code that judged a row's cases; of cases of which some had been looked at, how many."""
     looked, cases = row["looked_at"], row["cases"]
-    seen = "none seen" if looked == 0 else "all seen" if pd.isna(cases) or looked >= cases else f"{int(looked)} seen"
-    return f"{short_code(row['judged_by'])}, {seen}"
+    part = looked > 0 and pd.notna(cases) and looked < cases
+    return short_code(row["judged_by"]) + (f", {int(looked)} seen" if part else "")
 
 
 def of_families(families: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
@@ -369,8 +371,13 @@ def of_effects(effects: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for row in effects.itertuples():
         known = pd.notna(row.value)
-        power = power_of(row.value) if known else 0
-        value, low, high = (f"{x / 10**power:.3g}" if known else "" for x in (row.value, row.low_95, row.high_95))
+        numbers = (row.value, row.low_95, row.high_95) if known else (0.0, 0.0, 0.0)
+        largest = max(map(abs, numbers))
+        power = power_of(largest)
+        # A value that its interval does not separate from zero has no digits of its own.
+        decimals = max(0, 2 - math.floor(math.log10(largest / 10**power))) if largest else 0
+        form = f".{decimals}f" if abs(numbers[0]) < 0.01 * largest else ".3g"
+        value, low, high = (f"{x / 10**power:{form}}" for x in numbers)
         others = words(row.alternatives)
         rows.append(
             {

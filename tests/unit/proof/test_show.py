@@ -83,7 +83,7 @@ def test_releases_have_a_row_for_each_date_and_simulator_and_one_for_all():
 
 
 def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
-    row = release_row("multibody_2026-11-26_false", 0.1, 10) | {"what": "Drawn, released 2026-11-26: wrong"}
+    row = release_row("multibody_2026-11-26_false", 0.1, 10) | {"what": "Drawn stands, released 2026-11-26: wrong"}
     rows = pd.DataFrame(
         [
             row | {"judged_by": "c87a46b88923cd47"},
@@ -92,8 +92,8 @@ def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
         ]
     )
     shown = show.with_target(rows, {"2026-11-26": "40ff225"})
-    assert shown["by"].tolist() == ["c87a46b, none seen", "not kept, all seen", "not kept, 4 seen"]
-    assert shown["what"].unique().tolist() == ["Drawn, release of 40ff225: wrong"]
+    assert shown["by"].tolist() == ["c87a46b", "not kept", "not kept, 4 seen"]
+    assert shown["what"].unique().tolist() == ["Drawn stands, 40ff225: wrong"]
     assert shown["with_interval"][0] == "10.0 % (0.0 to 100.0 %)".replace(
         "0.0 to 100.0 %", "0.0\u00a0to\u00a0100.0\u00a0%"
     )
@@ -192,4 +192,6 @@ def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
     )
     shown = show.of_effects(effects)
     assert shown.iloc[0].tolist() == ["rotor drag", "established", "k_d", "40.8 (39 to 43.4)", "1e-6 N s2"]
+    unsure = pd.DataFrame([{**effects.iloc[0], "value": -4.38e-5, "low_95": -0.0052, "high_95": 0.0051}])
+    assert show.of_effects(unsure)["value"].item() == "-0.00004 (-0.00520 to 0.00510)"
     assert shown.iloc[1].tolist() == ["axial inflow (or: axial inflow or frame drag)", "suggested", "", "", ""]
