@@ -27,6 +27,7 @@ MADE_OF = {
     "simulated": "Simulated.",
     "public": "Real recordings of other laboratories.",
     "thesis": "Real, printed in the thesis.",
+    "stated": "Stated in the thesis.",
     "mixed": "Real and simulated recordings.",
     "campaign_simulated": "Recorded on the instruments, and simulated.",
     "emulated_simulated": "Emulated instruments, and simulated.",
@@ -321,9 +322,10 @@ def one_line(value: Any) -> str:
 
 
 def unit(value: Any) -> str:
-    """A unit on one line with its powers raised: `kg m2` is `kg m²`, `1e-6 N` is `10⁻⁶ N`."""
+    """A unit on one line with its powers raised: `kg m2` is `kg m²`, `1e-6 N` is `10⁻⁶ N`, `N/(N)2` is `1/N`."""
     raised = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-    shown = re.sub(r"(?<=[A-Za-z])-?[0-9]+", lambda power: power[0].translate(raised), text(value))
+    plain = re.sub(r"(?<=^1e-\d) 1$", "", re.sub(r"([^\s/]+)/\(\1\)2$", r"1/\1", str(value)))
+    shown = re.sub(r"(?<=[A-Za-z])-?[0-9]+", lambda power: power[0].translate(raised), text(plain))
     return re.sub("^1e(?=[⁻⁰-⁹¹²³])", "10", shown).replace(" ", "\u00a0")
 
 

@@ -6,6 +6,7 @@ import hashlib
 import platform
 import re
 import subprocess
+import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -74,6 +75,16 @@ def commit_date(folder: str | Path) -> str:
     return done.stdout.strip()
 
 
+def stored_with(folder: str | Path, path: str) -> str:
+    """The commit that last changed a file of a checkout, and its day: `09827fa, 2026-11-23`; or `not known`."""
+    command = ["git", "-C", str(folder), "log", "-1", "--format=%h, %cs", "--abbrev=7", "--", path]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return "not known"
+    return done.stdout.strip() or "not known"
+
+
 def in_words(folder: str | Path, judging: str) -> str:
     """Commit, its date and the hash of the code that judges recordings, in one sentence for a title page."""
     made, day = commit(folder), commit_date(folder)
@@ -92,6 +103,14 @@ def installed_versions(lock: str) -> dict[str, str]:
         except PackageNotFoundError:  # locked for another platform or Python
             continue
     return found
+
+
+def asked_for(project: str) -> list[str]:
+    """Packages that the text of a pyproject.toml asks for by name, its extras included, in their order there."""
+    table = tomllib.loads(project)["project"]
+    groups = [table.get("dependencies", []), *table.get("optional-dependencies", {}).values()]
+    names = [re.match(r"[A-Za-z0-9._-]+", entry)[0] for group in groups for entry in group]
+    return [name for name in dict.fromkeys(names) if name != table["name"]]
 
 
 def sha256(path: str | Path) -> str:

@@ -19,6 +19,9 @@ from rotorid.acquire.identify import stable_name, udev_rule, who_is_there
 from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
+from rotorid.io.tables import read_tables
+from rotorid.stand import align
+from rotorid.stand.recordings import read_pairs
 from tests.acquire.fault_table import seen
 
 ACQUIRE = [sys.executable, "-m", "rotorid.acquire"]
@@ -101,6 +104,27 @@ def test_experiment_with_two_instruments_and_two_clocks(emulator, tmp_path):
     # the two hosts' times are one clock, so that the sensor saw the programme begin and end
     begin = sensor.session.host_start_ns - vehicle.session.host_start_ns
     assert abs(begin) < 5e9
+
+
+def test_an_experiment_at_five_times_the_speed_of_life_is_ingested_and_aligned(emulator, tmp_path):
+    ports = emulator("stand", "ttyQUAD", "ttyWRENCH", more=("--experiment", "27", "--speed", "5"))
+    done = run(
+        *("experiment", "27", "--quadrotor-port", ports[0], "--wrench-port", ports[1]),
+        *("--out", str(tmp_path), "--id", "e27"),
+    )
+    assert done.returncode == 0, done.stderr
+    tables = {name: read_tables([tmp_path / f"e27-{name}.rlog"]) for name in ("quadrotor", "wrench")}
+    assert all(sessions["finished"].all() for _, sessions in tables.values())
+    (pair,) = read_pairs(tables["quadrotor"], tables["wrench"], 2e-4)
+    (entry,) = align.align([pair], lambda throttle: 30 * throttle**1.4)
+    assert abs(entry.lift.delay_s) < align.LARGEST_S and entry.lift.gain > 10 * entry.lift.delay_error_s
+    # In device time the programme lasts as long on both clocks.
+    throttle = pair.quadrotor.set_index("host_s")["throttle_1"]
+    lift = -pair.wrench.set_index("host_s")["force_z_n"]
+    lift -= lift.iloc[:50].mean()
+    on = throttle[throttle > 0.1].index
+    felt = lift[lift.rolling(25, center=True).mean() > lift.max() / 3].index
+    assert felt[-1] - felt[0] == pytest.approx(on[-1] - on[0], rel=0.15)
 
 
 def test_rotor_and_tensile(emulator, tmp_path):

@@ -36,10 +36,19 @@ local function with_number(word, number, inlines)
 end
 
 -- First sentence of a caption, without the words that say what the figure is made of.
+-- What is emulated or stored stays marked, since a list has nothing else that says so.
 local function first_sentence(inlines)
   local out, started, open = pandoc.Inlines({}), false, 0
+  local first = inlines[1]
+  local emulated = first and first.t == "Emph" and pandoc.utils.stringify(first):match("^Emulated")
+  local stored, skipping = false, false
   for position, inline in ipairs(inlines) do
-    if inline.t ~= "RawInline" and not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
+    if not started and inline.t == "Str" and inline.text:match("^Stored[.;,]$") then
+      stored, skipping = true, true
+    end
+    if skipping then
+      skipping = not (inline.t == "Str" and inline.text:match("%.$"))
+    elseif inline.t ~= "RawInline" and not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
       started = true
       out:insert(inline)
       if inline.t == "Str" then
@@ -50,6 +59,12 @@ local function first_sentence(inlines)
         break
       end
     end
+  end
+  if emulated then
+    out:extend(pandoc.Inlines({ pandoc.Space(), pandoc.Str("(emulated)") }))
+  end
+  if stored then
+    out:extend(pandoc.Inlines({ pandoc.Space(), pandoc.Str("(stored)") }))
   end
   return out
 end

@@ -15,6 +15,7 @@ rule chapter_appendix:
         "Chapter appendix: tables"
     input:
         lock="requirements.lock",
+        project="pyproject.toml",
         weights="raw/thesis/table_2_6.csv",
         readings="raw/thesis/table_2_7.csv",
         geometry=BENCH_GEOMETRY,
@@ -27,6 +28,7 @@ rule chapter_appendix:
         experiments="results/report/appendix/experiments.csv",
         settings="results/report/appendix/settings.csv",
         hashes="results/report/appendix/hashes.csv",
+        versions="results/report/appendix/versions.csv",
         rule_graph=report(
             "results/report/appendix/rule_graph.svg",
             category="Appendix",

@@ -36,9 +36,13 @@ QUOTED = {
 PRINTED = {
     "targets": rules.chapter_proof.output.rows,
     "plantings": rules.chapter_proof.output.planted,
+    "planned_flights": rules.chapter_proof.output.flights,
+    "proof_real": f"{CONFIG.proof.tables}/real.csv",
+    "proof_coefficients": f"{CONFIG.proof.tables}/coefficients.csv",
     "proof_cases": f"{CONFIG.proof.tables}/cases.csv",
 }
 QUOTED_BY = {
+    "fem": {"both_meshes": rules.chapter_speed.output.fem},
     "white_box": {"truth": rules.score_campaign.output.state},
     "abstract": QUOTED | PRINTED,
     "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},

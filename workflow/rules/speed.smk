@@ -1,5 +1,12 @@
 """What the benchmarks measured, for the report: stored tables, made by `python -m benchmarks`."""
 
+from rotorid.provenance import stored_with
+
+
+def stored_benchmarks(wildcards, input):
+    """The commit that each benchmark's table came with, by name."""
+    return {name: stored_with(ROOT, path) for name, path in input.items()}
+
 
 rule chapter_speed:
     """Tables of the benchmarks, and how time grows with the recording."""
@@ -12,6 +19,7 @@ rule chapter_speed:
         mismatch="benchmarks/mismatch.md",
         rebuild="benchmarks/rebuild.md",
         fleet="benchmarks/fleet.md",
+        fem="benchmarks/fem.md",
     output:
         simulator="results/report/speed/simulator.csv",
         selection="results/report/speed/selection.csv",
@@ -19,6 +27,8 @@ rule chapter_speed:
         mismatch="results/report/speed/mismatch.csv",
         rebuild="results/report/speed/rebuild.csv",
         fleet="results/report/speed/fleet.csv",
+        fem="results/report/speed/fem.csv",
+        stored="results/report/speed/stored.json",
         growth=report(
             "results/report/speed/growth.svg",
             category="Appendix",
@@ -26,6 +36,7 @@ rule chapter_speed:
             labels={"figure": "growth with the recording"},
         ),
     params:
+        stored=stored_benchmarks,
         code=code_of("tabulate_speed"),
     log:
         "results/logs/chapter_speed.log",

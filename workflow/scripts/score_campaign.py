@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid import log
+from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.proof import campaign, quoted
 from rotorid.recordings import read_set
 from rotorid.text_files import read_yaml
@@ -36,6 +37,7 @@ def main(
     judged = [json.loads(Path(path).read_text(encoding="utf-8")) for path in verdicts]
     found = {verdict["set"]: verdict for verdict in judged}
     state = {"verdicts": {name: quoted.said(verdict) for name, verdict in found.items()}}
+    state["thresholds"] = {"explained": EXPLAINED_SHARE, "unexplained": UNEXPLAINED_SHARE}
     rows = [row for name, verdict in found.items() for row in quoted.channels(name, verdict)]
     pd.DataFrame(rows, columns=quoted.CHANNEL_COLUMNS).to_csv(out["channels"], index=False, float_format="%.6g")
     if LINE in found:

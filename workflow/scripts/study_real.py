@@ -5,6 +5,7 @@
 """
 
 import json
+import logging
 import traceback
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from rotorid.mismatch.deliver import judge
 from rotorid.proof import real
 from rotorid.proof.studies import study
 from rotorid.recordings import read_set
+
+LOGGER = logging.getLogger("rotorid.study")
 
 
 def main(folder: str, name: str, out: str) -> None:
@@ -25,9 +28,9 @@ def main(folder: str, name: str, out: str) -> None:
         recordings = real.with_split(read_set(Path(folder)), wanted)
         try:
             verdict = json.loads(judge(recordings).text())
-        except Exception as error:  # a stage that stops on real data is a result: the table leaves the study out
-            traceback.print_exc()
-            result |= {"available": False, "reason": f"the stage stopped: {type(error).__name__}: {error}"}
+        except Exception as error:  # a stage that stops on real data is a result: the table says so
+            LOGGER.error("%s", traceback.format_exc())
+            result |= {"available": False, "reason": f"{real.STOPPED}: {type(error).__name__}: {error}"}
         else:
             result |= {
                 "row": real.row_of(verdict, wanted),

@@ -2,9 +2,10 @@
 
 - Gains and references of the attitude controller, as the code holds them.
 - Amplitudes and frequencies of the experiments on the stand (table A.1 of the thesis).
-- Every setting of the stages, and hashes of the lock file, the index and the thesis's tables.
+- Every setting of the stages, versions of the packages asked for, hashes of the lock file and the thesis's tables.
 """
 
+import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rotorid import log
+from rotorid import log, provenance
 from rotorid.control.pid import THESIS_GAINS
 from rotorid.control.references import AttitudeReference, training_reference, validation_reference
 from rotorid.io.experiments import EXPERIMENTS
@@ -88,7 +89,12 @@ def shown(value: Any) -> str:
 
 
 def main(
-    config: Mapping[str, Any], read: Sequence[str], steps: Sequence[Sequence[str]], out: Mapping[str, str]
+    config: Mapping[str, Any],
+    lock: str,
+    project: str,
+    read: Sequence[str],
+    steps: Sequence[Sequence[str]],
+    out: Mapping[str, str],
 ) -> None:
     """Write the tables (CSV) and the graph (SVG).
 
@@ -99,6 +105,10 @@ def main(
     pd.DataFrame(references).to_csv(out["references"], index=False, float_format="%.4g")
     experiments().to_csv(out["experiments"], index=False)
     settings(config).to_csv(out["settings"], index=False)
+    direct = provenance.asked_for(Path(project).read_text(encoding="utf-8"))
+    found = provenance.installed_versions(Path(lock).read_text(encoding="utf-8"))
+    versions = [("Python", platform.python_version()), *((name, found[name]) for name in direct if name in found)]
+    pd.DataFrame(versions, columns=["package", "version"]).to_csv(out["versions"], index=False)
     hashes = [{"file": path, "sha256": sha256(Path(path))[:16]} for path in read]
     pd.DataFrame(hashes).to_csv(out["hashes"], index=False)
     style.save(rule_graph([(a, b) for a, b in steps]), out["rule_graph"])
@@ -108,6 +118,8 @@ if __name__ == "__main__":
     with log.to(snakemake.log[0]):
         main(
             config=dict(snakemake.params.config),
+            lock=snakemake.input.lock,
+            project=snakemake.input.project,
             read=list(snakemake.input),
             steps=list(snakemake.params.steps),
             out=dict(snakemake.output.items()),

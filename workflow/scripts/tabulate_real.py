@@ -1,6 +1,6 @@
 """The table of real recordings.
 
-- One line a study that could be made; published coefficients beside ours.
+- One line a study that could be made or on which the stage stopped; published coefficients beside ours.
 - Beside the NeuroBEM flights held out, NeuroBEM's own prediction of the same flight.
 """
 
@@ -10,18 +10,20 @@ import pandas as pd
 
 from rotorid import log
 from rotorid.proof import real
+from rotorid.proof.studies import study
 
 
 def main(studies: list[str], flights: str, judging: str, table: str, coefficients: str) -> None:
     """Gather the results of `studies`, judged by the code `judging`; `flights` holds NeuroBEM's own errors."""
     results = real.read_results([Path(p) for p in studies])
-    rows = pd.DataFrame([r["row"] for r in results], columns=real.ROW_COLUMNS)
+    lines = [r["row"] if r["available"] else real.stopped_row(study(r["study"])) for r in results]
+    rows = pd.DataFrame(lines, columns=real.ROW_COLUMNS)
     own = real.neurobem_errors(pd.read_csv(flights).to_dict("records"))
     for group in ("force", "moment"):
         rows[f"{group}_neurobem"] = [own.get((held, group)) for held in rows["held_out"]]
     rows["judged_by"] = judging
     rows.to_csv(table, index=False, float_format="%.6g")
-    found = [c for r in results for c in r["compared"]]
+    found = [c for r in results if r["available"] for c in r["compared"]]
     pd.DataFrame(found, columns=real.COMPARED_COLUMNS).to_csv(coefficients, index=False, float_format="%.6g")
 
 

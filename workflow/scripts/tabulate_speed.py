@@ -1,9 +1,11 @@
 """Tables and figure of the chapter on speed, from what the benchmarks wrote.
 
 - One table (CSV) of each benchmark, its columns by short names.
+- The commit that each table was stored with (JSON).
 - Time and memory of the mismatch stage against the length of the recording (SVG).
 """
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,20 +22,28 @@ COLUMNS = {
     "mismatch": ["recording", "samples", "analysis_s", "per_second", "memory_mb", "found"],
     "rebuild": ["what", "processor", "wall"],
     "fleet": ["what", "amount"],
+    "fem": ["what", "coarse", "full"],
 }
 
 
-def main(files: Mapping[str, str], out: Mapping[str, str]) -> None:
-    """Write the table of each benchmark in `files` to the file of the same name in `out`, and `out["growth"]`."""
+def main(files: Mapping[str, str], stored: Mapping[str, str], out: Mapping[str, str]) -> None:
+    """Write the table of each benchmark in `files` to the file of the same name in `out`; `stored` and `growth` too."""
     tables = {
         name: first_table(Path(files[name]).read_text(), columns, files[name]) for name, columns in COLUMNS.items()
     }
+    for column in ("found_by", "found"):
+        tables["selection"][column] = tables["selection"][column].str.replace("_", " ")
     for name, table in tables.items():
         table.to_csv(out[name], index=False)
     numbers = tables["mismatch"][["samples", "analysis_s", "memory_mb"]].apply(pd.to_numeric)
+    Path(out["stored"]).write_text(json.dumps(dict(stored), indent=1) + "\n", encoding="utf-8")
     style.save(speed.growth(numbers), out["growth"])
 
 
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
-        main(files=dict(snakemake.input.items()), out=dict(snakemake.output.items()))
+        main(
+            files=dict(snakemake.input.items()),
+            stored=dict(snakemake.params.stored),
+            out=dict(snakemake.output.items()),
+        )

@@ -16,20 +16,10 @@ if TYPE_CHECKING:
 
     from rotorid.recordings.vehicle import Vehicle
 
-SIGNS = {1: (1, -1), 2: (-1, 1), 3: (-1, 1), 4: (1, 1), 5: (1, 1), 6: (1, -1)}
-"""Signs of the cells' x and y: those for which the three cells of each ring lie 120 degrees apart about the foot."""
-
-
-def cell_places_mm(distances_mm: Mapping[str, float]) -> dict[int, tuple[float, float]]:
-    """Forward and right distance (mm) of each cell's force from the foot of the bench, from table 2.3.
-
-    Table 2.3 has no x of cell 3 (it feels no force along y); it follows from the other two of its ring.
-    """
-    places = {}
-    for cell, (sign_x, sign_y) in SIGNS.items():
-        x = distances_mm.get(f"D_{cell}x", distances_mm["D_1x"] + distances_mm["D_5x"])
-        places[cell] = (sign_x * x, sign_y * distances_mm[f"D_{cell}y"])
-    return places
+BAR_MM = (70.0, 12.0)
+"""Length and width of a cell as drawn; neither is printed in the thesis."""
+BELOW_MM = 25.0
+"""From the lower cells to the table, as drawn."""
 
 
 def _plain(axis: Axes) -> None:
@@ -49,54 +39,52 @@ def _arrow(axis: Axes, start, stop, label: str = "", colour: str = style.BLACK, 
 
 
 def bench(distances_mm: Mapping[str, float]) -> Figure:
-    """The six cells from above (x up, y right), and the tube from the side with the distances of table 2.3 (mm)."""
-    from matplotlib.patches import Circle, Rectangle
+    """The six cells from above (x up, y right), and the bench from the side, by the distances of table 2.3 (mm).
 
-    fig, (top, side) = style.figure(3.0, 1, 2, width_ratios=(1.25, 1))
-    for radius in (
-        np.hypot(distances_mm["D_1x"], distances_mm["D_1y"]),
-        np.hypot(distances_mm["D_2x"], distances_mm["D_2y"]),
-    ):
-        top.add_patch(Circle((0, 0), radius, fill=False, color="#cccccc", lw=0.8, ls=":"))
-    for cell, (x, y) in cell_places_mm(distances_mm).items():
-        upper = cell % 2 == 0
-        colour = style.BLUE if upper else style.RED
-        along = np.degrees(np.arctan2(x, y))
-        top.add_patch(
-            Rectangle(
-                (y - 16, x - 6),
-                32,
-                12,
-                angle=along,
-                rotation_point="center",
-                facecolor=colour,
-                alpha=0.25,
-                edgecolor=colour,
-            )
-        )
-        # The rings nearly cover each other: numbers stand outside of the upper ring and inside of the lower one.
-        out = 1 + (24 if upper else -24) / np.hypot(x, y)
-        top.text(out * y, out * x, str(cell), ha="center", va="center", fontweight="bold", color=colour)
+    Places and directions are those of `rotorid.fem.placement`, which the finite elements have too.
+    """
+    from matplotlib.patches import Polygon, Rectangle
+
+    from rotorid.fem import placement
+
+    fig, (top, side) = style.figure(3.3, 1, 2, width_ratios=(1.25, 1))
+    length, width = BAR_MM
+    for cell, place in sorted(placement.cells(distances_mm).items(), reverse=True):
+        colour = style.RED if cell % 2 else style.BLUE
+        start, along = place.force_m[:2], place.axis[:2]
+        across = np.array([-along[1], along[0]])
+        corners = [
+            start + t * length * along + w * width * across for t, w in ((0, -0.5), (1, -0.5), (1, 0.5), (0, 0.5))
+        ]
+        top.add_patch(Polygon([corner[::-1] for corner in corners], facecolor=colour, alpha=0.3, edgecolor=colour))
+        top.plot(start[1], start[0], "o", color=colour, markersize=4)
+        middle = start + 0.55 * length * along
+        outwards = middle / np.linalg.norm(middle)
+        label = middle + (-15 if cell % 2 else 15) * outwards
+        top.text(label[1], label[0], str(cell), ha="center", va="center", fontweight="bold", color=colour)
     top.plot(0, 0, "o", color="black", markersize=5)
-    top.text(6, -13, "foot {T}", fontsize=8.5)
+    top.text(-5, -9, "{T}", fontsize=8.5, ha="right")
     _arrow(top, (0, 0), (0, 38), "$x$")
     _arrow(top, (0, 0), (38, 0), "$y$")
-    top.set_xlim(-100, 100)
-    top.set_ylim(-95, 95)
+    top.set_xlim(-105, 105)
+    top.set_ylim(-100, 100)
     top.set_title("from above")
     _plain(top)
-    length, low, high = (distances_mm[name] for name in ("L", "D_135z", "D_246z"))
-    side.add_patch(Rectangle((-70, -14), 140, 14, facecolor="#dddddd", edgecolor="black", lw=0.7))
+    length, upper, lower = (distances_mm[name] for name in ("L", "D_135z", "D_246z"))
+    table = -lower - BELOW_MM
+    side.add_patch(Rectangle((-80, table - 10), 160, 10, facecolor="#dddddd", edgecolor="black", lw=0.7))
+    side.add_patch(Rectangle((-60, -6), 120, 6, facecolor="#eeeeee", edgecolor="black", lw=0.7))
     side.add_patch(Rectangle((-6, 0), 12, length, facecolor="#eeeeee", edgecolor="black", lw=0.7))
-    for height, colour, name in ((low, style.RED, "cells 1, 3, 5"), (high, style.BLUE, "cells 2, 4, 6")):
-        side.plot([-60, 60], [height, height], color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
-        side.text(68, height, f"{name}: {height:.1f} mm", color=colour, va="center", fontsize=8.5)
+    for depth, colour, name in ((upper, style.RED, "cells 1, 3, 5"), (lower, style.BLUE, "cells 2, 4, 6")):
+        side.plot([-60, 60], [-depth, -depth], color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
+        side.text(88, -depth, f"{name}: {depth:.1f} mm below", color=colour, va="center", fontsize=8.5)
     side.plot([-62, 62], [length, length], color="black", lw=3)
+    side.text(88, 3, "{T}, top of piece D", va="center", fontsize=8.5)
     side.text(68, length, f"vehicle {{B}}: $L$ = {length:.0f} mm", va="center", fontsize=8.5)
     _arrow(side, (-90, 150), (-90, 95), "$z$")
     _arrow(side, (0, length + 8), (0, length + 50), "thrust", fontsize=8.5)
-    side.set_xlim(-105, 190)
-    side.set_ylim(-20, length + 70)
+    side.set_xlim(-105, 235)
+    side.set_ylim(table - 16, length + 70)
     side.set_title("from the side")
     _plain(side)
     return fig

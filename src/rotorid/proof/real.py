@@ -118,7 +118,17 @@ def neurobem_errors(flights: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str
     }
 
 
+STOPPED = "the stage stopped"
+"""Beginning of the reason of a study on whose recordings the stage itself failed."""
+
+
 def read_results(paths: Sequence[Path]) -> list[dict[str, Any]]:
-    """Results of studies that could be made."""
+    """Results of studies that could be made, and of those on which the stage stopped."""
     found = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
-    return [f for f in found if f["available"]]
+    return [f for f in found if f["available"] or f["reason"].startswith(STOPPED)]
+
+
+def stopped_row(wanted: Study) -> dict[str, Any]:
+    """The line of a study on which the stage stopped: what was expected, and that nothing came of it."""
+    row = {"study": wanted.name, "about": wanted.about, "expected": "; ".join(wanted.expected)}
+    return row | {"held_out": "; ".join(wanted.held_out or ()), "word": "stopped"}

@@ -26,6 +26,8 @@ RELEASE_ROW = re.compile(r"(?P<simulator>\w+)_(?P<date>\d{4}-\d\d-\d\d)_(?P<scor
 
 
 NOT_KEPT = "not kept"
+DEVELOPMENT = "development"
+"""In the place of a release's date: the commit that stored the development cases, of which no hash was kept."""
 
 
 def short_code(code: object) -> str:
@@ -34,14 +36,18 @@ def short_code(code: object) -> str:
     return " ".join(part[:7] for part in known) or NOT_KEPT
 
 
-def codes_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
-    """Beginnings of the hashes of the code that judged each stored table's rows, in words."""
+def codes_of(tables: Mapping[str, pd.DataFrame], stored_with: str = "") -> dict[str, str]:
+    """Beginnings of the hashes of the code that judged each stored table's rows, in words.
+
+    Where no hash was kept, `stored_with` is the commit that stored the rows: no later code judged them.
+    """
+    unknown = f"{NOT_KEPT} (of commit {stored_with} or before)" if stored_with else NOT_KEPT
     found = {}
     for name, table in tables.items():
         column = "judged_by" if "judged_by" in table else "code"
         rows = table[column] if column in table else pd.Series([None])
         codes = sorted({short_code(code) for code in rows}, key=lambda code: (code == NOT_KEPT, code))
-        found[name] = ", ".join(codes)
+        found[name] = ", ".join(unknown if code == NOT_KEPT else code for code in codes)
     return found
 
 
@@ -162,9 +168,11 @@ def with_target(summary: pd.DataFrame, names: Mapping[str, str] | None = None) -
 
 
 def in_words(what: str, names: Mapping[str, str]) -> str:
-    """What a row is about, a release called by its commit instead of the date that its cases are drawn from."""
+    """What a row is about in few words; a release is called by its commit, not by the date its cases are drawn from."""
     for date, commit in names.items():
-        what = what.replace(f"released {date}", f"release of {commit}")
+        what = what.replace(f"released {date}", commit)
+    for simulator in SIMULATORS.values():
+        what = what.replace(simulator.what, f"Drawn {simulator.short}")
     return what
 
 
@@ -199,10 +207,10 @@ def _shown(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def provenance(row: pd.Series) -> str:
-    """The code that judged a row's cases, and how many of them are development cases."""
+    """The code that judged a row's cases; of cases of which some had been looked at, how many."""
     looked, cases = row["looked_at"], row["cases"]
-    seen = "none seen" if looked == 0 else "all seen" if pd.isna(cases) or looked >= cases else f"{int(looked)} seen"
-    return f"{short_code(row['judged_by'])}, {seen}"
+    part = looked > 0 and pd.notna(cases) and looked < cases
+    return short_code(row["judged_by"]) + (f", {int(looked)} seen" if part else "")
 
 
 def of_families(families: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
@@ -313,6 +321,7 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
         found = [words(row["found"])] if pd.notna(row["found"]) else []
         found += [f"wrong {'values' if len(wrong) > 1 else 'value'}: {words(', '.join(wrong))}"] if wrong else []
         error = " / ".join("–" if pd.isna(s) else f"{s:.{digits}f}" for s in stages) + f" {unit}"
+        error = "–" if row["word"] == "stopped" else error
         share = row["unexplained_share"]
         expected, confirmed = (
             [] if pd.isna(row[name]) else [words(one) for one in str(row[name]).split("; ")]
@@ -322,7 +331,7 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
             {
                 "study": row["study"],
                 "about": row["about"],
-                "found": "; ".join(found) or "nothing",
+                "found": "the stage stopped" if row["word"] == "stopped" else "; ".join(found) or "nothing",
                 "expected": "; ".join(f"{one}: {'found' if one in confirmed else 'no'}" for one in expected) or "–",
                 "confirmed": len(confirmed) if expected else "",
                 "error": error.replace(" ", "\u00a0"),
@@ -350,6 +359,36 @@ LEAST_WORSE = 5e-4
 """Growth of an error that its three printed digits may show."""
 
 
+def power_of(value: float) -> int:
+    """The power of ten, a multiple of three, in whose units a small number is written; 0 for others."""
+    return 3 * math.floor(math.log10(abs(value)) / 3) if 0 < abs(value) < 1e-3 else 0
+
+
+def of_effects(effects: pd.DataFrame) -> pd.DataFrame:
+    """Effects of a verdict as text: names with their class and status, each number with its interval in one cell."""
+    rows = []
+    for row in effects.itertuples():
+        known = pd.notna(row.value)
+        numbers = (row.value, row.low_95, row.high_95) if known else (0.0, 0.0, 0.0)
+        largest = max(map(abs, numbers))
+        power = power_of(largest)
+        # A value that its interval does not separate from zero has no digits of its own.
+        decimals = max(0, 2 - math.floor(math.log10(largest / 10**power))) if largest else 0
+        form = f".{decimals}f" if abs(numbers[0]) < 0.01 * largest else ".3g"
+        value, low, high = (f"{x / 10**power:{form}}" for x in numbers)
+        others = words(row.alternatives)
+        rows.append(
+            {
+                "effect": words(row.effect) + (f" (or: {others})" if others else ""),
+                "status": words(row.status),
+                "symbol": row.symbol if isinstance(row.symbol, str) else "",
+                "value": f"{value} ({low} to {high})" if known else "",
+                "unit": ((f"1e{power} " if power else "") + str(row.unit)) if known else "",
+            }
+        )
+    return pd.DataFrame(rows, columns=["effect", "status", "symbol", "value", "unit"])
+
+
 def of_campaign_sets(sets: pd.DataFrame) -> pd.DataFrame:
     """The campaign's sets as text: verdict, what is at work, and what of it was named, rightly or wrongly."""
     return sets.apply(lambda column: column.map(words)).replace({"right": {"": "–"}, "wrong": {"": "–"}})
@@ -359,7 +398,7 @@ def of_campaign_numbers(numbers: pd.DataFrame) -> pd.DataFrame:
     """A row a set and effect as text: how many numbers are inside, and the one furthest out."""
     rows = []
     for row in numbers.itertuples():
-        power = 3 * math.floor(math.log10(abs(row.found)) / 3) if 0 < abs(row.found) < 1e-3 else 0
+        power = power_of(row.found)
         true, found, low, high = (f"{x / 10**power:.4g}" for x in (row.truth, row.found, row.low_95, row.high_95))
         rows.append(
             {
@@ -388,7 +427,7 @@ def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
     """Coefficients found beside published ones, as text: small ones in units of a power of ten."""
     rows = []
     for row in coefficients.itertuples():
-        power = 3 * math.floor(math.log10(abs(row.found)) / 3) if 0 < abs(row.found) < 1e-3 else 0
+        power = power_of(row.found)
         found, low, high, published = (
             f"{x / 10**power:.3g}" for x in (row.found, row.low_95, row.high_95, row.published)
         )

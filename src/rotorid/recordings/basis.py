@@ -18,6 +18,8 @@ GROUND_S = 1.0
 """Rotors that idle so long leave a vehicle on the ground: in the air it would have fallen five metres."""
 RESTING_G = 0.5
 """Specific force, over gravity, that the ground exerts on it at least; a vehicle that falls has next to none."""
+PAUSE_S, PAUSE_STEPS = 5.0, 20
+"""A stand's or bench's samples that are further apart than both are of two recordings, and nothing between them."""
 MOST_NAMES = 12
 
 
@@ -26,7 +28,7 @@ class Basis:
     """Time and columns of a set, as they are used."""
 
     recorded_s: float
-    """Length of all runs."""
+    """Length of all runs, of a stand or bench without the pauses in them."""
     in_the_air_s: float | None
     """None for a stand or bench, and where no rotors are recorded."""
     ground_share: float | None
@@ -49,7 +51,8 @@ class Basis:
 
 def basis_of(recordings: RecordingSet) -> Basis:
     """What a set offers to a verdict."""
-    recorded = sum(float(run.time_s[-1] - run.time_s[0]) for run in recordings.runs)
+    with_pauses = recordings.vehicle.kind == "flight"
+    recorded = sum(float(np.ptp(run.time_s)) if with_pauses else recorded_s(run.time_s) for run in recordings.runs)
     grounded = [on_the_ground_s(run, recordings.vehicle) for run in recordings.runs]
     known = recordings.vehicle.kind == "flight" and any(g is not None for g in grounded)
     ground = sum(g for g in grounded if g is not None)
@@ -59,6 +62,14 @@ def basis_of(recordings: RecordingSet) -> Basis:
         ground / recorded if known and recorded > 0 else None,
         tuple(missing(recordings)),
     )
+
+
+def recorded_s(time_s: np.ndarray) -> float:
+    """Length of a run, s, without its pauses; `time_s` has shape (n,)."""
+    steps = np.diff(time_s)
+    if not len(steps):
+        return 0.0
+    return float(steps[steps <= max(PAUSE_S, PAUSE_STEPS * np.median(steps))].sum())
 
 
 def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:

@@ -15,6 +15,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.io.tables import by_recording
+from rotorid.stand.clocks import device_time
 
 RPM = 2 * np.pi / 60
 MARGIN_S = 0.6
@@ -31,12 +32,6 @@ def _running(table: pd.DataFrame, name: str) -> pd.DataFrame:
     if len(on) == 0 or on["time_s"].iloc[-1] - on["time_s"].iloc[0] <= 2 * MARGIN_S:
         raise InputError(f"{name}: the motor never ran for more than {2 * MARGIN_S} s")
     return on.iloc[[0, -1]]
-
-
-def _device_time(time_s: pd.Series, seen_s: pd.Series, host_s: pd.Series) -> np.ndarray:
-    """Times of a device's clock at times of the host: of a batch that the host sees at once, the last sample counts."""
-    latest = time_s.groupby(seen_s).max()
-    return np.interp(host_s, latest.index, latest)
 
 
 def thrust_points(samples: pd.DataFrame, recordings: pd.DataFrame) -> pd.DataFrame:
@@ -78,7 +73,7 @@ def torque_points(rotor: tuple[pd.DataFrame, pd.DataFrame], wrench: tuple[pd.Dat
         steady = table[table["time_s"].between(start + MARGIN_S, stop - MARGIN_S)]
         # Each recording's times count from its own beginning.
         seen = reading["host_time_s"] + (read.host_start_s - drive.host_start_s)
-        start, stop = _device_time(reading["time_s"], seen, ends["host_time_s"])
+        start, stop = device_time(reading["time_s"], seen, ends["host_time_s"])
         when = reading["time_s"]
         loaded = reading.loc[when.between(start + MARGIN_S, stop - MARGIN_S), "moment_z_n_m"]
         before = reading.loc[when < start - 0.1, "moment_z_n_m"]

@@ -24,12 +24,14 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.signal.filters import zero_phase
-from rotorid.stand.clocks import Lag, follow, lower_edge, pooled
+from rotorid.stand.clocks import Lag, device_time, follow, lower_edge, pooled
 
 STEP_S = 0.01
 SMOOTH_HZ = 5.0
 LARGEST_S = 0.5
 """Largest offset that the arrival times may leave."""
+FASTER_THAN_LIFE = 1.2
+"""Device seconds a host second that no clock's error explains."""
 LEAST_THRUST_N = 1e-3
 """A motor that is asked for more than this turns."""
 CURRENT_POWER = 1.5
@@ -59,12 +61,38 @@ def on_host(table: pd.DataFrame, largest_error: float) -> tuple[pd.DataFrame, fl
     return table.assign(host_s=line.host(table["time_s"].to_numpy())), line.rate
 
 
+def both_on_host(
+    first: pd.DataFrame, second: pd.DataFrame, largest_error: float
+) -> tuple[tuple[pd.DataFrame, float], tuple[pd.DataFrame, float]]:
+    """`on_host` of two recordings that one host made at once.
+
+    Where the devices' time passes faster than the host's, as an emulator's can, the clock of the first device
+    takes the place of the host's.
+
+    Raises InputError where such recordings have no time in common.
+    """
+    if _pace(second) < FASTER_THAN_LIFE:
+        return on_host(first, largest_error), on_host(second, largest_error)
+    host = second["host_time_s"].to_numpy()
+    both = (host >= first["host_time_s"].min()) & (host <= first["host_time_s"].max())
+    if not both.any():
+        raise InputError("two recordings of one test have no time in common")
+    # Both arrive late, so that neither edge is the clocks'; what the median leaves, the measurements tell.
+    seen = device_time(first["time_s"], first["host_time_s"], host[both])
+    offset = float(np.median(seen - second["time_s"].to_numpy()[both]))
+    return (first.assign(host_s=first["time_s"]), 1.0), (second.assign(host_s=second["time_s"] + offset), 1.0)
+
+
+def _pace(table: pd.DataFrame) -> float:
+    """Device seconds that pass in a second of the host."""
+    return float(np.ptp(table["time_s"]) / max(np.ptp(table["host_time_s"]), 1e-9))
+
+
 def pair_of(
     name: str, experiment: int, sine: bool, quadrotor: pd.DataFrame, wrench: pd.DataFrame, largest_error: float
 ) -> Pair:
     """Both recordings by their arrival times."""
-    first, rate_1 = on_host(quadrotor, largest_error)
-    second, rate_2 = on_host(wrench, largest_error)
+    (first, rate_1), (second, rate_2) = both_on_host(quadrotor, wrench, largest_error)
     return Pair(name, experiment, sine, first, second, (rate_1, rate_2))
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from rotorid.errors import InputError
 
@@ -48,6 +49,22 @@ def lower_edge(device_s: np.ndarray, host_s: np.ndarray, largest_error: float) -
     slope = float(np.clip(slope, -largest_error, largest_error))
     offset = float(np.min(y - x - slope * x))
     return ClockLine(offset, 1 + slope)
+
+
+def device_time(time_s: np.ndarray, seen_s: np.ndarray, host_s: np.ndarray) -> np.ndarray:
+    """Times of a device's clock at times of the host, s, interpolated between the device's samples.
+
+    Of a batch that the host sees at once, the last sample counts.
+
+    Parameters
+    ----------
+    time_s, seen_s
+        Shape (n,): the device's time of each sample, and the host's time when it was read.
+    host_s
+        Times of the host, any shape; beyond the samples the first or last device time is given.
+    """
+    latest = pd.Series(np.asarray(time_s, float)).groupby(np.asarray(seen_s, float)).max()
+    return np.interp(host_s, latest.index, latest)
 
 
 def _lower_hull(x: np.ndarray, y: np.ndarray) -> np.ndarray:

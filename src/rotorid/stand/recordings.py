@@ -16,7 +16,7 @@ from rotorid.io.tables import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.stand.align import Aligned, Pair, on_host, pair_of, torque_offset
+from rotorid.stand.align import Aligned, Pair, both_on_host, pair_of, torque_offset
 
 RPM = 2 * np.pi / 60
 WRENCH = (*c.FORCE, *c.MOMENT)
@@ -145,10 +145,10 @@ def torque_set(
 ) -> RecordingSet:
     """The 20 torque tests; where a test's lift is too weak to tell its clocks' offset, the others' median is taken."""
     counted, felt = by_recording(rotor[0]), by_recording(wrench[0])
-    tests = [
-        (drive.group, on_host(counted[drive.id], largest_error)[0], on_host(felt[read.id], largest_error)[0])
-        for drive, read in pairs(rotor[1], wrench[1])
-    ]
+    tests = []
+    for drive, read in pairs(rotor[1], wrench[1]):
+        (speed, _), (reading, _) = both_on_host(counted[drive.id], felt[read.id], largest_error)
+        tests.append((drive.group, speed, reading))
     lags = [torque_offset(speed, reading) for _, speed, reading in tests]
     clear = [lag.delay_s for lag in lags if lag.delay_error_s < LARGEST_OFFSET_ERROR_S]
     usual = float(np.median(clear)) if clear else 0.0

@@ -11,6 +11,7 @@ import pytest
 
 from rotorid.bench import calibration_flags, loadcell
 from rotorid.bench.prepare import prepare
+from rotorid.plots import bench as plots
 from workflow.scripts import calibrate_campaign, calibrate_load_cells
 
 from .logs import cells, write_log
@@ -94,6 +95,45 @@ def test_a_recording_without_its_load_is_in_the_log_and_the_result_and_still_in_
     assert readings["flag"].dropna().to_dict() == {"unloaded": "no load was on"} and len(readings) == 25
     (row,) = calibration_flags.as_table(result["cells"]).to_dict("records")
     assert (row["a1_with"], row["a1_without"]) == (slopes["bad"], without["a1_gf_per_10uv"])
+
+
+def test_a_recording_that_moves_a_slope_by_seven_per_cent_is_in_table_and_figure() -> None:
+    """One of three readings of 500.5 gf had no load on; r is still 0.951."""
+    readings = table()
+    readings.loc[16, "reading_10uv"] = 0.001
+    flagged = calibration_flags.flag(readings)
+    line = loadcell.fit_line(readings["reading_10uv"], readings["weight_gf"])
+    entry = {"cell": 3, "a0_gf": line.a0, "a1_gf_per_10uv": line.a1, "r": line.r, **calibration_flags.as_dict(flagged)}
+    assert abs(line.a1 / 40 - 1) == pytest.approx(0.07, abs=0.005) and line.r == pytest.approx(0.951, abs=1e-3)
+    (row,) = calibration_flags.as_table([entry]).to_dict("records")
+    assert (
+        (row["id"], row["flag"]) == ("r16", "no load was on")
+        and row["a1_with"] == line.a1
+        and row["a1_without"] == pytest.approx(40, rel=1e-3)
+    )
+    shown = flagged.assign(flag=flagged["flag"].replace("", None))
+    figure = plots.calibration_residuals(
+        pd.concat([shown.assign(cell=cell) for cell in range(1, 7)]), [{**entry, "cell": cell} for cell in range(1, 7)]
+    )
+    (cross,) = (drawn for drawn in figure.axes[0].lines if drawn.get_marker() == "x")
+    assert cross.get_xdata().tolist() == [500.5]
+
+
+def test_a_flag_begins_below_one_part_in_a_thousand_of_the_range() -> None:
+    """With the scatter of the campaign's cells: the least error that is flagged in each of many calibrations, gf."""
+    least = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        readings = table()
+        readings["reading_10uv"] = (readings["weight_gf"] + rng.normal(0, 0.07, len(readings))) / 40.0
+        for error_gf in np.arange(0.2, 1.2, 0.05):
+            spoilt = readings.copy()
+            spoilt.loc[13, "reading_10uv"] += error_gf / 40.0
+            if calibration_flags.flag(spoilt)["flag"].iloc[13]:
+                least.append(error_gf)
+                break
+    assert len(least) == 20 and 0.15 < min(least) and max(least) < 0.957
+    assert np.median(least) == pytest.approx(0.4, abs=0.1)
 
 
 def test_the_thesis_table_has_no_flag_until_a_reading_is_spoilt(tmp_path) -> None:

@@ -1,9 +1,14 @@
 """Lines of the table of real recordings, from a verdict written by hand."""
 
+import json
+from pathlib import Path
+
+import pandas as pd
 import pytest
 
 from rotorid.proof import real
 from rotorid.proof.studies import STUDIES, Published, Study
+from workflow.scripts import tabulate_real
 
 
 def verdict(**changes):
@@ -58,3 +63,24 @@ def test_errors_of_neurobem_are_totals_over_the_axes_as_ours_are():
     line |= {"moment_x": 0.003, "moment_y": 0.004, "moment_z": 0.0, "force": 0.75, "moment": 0.003}
     own = real.neurobem_errors([line | {"model": "neurobem"}, line | {"model": "rigid_body", "force_z": 9.0}])
     assert own == {("a", "force"): pytest.approx(1.3), ("a", "moment"): pytest.approx(0.005)}
+
+
+def test_a_study_on_which_the_stage_stopped_has_its_line(tmp_path: Path) -> None:
+    """Before: it was left out of the table as a recording is that could not be obtained."""
+    results = {
+        "neurobem-1": {"available": True, "row": real.row_of(verdict(), STUDIES[0]), "compared": []},
+        "neurobem-4": {"available": False, "reason": f"{real.STOPPED}: KeyError: 'wind'", "study": "neurobem-4"},
+        "crazypad-cut": {"available": False, "reason": "not obtained", "study": "crazypad-cut"},
+    }
+    for name, result in results.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps({"reason": ""} | result))
+    columns = ["flight", "model", *(f"{g}_{a}" for g in ("force", "moment") for a in "xyz")]
+    pd.DataFrame(columns=columns).to_csv(tmp_path / "flights.csv", index=False)
+    out = [str(tmp_path / name) for name in ("table.csv", "coefficients.csv")]
+    studies = [str(tmp_path / f"{name}.json") for name in results]
+    tabulate_real.main(studies, str(tmp_path / "flights.csv"), "abc123", *out)
+    table = pd.read_csv(out[0])
+    assert table["study"].tolist() == ["neurobem-1", "neurobem-4"]
+    assert table["word"].tolist() == ["explained", "stopped"]
+    assert table["expected"][1].startswith("rotor_drag") and pd.isna(table["expected_found"][1])
+    assert set(table["judged_by"]) == {"abc123"}

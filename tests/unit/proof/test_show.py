@@ -1,5 +1,7 @@
 """The proof's tables as text: wrong values without their units, small coefficients in a power of ten."""
 
+from pathlib import Path
+
 import pandas as pd
 
 from rotorid.plots import proof
@@ -26,6 +28,7 @@ def test_a_wrong_value_is_named_without_its_unit() -> None:
     row = {
         "study": "a",
         "about": "b",
+        "word": "explained",
         "found": "rotor_drag",
         "expected": None,
         "expected_found": None,
@@ -80,7 +83,7 @@ def test_releases_have_a_row_for_each_date_and_simulator_and_one_for_all():
 
 
 def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
-    row = release_row("multibody_2026-11-26_false", 0.1, 10) | {"what": "Drawn, released 2026-11-26: wrong"}
+    row = release_row("multibody_2026-11-26_false", 0.1, 10) | {"what": "Drawn stands, released 2026-11-26: wrong"}
     rows = pd.DataFrame(
         [
             row | {"judged_by": "c87a46b88923cd47"},
@@ -89,8 +92,8 @@ def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
         ]
     )
     shown = show.with_target(rows, {"2026-11-26": "40ff225"})
-    assert shown["by"].tolist() == ["c87a46b, none seen", "not kept, all seen", "not kept, 4 seen"]
-    assert shown["what"].unique().tolist() == ["Drawn, release of 40ff225: wrong"]
+    assert shown["by"].tolist() == ["c87a46b", "not kept", "not kept, 4 seen"]
+    assert shown["what"].unique().tolist() == ["Drawn stands, 40ff225: wrong"]
     assert shown["with_interval"][0] == "10.0 % (0.0 to 100.0 %)".replace(
         "0.0 to 100.0 %", "0.0\u00a0to\u00a0100.0\u00a0%"
     )
@@ -99,6 +102,19 @@ def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
 def test_codes_of_stored_tables() -> None:
     tables = {"a": pd.DataFrame({"judged_by": ["c87a46b88923cd47", None]}), "b": pd.DataFrame({"x": [1]})}
     assert show.codes_of(tables) == {"a": "c87a46b, not kept", "b": "not kept"}
+    assert show.codes_of(tables, "24d4ace")["a"] == "c87a46b, not kept (of commit 24d4ace or before)"
+
+
+def test_every_stored_table_of_the_repository_has_a_code_or_a_commit() -> None:
+    stored = Path(__file__).parents[3] / "docs" / "proof"
+    names = show.commits(pd.read_csv(stored / "releases.csv"))
+    tables = {name: pd.read_csv(stored / f"{name}.csv") for name in ("cases", "confusion", "power", "peers", "real")}
+    codes = show.codes_of(tables, names[show.DEVELOPMENT])
+    assert codes["confusion"] == codes["power"] == codes["peers"] == "not kept (of commit 24d4ace or before)"
+    assert codes["cases"].endswith(codes["power"]) and "not kept" not in codes["real"]
+    drawn = tables["cases"].dropna(subset="released")
+    by_release = pd.read_csv(stored / "releases.csv").set_index("released")["code"]
+    assert (drawn["judged_by"] == drawn["released"].map(by_release)).all()
 
 
 def test_the_figure_of_the_targets_has_every_target() -> None:
@@ -110,13 +126,15 @@ def test_the_figure_of_the_targets_has_every_target() -> None:
 
 
 def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> None:
-    row = {"study": "a", "about": "cut", "found": None, "values": None, "unexplained_share": 1}
+    row = {"study": "a", "about": "cut", "word": "explained", "found": None, "values": None, "unexplained_share": 1}
     row |= {f"force_{stage}": 0.1 for stage in ("before", "refitted", "after")}
     rows = [row | {"expected": "unequal_rotors; com_offset", "expected_found": None}]
     rows += [row | {"expected": "motor_lag", "expected_found": "motor_lag"}, row | {"expected": None}]
     shown = show.of_studies(pd.DataFrame(rows))
     assert shown["expected"].tolist() == ["unequal rotors: no; com offset: no", "motor lag: found", "–"]
     assert shown["confirmed"].tolist() == [0, 1, ""]
+    halted = show.of_studies(pd.DataFrame([rows[0] | {"word": "stopped"}])).iloc[0]
+    assert (halted["found"], halted["error"], halted["confirmed"]) == ("the stage stopped", "–", 0)
 
 
 def test_plantings_are_counted_by_flight_and_family():
@@ -161,3 +179,18 @@ def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
         "-510 (-520 to -500)",
         "1e-6 m",
     ]
+
+
+def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
+    effects = pd.DataFrame(
+        [
+            ("rotor_drag", "established", "", "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
+            ("axial_inflow", "suggested", "axial_inflow or frame_drag", None, None, None, None, None),
+        ],
+        columns=["effect", "status", "alternatives", "symbol", "value", "low_95", "high_95", "unit"],
+    )
+    shown = show.of_effects(effects)
+    assert shown.iloc[0].tolist() == ["rotor drag", "established", "k_d", "40.8 (39 to 43.4)", "1e-6 N s2"]
+    unsure = pd.DataFrame([{**effects.iloc[0], "value": -4.38e-5, "low_95": -0.0052, "high_95": 0.0051}])
+    assert show.of_effects(unsure)["value"].item() == "-0.00004 (-0.00520 to 0.00510)"
+    assert shown.iloc[1].tolist() == ["axial inflow (or: axial inflow or frame drag)", "suggested", "", "", ""]

@@ -88,3 +88,12 @@ def test_a_bench_lacks_the_reference_of_an_axis_alone():
     time = np.arange(2001) / 100
     table = pd.DataFrame({"time_s": time, "force_x_n": time, "force_y_n": time, "reference_force_x_n": time})
     assert list(missing(set_of(Run("a", table), kind="bench"))) == ["reference_force_y_n"]
+
+
+def test_pauses_between_the_readings_of_a_bench_are_no_recordings():
+    """Ten readings of 3 s an hour; before, the hour counted."""
+    time = np.concatenate([360 * k + np.arange(151) / 50 for k in range(10)])
+    run = Run("a", pd.DataFrame({"time_s": time, "force_z_n": 0.0, "reference_force_z_n": 0.0}))
+    assert basis_of(set_of(run, kind="bench")).sentence.startswith("The verdict rests on 30 s of recordings;")
+    slow = Run("b", pd.DataFrame({"time_s": 2.0 * np.arange(16), "force_z_n": 0.0, "reference_force_z_n": 0.0}))
+    assert basis_of(set_of(slow, kind="bench")).recorded_s == 30.0

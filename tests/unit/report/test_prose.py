@@ -139,11 +139,13 @@ def test_symbols_are_set_as_mathematics() -> None:
 
 
 def test_units_and_names_stay_on_one_line_and_small_numbers_keep_their_digits() -> None:
-    assert [prose.unit(u) for u in ("kg m2", "N s2/(rad m)", "1e-6 kg/rad", "1")] == [
+    assert [prose.unit(u) for u in ("kg m2", "N s2/(rad m)", "1e-6 kg/rad", "1", "1e-6 1", "N/(N)2")] == [
         "kg\u00a0m²",
         "N\u00a0s²/(rad\u00a0m)",
         "10⁻⁶\u00a0kg/rad",
         "1",
+        "10⁻⁶",
+        "1/N",
     ]
     assert prose.one_line("imrc-brushless a") == "imrc\u2011brushless\u00a0a"
     assert [prose.sig(x, 3) for x in (0.20613, -0.00421, 12.0, 1.44e-6, None)] == [

@@ -30,22 +30,23 @@ def test_outside_of_git_the_commit_is_said_to_be_unknown(tmp_path: Path, monkeyp
     assert "no commit is known" in provenance.in_words(tmp_path, "0123456789ab")
 
 
+def git(folder: Path, *arguments: str) -> str:
+    identity = ["-c", "user.name=t", "-c", "user.email=t@example.org"]
+    command = ["git", "-C", str(folder), *identity, *arguments]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
 @pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
 def test_a_changed_file_marks_the_commit_dirty(tmp_path: Path) -> None:
-    def git(*arguments: str) -> str:
-        identity = ["-c", "user.name=t", "-c", "user.email=t@example.org"]
-        command = ["git", "-C", str(tmp_path), *identity, *arguments]
-        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
-
-    git("init", "-q")
+    git(tmp_path, "init", "-q")
     (tmp_path / "a").write_text("1")
-    git("add", "a")
-    git("commit", "-q", "-m", "one")
-    head = git("rev-parse", "HEAD")
+    git(tmp_path, "add", "a")
+    git(tmp_path, "commit", "-q", "-m", "one")
+    head = git(tmp_path, "rev-parse", "HEAD")
     assert provenance.commit(tmp_path) == head
     (tmp_path / "a").write_text("2")
     assert provenance.commit(tmp_path) == f"{head}-dirty"
-    day = git("log", "-1", "--format=%cs")
+    day = git(tmp_path, "log", "-1", "--format=%cs")
     assert provenance.in_words(tmp_path, "0123456789ab") == (
         f"Made from commit {head[:10]} of {day}, with changes that are not committed. "
         "The code that judges recordings has the hash 0123456 (0123456789ab)."
@@ -67,3 +68,30 @@ def test_the_librarys_commit_is_that_of_its_clone_and_not_of_a_project_that_hold
     subprocess.run([*git, "add", "rotorid"], check=True)
     subprocess.run([*git, "commit", "-q", "-m", "its clone"], check=True)
     assert provenance.own_commit() == provenance.commit(tmp_path) != ""
+
+
+def test_the_packages_asked_for_are_named_once_and_without_their_bounds() -> None:
+    project = """
+[project]
+name = "own"
+dependencies = ["numpy>=2", "scipy"]
+[project.optional-dependencies]
+all = ["own[logs]", "ros-bags[x]>=0.1,!=0.2", "numpy"]
+"""
+    assert provenance.asked_for(project) == ["numpy", "scipy", "ros-bags"]
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
+def test_a_stored_file_is_called_by_the_commit_that_changed_it_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert provenance.stored_with(tmp_path, "table.csv") == "not known"
+    git(tmp_path, "init", "-q")
+    for name in ("table.csv", "other.csv"):
+        (tmp_path / name).write_text("1")
+        git(tmp_path, "add", ".")
+        git(tmp_path, "commit", "-q", "-m", name)
+    first = git(tmp_path, "rev-parse", "HEAD~1")[:7]
+    assert provenance.stored_with(tmp_path, "table.csv").startswith(f"{first}, 20")
+    assert provenance.stored_with(tmp_path, "absent.csv") == "not known"

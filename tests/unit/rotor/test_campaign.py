@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.rotor.campaign import COLUMNS, _device_time, thrust_points, torque_points
+from rotorid.rotor.campaign import COLUMNS, thrust_points, torque_points
+from rotorid.stand.clocks import device_time
 
 STEP_S = 0.02
 
@@ -84,4 +85,4 @@ def test_of_a_batch_that_the_host_sees_at_once_the_last_sample_tells_the_time() 
     """Five samples arrive together every 0.1 s: between two looks of the host, time goes on from the latest sample."""
     time = pd.Series(np.arange(1, 51) * STEP_S)
     seen = pd.Series(10 + np.ceil(np.arange(1, 51) / 5) * 0.1)
-    np.testing.assert_allclose(_device_time(time, seen, pd.Series([10.1, 10.25, 11.0])), [0.1, 0.25, 1.0])
+    np.testing.assert_allclose(device_time(time, seen, pd.Series([10.1, 10.25, 11.0])), [0.1, 0.25, 1.0])

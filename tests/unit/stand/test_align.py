@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.errors import InputError
 from rotorid.stand import align
 
 OFFSET_S, LAG_S = -0.083, 0.055
@@ -64,3 +65,26 @@ def test_a_torque_test_aligns_on_the_speed() -> None:
     found = align.torque_offset(rotor, wrench)
     assert found.delay_s == pytest.approx(0.06, abs=0.005)
     assert found.delay_error_s < 0.005
+
+
+def test_recordings_of_an_emulator_faster_than_life_are_aligned_in_device_time() -> None:
+    """Five device seconds a host second, read in batches: no quartz is that far off."""
+    known = pair(6, sine=True)
+    quadrotor, wrench = known.quadrotor.drop(columns="host_s"), known.wrench.drop(columns="host_s")
+    wrench["time_s"] += 2.5  # switched on earlier
+    for table, began_s, batch_s in ((quadrotor, 2.5, 0.04), (wrench, 0.0, 0.02)):
+        table["host_time_s"] = np.ceil((table["time_s"] + began_s) / 5 / batch_s) * batch_s
+    made = align.pair_of("fast", 6, True, quadrotor, wrench, 2e-4)
+    (entry,) = align.align([made], thrust_of)
+    felt = made.wrench["host_s"] - entry.offset_s  # on the quadrotor's clock
+    np.testing.assert_allclose(felt, known.wrench["time_s"], atol=0.02)
+    slow = align.pair_of("slow", 6, True, *(t.assign(host_time_s=t["time_s"]) for t in (quadrotor, wrench)), 2e-4)
+    assert (slow.wrench["host_s"] == wrench["time_s"]).all()
+
+
+def test_recordings_that_have_no_time_in_common_are_refused() -> None:
+    made = pair(6, sine=True)
+    first = made.quadrotor.assign(host_time_s=made.quadrotor["time_s"] / 5)
+    second = made.wrench.assign(host_time_s=100 + made.wrench["time_s"] / 5)
+    with pytest.raises(InputError, match="no time in common"):
+        align.pair_of("apart", 6, True, first, second, 2e-4)
