@@ -21,7 +21,7 @@ def compare(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File for the result as JSON.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
-    ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where something surely changed.")] = False,
+    ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where a change is stated (probability 0.99).")] = False,
 ) -> None:
     """Say what changed between two sets of flights of one vehicle, and by how much at most everything else.
 
