@@ -23,7 +23,7 @@ def compare(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File for the result as JSON.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
-    ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where something surely changed.")] = False,
+    ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where a change is stated (probability 0.99).")] = False,
 ) -> None:
     """Say what changed since the flights of one vehicle that were good, and by how much at most everything else.
 

@@ -20,7 +20,7 @@ def export(
     """Write the vehicle, with its effects as far as the form knows them, for another tool.
 
     What the form cannot express is named, on the screen and in the file. Where the tool is installed the vehicle is
-    flown there beside ours first: a file that the tool does not read is not written.
+    flown there and compared with ours first: a file that the tool does not read is not written.
 
     Example: `rotorid export flights-verdict/improved_vehicle.yaml --to rotorpy`
     """

@@ -17,7 +17,7 @@ from rotorid.names import neighbour
 def plan(
     verdict: Annotated[Path, typer.Argument(metavar="VERDICT", help="A verdict's folder, or its verdict.json.")],
     recordings: Annotated[
-        Path | None, typer.Option("--set", help="The recording set; by default the one beside the verdict.")
+        Path | None, typer.Option("--set", help="The recording set; by default the one next to the verdict.")
     ] = None,
     limits: Annotated[Path | None, typer.Option(help="YAML file of what the flight, or session, may ask for.")] = None,
     want: Annotated[
@@ -131,7 +131,7 @@ def set_of(folder: Path, content: dict) -> Path:
     for place in places:
         if (place / "vehicle.yaml").is_file():
             return place
-    raise InputError(f"{folder}: the recording set {name} of this verdict is not beside it; name it with --set")
+    raise InputError(f"{folder}: the recording set {name} of this verdict is not next to it; name it with --set")
 
 
 def together(

@@ -74,7 +74,7 @@ def init(
         path.write_text(text, encoding="utf-8")
         typer.echo(
             f"{path}: written from template {like}. Put runs (CSV or Parquet, columns as in the recording contract) "
-            f"beside it, then `rotorid check {folder}`"
+            f"next to it, then `rotorid check {folder}`"
         )
 
 

@@ -1,4 +1,4 @@
-"""The fleet's page: one HTML file that needs no other beside the verdicts that it links to."""
+"""The fleet's page: one HTML file that needs no other but the verdicts that it links to."""
 
 from __future__ import annotations
 

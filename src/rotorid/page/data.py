@@ -120,7 +120,7 @@ def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
 
 
 def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[Trace]]) -> dict:
-    """Size of the error by half seconds beside what was flown: variables and, by channel, before and after."""
+    """Size of the error by half seconds next to what was flown: variables and, by channel, before and after."""
     variables = sorted({v for known in analysis.regimes.values() for v in known if v != "time_s"})
     channels = list(dict.fromkeys(c for _, c in by_pair))
     rows: dict[str, dict[str, list[np.ndarray]]] = {}

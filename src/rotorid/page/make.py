@@ -405,8 +405,8 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
         notes.append(f"Not delivered: {e.withheld}.")
     elif effect is not None and effect.confusers:
         notes.append(
-            f"What is easily mistaken for it ({listed([effect_words(i) for i in effect.confusers])}) was tested beside "
-            "it and does not explain these data as well."
+            f"What is easily mistaken for it ({listed([effect_words(i) for i in effect.confusers])}) was tested "
+            "jointly with it and does not explain these data as well."
         )
     if effect is not None and effect.source:
         notes.append(f"Source: {effect.source}.")
@@ -549,7 +549,7 @@ FARTHEST = 100.0
 
 
 def bars(channel: Channel) -> Markup:
-    """Errors as believed (open) and improved (full) beside the noise (line), on a logarithmic scale."""
+    """Errors as believed (open) and improved (full) next to the noise (line), on a logarithmic scale."""
     errors, _ = errors_of(channel)
     if not channel.noise_floor or errors.before is None or errors.after is None:
         return Markup("")

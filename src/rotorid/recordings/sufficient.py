@@ -57,7 +57,7 @@ LEAST_LIFT_N = 1.0
 
 
 def sufficient(recordings: RecordingSet) -> RecordingSet:
-    """The set as the analysis can use it: runs that are of no use left out, each with a sentence in `left_out`.
+    """The set as the analysis can use it: runs that cannot be used left out, each with a sentence in `left_out`.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def reads(run: Run, names: tuple[str, ...]) -> bool:
 
 
 def channels_of(run: Run) -> set[str]:
-    """Channels of a flight that a run can be compared in, beside those of its rotors."""
+    """Channels of a flight that a run can be compared in, besides those of its rotors."""
     force, turning, attitude = (reads(run, n) for n in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, c.QUATERNION))
     moving = attitude and (reads(run, c.VELOCITY) or reads(run, c.POSITION))
     found = {
@@ -202,7 +202,7 @@ def known_names(vehicle: Vehicle) -> list[str]:
 
 
 def check_spelling(run: Run, vehicle: Vehicle) -> None:
-    """InputError where an unknown column is surely a known one that is missing."""
+    """InputError where an unknown column can only be a known one that is missing."""
     there = set(run.table.columns)
     missing = [name for name in known_names(vehicle) if name not in there]
     halved = {
@@ -356,7 +356,7 @@ def nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
     if any(run.has(a, b) for a, b in pairs):
         return None
     half = next(((b if run.has(a) else a, a if run.has(a) else b) for a, b in pairs if run.has(a) or run.has(b)), None)
-    what = f"column {half[0]} is missing beside {half[1]}" if half else "there is no such pair of columns"
+    what = f"column {half[0]} is missing where {half[1]} is there" if half else "there is no such pair of columns"
     return (
         f"{whereof(run)}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
         f"{likely(run, (*c.FORCE, *c.REFERENCE_FORCE))}"
@@ -494,7 +494,7 @@ def check_common(recordings: RecordingSet) -> None:
 
 
 def first_reason(recordings: RecordingSet) -> str:
-    """Why the first of the runs left out is of no use."""
+    """Why the first of the runs left out cannot be used."""
     return recordings.left_out[0].removeprefix("Left out: ").removesuffix(".")
 
 

@@ -152,7 +152,7 @@ INSUFFICIENT = {
     ),
     "bench without its reference": (
         bench(reference_force_z_n="z", reference_force_x_n="x", reference_force_y_n="y"),
-        ["run1.csv", "column reference_force_x_n is missing beside force_x_n"],
+        ["run1.csv", "column reference_force_x_n is missing where force_x_n is there"],
     ),
 }
 
