@@ -377,8 +377,6 @@ class Plantings(Section):
         min_length=1, description="Shell patterns on the names in workflow/plantings.tsv; one must fit [names]."
     )
     batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
-    history: bool = Field(description="Whether each vehicle's later sets are held against its first ones.")
-    good: int = Field(ge=1, le=MOST_SETS, description="First sets of each vehicle that count as good [1].")
     kept: Text = Field(
         description="Table whose rows are kept beside new ones, marked where older code judged them; a file that does "
         "not exist keeps none [path]."
@@ -434,7 +432,9 @@ class Fleet(Section):
     """Every recording set of a folder, judged together."""
 
     batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
-    history: bool = Field(description="Whether each vehicle's later sets are held against its first ones.")
+    history: bool = Field(
+        description="Whether each vehicle's later sets are compared with its first [true, false]."
+    )
     good: int = Field(ge=1, le=MOST_SETS, description="First sets of each vehicle that count as good [1].")
 
 

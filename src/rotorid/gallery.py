@@ -188,10 +188,7 @@ def draw(folder: Path, target: Path) -> str:
         up = own[["time_s", "specific_force_z_m_s2"]].dropna()
         own, lines = up, {"measured": -up["specific_force_z_m_s2"].to_numpy()}
         caption, label = f"Specific force upward in {runs[0].stem}, the part in the air.", "specific force upward, m/s²"
-    style.use()
-    import matplotlib.pyplot as plt
-
-    fig, ax = plt.subplots(figsize=(style.TEXT_WIDTH_IN, 2.2))
+    fig, ax = style.figure(2.2)
     for word, values in lines.items():
         ax.plot(
             own["time_s"],
@@ -202,8 +199,7 @@ def draw(folder: Path, target: Path) -> str:
         )
     ax.set(xlabel="time, s", ylabel=label)
     ax.legend()
-    fig.savefig(target, dpi=130, metadata={"Software": None})
-    plt.close(fig)
+    style.save(fig, target)
     return caption
 
 

@@ -49,6 +49,16 @@ def stamp_of(folders):
     return found.hexdigest()
 
 
+def folders_of_fleet(wildcards):
+    """Folders of all sets."""
+    return [f"{CONFIG.recordings}/{name}" for name in fleet_sets()]
+
+
+def stamp_of_fleet(wildcards):
+    """Hash of the names, sizes and times of the files of all sets."""
+    return stamp_of(folders_of_fleet(wildcards))
+
+
 def verdicts_of_fleet(wildcards):
     """Folders of verdicts, one a batch."""
     if not fleet_sets():
@@ -84,8 +94,8 @@ rule fleet_history:
         events="results/fleet/events.csv",
         figure="results/fleet/history.svg",
     params:
-        folders=lambda wildcards: [f"{CONFIG.recordings}/{name}" for name in fleet_sets()],
-        stamp=lambda wildcards: stamp_of(f"{CONFIG.recordings}/{name}" for name in fleet_sets()),
+        folders=folders_of_fleet,
+        stamp=stamp_of_fleet,
         good=CONFIG.fleet.good,
         code=code_of("fleet_history"),
     log:

@@ -21,6 +21,7 @@ def compare(
         typer.Argument(help="Sets: one or more of flights that were good, then the one in question."),
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File for the result as JSON.")] = None,
+    page: Annotated[Path | None, typer.Option("--page", help="File for a page with figures (HTML).")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
     ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where a change is stated (probability 0.99).")] = False,
@@ -37,7 +38,7 @@ def compare(
 
     `rotorid compare monday tuesday wednesday thursday`
 
-    `rotorid compare reference today --ci`
+    `rotorid compare reference today --ci --page changes.html`
     """
     with one_sentence():
         *good, new = sets
@@ -52,10 +53,11 @@ def compare(
             found = changes_between(first, second)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         if out is not None:
-            from rotorid.writing import all_or_none
+            write(out, text)
+        if page is not None:
+            from rotorid.page.changes import make_changes_page
 
-            with all_or_none(out) as (part,):
-                part.write_text(text, encoding="utf-8")
+            write(page, make_changes_page(found))
         if as_json:
             typer.echo(text, nl=False)
         else:
@@ -63,6 +65,14 @@ def compare(
                 typer.echo(line)
     if ci and any(c.status in ("established", "ambiguous") for c in found.changes):
         raise typer.Exit(1)
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    from rotorid.writing import all_or_none
+
+    with all_or_none(path) as (part,):
+        part.write_text(text, encoding="utf-8")
 
 
 def flights(folder: Path) -> RecordingSet:

@@ -15,6 +15,7 @@ from rotorid.mismatch.changes import Changes, as_one, changes_between
 from rotorid.mismatch.changes.compare import Change
 from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
+from rotorid.page.changes import make_changes_page
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from tests.unit.mismatch.flights import Flight
 
@@ -122,3 +123,13 @@ def test_what_differs_between_good_flights_is_no_change():
     fourth = flights("day4", (4,), drag=1.1)
     assert "rotor_drag" in {i for c in sure(changes_between(good[0], fourth)) for i in (c.id, *c.alternatives)}
     assert sure(changes_between(as_one(good), fourth)) == []
+
+
+def test_the_page_holds_sentences_limits_and_both_recordings(tmp_path):
+    found = compared("believed lighter")
+    page = make_changes_page(found)
+    assert sentences(found)[0] in page and "<h1>friday compared with monday</h1>" in page
+    assert page.count("<svg") == 2 and "Rotor drag" in page
+    assert {"force_z", "moment_x"} <= found.residuals[0].keys() & found.residuals[1].keys()
+    script_free = page.lower()
+    assert "<script" not in script_free and "content-security-policy" in script_free

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from rotorid.mismatch.changes.joint import Reference, joint_of, reference_of
 from rotorid.mismatch.changes.notes import notes_of
 from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
+from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.findings import Estimate, Finding, Status
 from rotorid.mismatch.posterior.evidence import Evidence
@@ -20,7 +21,7 @@ from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import parameters, statements_of
-from rotorid.mismatch.rows import PARAMETER_NAMES
+from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, Rows
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -43,6 +44,16 @@ class Change:
 
 
 @dataclass(frozen=True)
+class Residual:
+    """What a believed vehicle leaves of one force (N) or moment (N m) in a stretch."""
+
+    time_s: np.ndarray
+    """(n,)."""
+    values: np.ndarray
+    """(n,)."""
+
+
+@dataclass(frozen=True)
 class Changes:
     """What changed between two sets of flights of one vehicle."""
 
@@ -54,6 +65,8 @@ class Changes:
     """By how much everything else may have changed at most, with 95 % probability; of a value relative."""
     values: tuple[Estimate, ...]
     """Of every believed value its relative change with 95 % interval, changed or not."""
+    residuals: tuple[Mapping[str, Residual], Mapping[str, Residual]]
+    """Of the longest stretch of each set, by channel."""
     notes: tuple[str, ...] = ()
     """What keeps the two sets from being compared fully, in sentences."""
 
@@ -86,6 +99,7 @@ def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()
         changes=(*mistakes_that_differ(joint.mistakes_of_base, joint.mistakes_of_new), *changes),
         limits=tuple(limit for limit in limits_of(found, squares) if limit.id not in changed),
         values=values_of(found, *vehicles),
+        residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
         notes=notes_of(joint, base.name, new.name),
     )
 
@@ -108,6 +122,13 @@ def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:
         return first
     runs = tuple(replace(run, name=f"{own.name}-{run.name}") for own in sets for run in own.runs)
     return replace(first, name=" + ".join(own.name for own in sets), runs=runs, held_out=())
+
+
+def residuals_of(rows: Sequence[Rows]) -> dict[str, Residual]:
+    """What is left in the longest stretch, by channel that the set has."""
+    longest = max(rows, key=lambda own: len(own.time_s))
+    known = [c for c in range(CHANNELS_OF_WRENCH) if np.isfinite(longest.y[:, c]).all()]
+    return {CHANNELS[c]: Residual(longest.time_s, longest.y[:, c]) for c in known}
 
 
 def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:

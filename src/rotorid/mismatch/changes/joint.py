@@ -50,6 +50,7 @@ class Joint:
     flown_by_base: Mapping[str, float]
     flown_by_new: Mapping[str, float]
     """How far each set goes: 95th percentile of the magnitude of some regime variables."""
+    rows_of_new: tuple[Rows, ...]
     mistakes_of_base: tuple[Finding, ...]
     mistakes_of_new: tuple[Finding, ...]
     """Mistakes in the recordings of each set, which were undone before."""
@@ -119,6 +120,7 @@ def joint_of(reference: Reference, new: RecordingSet) -> Joint:
         reference.known,
         np.divide(*believed),
         *flown,
+        tuple(rows),
         reference.mistakes,
         mistakes,
         *squares,

@@ -103,7 +103,7 @@ def test_a_channel_that_is_worse_on_the_runs_held_out_is_a_warning(name):
         least = min(errors.before, errors.refitted)
         if errors.after > max(1.02 * least, channel.noise_floor or 0.0):
             assert verdict.warnings
-    assert all(text.startswith("On the runs held out the ") for text in verdict.warnings)
+    assert all(text.startswith("On the held-out runs the error of the ") for text in verdict.warnings)
 
 
 def test_what_is_only_suggested_is_in_no_file_and_counts_in_no_figure():
