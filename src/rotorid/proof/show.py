@@ -333,6 +333,7 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
             {
                 "study": row["study"],
                 "about": row["about"],
+                "subject": f"{row['study']}: {row['about']}",
                 "found": "the stage stopped" if row["word"] == "stopped" else "; ".join(found) or "nothing",
                 "expected": "; ".join(f"{one}: {'found' if one in confirmed else 'no'}" for one in expected) or "–",
                 "confirmed": len(confirmed) if expected else "",
@@ -340,7 +341,7 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
                 "unexplained": "–" if pd.isna(share) else f"{100 * share:.0f} %",
             }
         )
-    return pd.DataFrame(rows, columns=["study", "about", "expected", "confirmed", "found", "error", "unexplained"])
+    return pd.DataFrame(rows, columns=["study", "about", "subject", "expected", "confirmed", "found", "error", "unexplained"])
 
 
 def of_channels(channels: pd.DataFrame) -> pd.DataFrame:
