@@ -432,9 +432,7 @@ class Fleet(Section):
     """Every recording set of a folder, judged together."""
 
     batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
-    history: bool = Field(
-        description="Whether each vehicle's later sets are compared with its first [true, false]."
-    )
+    history: bool = Field(description="Whether each vehicle's later sets are compared with its first [true, false].")
     good: int = Field(ge=1, le=MOST_SETS, description="First sets of each vehicle that count as good [1].")
 
 

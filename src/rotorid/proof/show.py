@@ -331,6 +331,7 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
             {
                 "study": row["study"],
                 "about": row["about"],
+                "subject": f"{row['study']}: {row['about']}",
                 "found": "the stage stopped" if row["word"] == "stopped" else "; ".join(found) or "nothing",
                 "expected": "; ".join(f"{one}: {'found' if one in confirmed else 'no'}" for one in expected) or "–",
                 "confirmed": len(confirmed) if expected else "",
@@ -338,7 +339,9 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
                 "unexplained": "–" if pd.isna(share) else f"{100 * share:.0f} %",
             }
         )
-    return pd.DataFrame(rows, columns=["study", "about", "expected", "confirmed", "found", "error", "unexplained"])
+    return pd.DataFrame(
+        rows, columns=["study", "about", "subject", "expected", "confirmed", "found", "error", "unexplained"]
+    )
 
 
 def of_channels(channels: pd.DataFrame) -> pd.DataFrame:
@@ -375,7 +378,7 @@ def of_effects(effects: pd.DataFrame) -> pd.DataFrame:
         # A value that its interval does not separate from zero has no digits of its own.
         decimals = max(0, 2 - math.floor(math.log10(largest / 10**power))) if largest else 0
         form = f".{decimals}f" if abs(numbers[0]) < 0.01 * largest else ".3g"
-        value, low, high = (f"{x / 10**power:{form}}" for x in numbers)
+        value, low, high = (f"{x / 10**power:{form}}".replace("-", "−") for x in numbers)
         others = words(row.alternatives)
         rows.append(
             {
@@ -399,7 +402,8 @@ def of_campaign_numbers(numbers: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for row in numbers.itertuples():
         power = power_of(row.found)
-        true, found, low, high = (f"{x / 10**power:.4g}" for x in (row.truth, row.found, row.low_95, row.high_95))
+        shown = (row.truth, row.found, row.low_95, row.high_95)
+        true, found, low, high = (f"{x / 10**power:.4g}".replace("-", "−") for x in shown)
         rows.append(
             {
                 "set": row.set,

@@ -175,8 +175,8 @@ def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
     shown = show.of_campaign_numbers(pd.DataFrame([row]))
     assert shown.iloc[0][["inside", "truth", "found", "unit"]].tolist() == [
         "1 of 3",
-        "-404.5",
-        "-510 (-520 to -500)",
+        "−404.5",
+        "−510 (−520 to −500)",
         "1e-6 m",
     ]
 
@@ -192,5 +192,5 @@ def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
     shown = show.of_effects(effects)
     assert shown.iloc[0].tolist() == ["rotor drag", "established", "k_d", "40.8 (39 to 43.4)", "1e-6 N s2"]
     unsure = pd.DataFrame([{**effects.iloc[0], "value": -4.38e-5, "low_95": -0.0052, "high_95": 0.0051}])
-    assert show.of_effects(unsure)["value"].item() == "-0.00004 (-0.00520 to 0.00510)"
+    assert show.of_effects(unsure)["value"].item() == "−0.00004 (−0.00520 to 0.00510)"
     assert shown.iloc[1].tolist() == ["axial inflow (or: axial inflow or frame drag)", "suggested", "", "", ""]
