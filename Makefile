@@ -15,7 +15,7 @@ BIN := .venv/bin
 READY := .venv/ready
 TESTED := .venv/tested
 SOURCES := $(shell find Snakefile config.yaml mkdocs.yml pyproject.toml README.md .pre-commit-config.yaml \
-	src acquire firmware workflow notebooks tests raw docs \
+	src proof acquire firmware workflow notebooks tests raw docs \
 	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
 .PHONY: help report site proof plantings campaign test test-slow check environment lock sbom licences
@@ -82,7 +82,7 @@ $(READY): requirements.lock pyproject.toml
 		&& $(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock \
 		|| { echo "Environment: uv did not work here; installing with pip, about a minute"; \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r .venv/without-uv.lock; }
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable . $(if $(wildcard proof/pyproject.toml),--editable ./proof)
 	@touch $@
 
 lock: $(READY) ## resolve the dependencies of pyproject.toml anew

@@ -22,10 +22,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import skfem
 
-from rotorid.bench.reconstruct import read_geometry
-from rotorid.fem import statements, studies
-from rotorid.fem.answers import ratios
-from rotorid.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.fem import statements, studies
+from rotorid.identify.fem.answers import ratios
+from rotorid.identify.fem.sizes import read_assumed, read_moduli
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAWS, SEED = 12, 1

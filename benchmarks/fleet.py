@@ -6,8 +6,8 @@
         [--out benchmarks/fleet.md --measured "processor time, h: 0.9" ...]    its table, with what was measured
 
 A vehicle hides what its number says: nothing, a drag that grows from flight to flight, a payload, a motor lag, drag and
-lag, a centre of mass beside the believed one. Every 25th set is a bench or a stand of `tests/concealed`, one
-effect each or none. Every fiftieth flight is broken in one of four ways.
+lag, a centre of mass beside the believed one. Every 25th set is a bench or a stand of `proof/rotorid_proof/concealed`,
+one effect each or none. Every fiftieth flight is broken in one of four ways.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from rotorid.control.swings import swings
 from rotorid.errors import InputError
-from rotorid.fleet.judge import FAILED, FILES
-from rotorid.mismatch.deliver import deliver
 from rotorid.recordings import read_set, write_set
-from rotorid.templates import read
-from tests.concealed import cases
-from tests.concealed.build import build
+from rotorid.recordings.templates import read
+from rotorid.report.deliver import deliver
+from rotorid.report.fleet.judge import FAILED, FILES
+from rotorid.vehicle.control.swings import swings
+from rotorid_proof.concealed import cases
+from rotorid_proof.concealed.build import build
 
 VEHICLES, EVERY_BROKEN, EVERY_INSTRUMENT = 40, 50, 25
 FIRST_DAY = datetime.date(2026, 1, 5)

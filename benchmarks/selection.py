@@ -3,7 +3,7 @@
 Run: python benchmarks/selection.py [--out benchmarks/selection.md]
 
 The columns of the catalogue's forms, as the regression has them, go to both: to PySINDy's STLSQ as
-`rotorid.proof.peers.sindy` uses it, and to our search (`rotorid.mismatch.select.Search`), timed inside the whole
+`rotorid_proof.peers.sindy` uses it, and to our search (`rotorid.mismatch.select.Search`), timed inside the whole
 analysis, which makes columns, searches and judges. Simulated vehicles, two flights each.
 """
 
@@ -18,13 +18,13 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from rotorid.control.swings import swings
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.findings import CLAIMED
 from rotorid.mismatch.select import Search
-from rotorid.proof.peers import sindy
-from rotorid.proof.peers.problem import problem_of
-from rotorid.templates import read
+from rotorid.recordings.templates import read
+from rotorid.vehicle.control.swings import swings
+from rotorid_proof.peers import sindy
+from rotorid_proof.peers.problem import problem_of
 
 DRAG = {"id": "rotor_drag", "form": "at the hubs", "parameters": {"k_d": 8e-5}}
 OFFSET = {"id": "com_offset", "form": "moment", "parameters": {"r_x": 0.004, "r_y": -0.003}}

@@ -26,10 +26,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
 
-from rotorid.control.pid import AttitudePid, Gains
-from rotorid.control.references import training_reference
 from rotorid.effects.catalogue import catalogue
 from rotorid.vehicle.batch import Batch
+from rotorid.vehicle.control.pid import AttitudePid, Gains
+from rotorid.vehicle.control.references import training_reference
 from rotorid.vehicle.improved import active_forms
 from rotorid.vehicle.simulator import Commands, Motors, Start, simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows

@@ -3,7 +3,7 @@
 Run: python benchmarks/verdict.py [--out benchmarks/verdict.md] [--seconds 20]
 
 The set is simulated (`rotorid simulate`, two flights of the thesis's quadrotor). Steps are timed where
-`rotorid.mismatch.deliver` calls them, in one process, each once, as a user has it.
+`rotorid.report.deliver` calls them, in one process, each once, as a user has it.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ STEPS = {
 
 def main(out: Path | None, seconds: float) -> None:
     begin = time.process_time()
-    from rotorid.mismatch import deliver as stage
     from rotorid.recordings import read_set
+    from rotorid.report import deliver as stage
 
     took = {"starting Python and imports": time.process_time()}
     print(f"imports alone {time.process_time() - begin:.2f} s", file=sys.stderr)
     for name, words in STEPS.items():
         setattr(stage, name, timed(getattr(stage, name), words, took))
     from rotorid.cli.simulating import fly
-    from rotorid.templates import read
+    from rotorid.recordings.templates import read
 
     with tempfile.TemporaryDirectory() as folder:
         place = fly(read("thesis"), Path(folder) / "set", seconds, 2, 1)

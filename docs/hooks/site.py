@@ -150,9 +150,9 @@ def commands_page() -> str:
 def signatures() -> dict[str, str]:
     """To the path of each effect's picture its SVG, drawn from the effect's own equations."""
     from rotorid.effects.catalogue import catalogue
-    from rotorid.plots import style
-    from rotorid.plots.effects import signature_figure
-    from rotorid.plots.signature import signature
+    from rotorid.report.plots import style
+    from rotorid.report.plots.effects import signature_figure
+    from rotorid.report.plots.signature import signature
 
     found = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -28,7 +28,11 @@ __all__ = [
     "verdict",
 ]
 
-_HOME = {name: "api" for name in __all__} | {"InputError": "errors", "Result": "result", "read_set": "recordings"}
+_HOME = {name: "api" for name in __all__} | {
+    "InputError": "errors",
+    "Result": "report.result",
+    "read_set": "recordings",
+}
 
 
 def __getattr__(name: str):

@@ -14,18 +14,17 @@ from tempfile import TemporaryDirectory
 
 import pandas as pd
 
-from rotorid import templates
 from rotorid.errors import InputError
-from rotorid.exports import Exported, export_vehicle
-from rotorid.names import hint
-from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, vehicle_of
+from rotorid.io.text.files import parse_yaml
+from rotorid.io.text.names import hint
+from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, templates, vehicle_of
 from rotorid.recordings.belief import check_belief
 from rotorid.recordings.check import SetCheck, check_recordings
 from rotorid.recordings.files import check_rotors, usable_runs
 from rotorid.recordings.proposed import proposed_in
 from rotorid.recordings.tables import check_table, numbers
-from rotorid.result import FILES, OTHERS, Result
-from rotorid.text_files import parse_yaml
+from rotorid.report.result import FILES, OTHERS, Result
+from rotorid.vehicle.exports import Exported, export_vehicle
 
 Believed = Vehicle | Mapping | str | Path
 """A vehicle, the keys of a `vehicle.yaml`, the path of one, or the name of a template."""
@@ -75,7 +74,7 @@ def verdict(
         Something in the data or the vehicle does not fit; one sentence says what.
     """
     # The effects bring a compiler along, whose start takes seconds.
-    from rotorid.mismatch.deliver import analysis_of, write_files
+    from rotorid.report.deliver import analysis_of, write_files
 
     tell = progress or (lambda text: None)
     recordings = recording_set(data, vehicle, name=name, held_out=held_out, mass_kg=mass_kg, like=like, mapping=mapping)
@@ -171,8 +170,8 @@ def _of_table(name: str, table: pd.DataFrame) -> Run:
 
 
 def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
-    from rotorid.importers.mapping import read_mapping
-    from rotorid.importers.set_of_logs import set_of_logs
+    from rotorid.recordings.importers.mapping import read_mapping
+    from rotorid.recordings.importers.set_of_logs import set_of_logs
 
     found = set_of_logs(
         logs,
@@ -212,8 +211,8 @@ def check(data: Recorded, vehicle: Believed | None = None, **options) -> SetChec
 
 def read_log(path: str | Path, mapping: str | Path | None = None) -> dict[str, pd.DataFrame]:
     """The flights of a log by name, in the contract's columns, axes and units; InputError where it holds none."""
-    from rotorid.importers.logfile import read_log as read
-    from rotorid.importers.mapping import read_mapping
+    from rotorid.recordings.importers.logfile import read_log as read
+    from rotorid.recordings.importers.mapping import read_mapping
 
     return read(Path(path), read_mapping(Path(mapping)) if mapping else None).runs
 
@@ -224,7 +223,7 @@ def simulate(vehicle: Believed, seconds: float = 20.0, flights: int = 2, seed: i
     The vehicle swings in roll and pitch about hover under an attitude controller; sensors are noisy. The set's own
     vehicle is the one without the effects.
     """
-    from rotorid.control.swings import swings
+    from rotorid.vehicle.control.swings import swings
 
     return swings(vehicle_from(vehicle), "simulated", seconds, flights, seed)
 
@@ -246,9 +245,9 @@ def parameters(data: Recorded, to: str, vehicle: Believed | None = None, **optio
 
     Returns
     -------
-    tuple of rotorid.autopilot.parameters.Parameter
+    tuple of rotorid.identify.autopilot.parameters.Parameter
         Each with `value`, `interval_95`, `determined` and `to_set`.
     """
-    from rotorid.autopilot.parameters import parameters_of
+    from rotorid.identify.autopilot.parameters import parameters_of
 
     return parameters_of(recording_set(data, vehicle, **options), to)

@@ -19,10 +19,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from rotorid.control.readings import READING_S
 from rotorid.errors import InputError
+from rotorid.io.text.wording import LONGEST, explained
 from rotorid.mismatch.rules import RULES
-from rotorid.wording import LONGEST, explained
+from rotorid.vehicle.control.readings import READING_S
 
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
 
@@ -349,7 +349,8 @@ class Proof(Section):
     """The proof on concealed recordings."""
 
     seeds: dict[str, Annotated[int, Field(ge=0)]] = Field(
-        description="Repetitions taken of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
+        description="Repetitions taken of each family of cases in proof/rotorid_proof/concealed/cases.tsv; 0 leaves it "
+        "out [1]."
     )
     release: Annotated[str, AfterValidator(_release)] = Field(
         description="Release proof: commit (or date) whose cases, never looked at, are drawn; empty for none [name]."
@@ -387,7 +388,8 @@ class Decisions(Section):
     """Evidence of many sets, on which decisions are scored."""
 
     seeds: dict[str, Annotated[int, Field(ge=0)]] = Field(
-        description="Repetitions kept of each family of cases in tests/concealed/cases.tsv; 0 leaves it out [1]."
+        description="Repetitions kept of each family of cases in proof/rotorid_proof/concealed/cases.tsv; 0 leaves it "
+        "out [1]."
     )
     plantings: list[Text] = Field(
         description="Shell patterns on the names in workflow/plantings.tsv of those kept [names]."
@@ -423,7 +425,8 @@ class Ablation(Section):
     """What each rule of the mismatch stage is worth."""
 
     cases: list[Text] = Field(
-        min_length=1, description="Shell patterns on the cases of tests/concealed/cases.tsv; one must fit [names]."
+        min_length=1,
+        description="Shell patterns on the cases of proof/rotorid_proof/concealed/cases.tsv; one must fit [names].",
     )
     most: int = Field(ge=1, description="Sets that a rule is judged without, of those in which it fired [1].")
 

@@ -17,11 +17,11 @@ from rotorid.acquire.cli import app
 from rotorid.acquire.geometry import GF_N, body_forces, cell_forces
 from rotorid.acquire.identify import stable_name, udev_rule, who_is_there
 from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
+from rotorid.identify.stand import align
+from rotorid.identify.stand.recordings import read_pairs
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
 from rotorid.io.tables import read_tables
-from rotorid.stand import align
-from rotorid.stand.recordings import read_pairs
 from tests.acquire.fault_table import seen
 
 ACQUIRE = [sys.executable, "-m", "rotorid.acquire"]

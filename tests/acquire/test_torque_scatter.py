@@ -7,8 +7,8 @@ import pytest
 
 from rotorid.acquire.campaign import SEED, run_campaign
 from rotorid.acquire.emulators.truth import draw_truth
+from rotorid.identify.rotor.campaign import torque_points
 from rotorid.io.tables import read_tables
-from rotorid.rotor.campaign import torque_points
 
 
 def deviation(folder: Path, seed: int) -> float:

@@ -18,9 +18,9 @@ import pandas as pd
 from scipy.io import savemat
 
 from rotorid.errors import InputError
-from rotorid.importers.logfile import read_log
 from rotorid.recordings import columns as c
-from tests.unit.importers import test_importers, test_log_formats
+from rotorid.recordings.importers.logfile import read_log
+from tests.unit.recordings.importers import test_importers, test_log_formats
 
 EVERY = 8
 """Every how many samples of the known flight the sound logs hold."""

@@ -15,9 +15,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rotorid.importers.guessing.guess import guess
-from rotorid.importers.logfile import read_log
-from rotorid.importers.mapping import read_columns
+from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.logfile import read_log
+from rotorid.recordings.importers.mapping import read_columns
 from tests.fuzz.foreign import SOUND, look, sound
 
 NEEDS = {"log.bbl": "orangebox", "log.bin": "pymavlink", "log.bag": "rosbags", "log.mcap": "rosbags"}

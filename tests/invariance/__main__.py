@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 from rotorid.errors import InputError
-from rotorid.mismatch.deliver import judge
 from rotorid.recordings import read_set
+from rotorid.report.deliver import judge
 from tests.invariance.changes import CHANGES, LESS_IS_KNOWN
 from tests.invariance.compare import difference
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rotorid.mismatch.deliver import judge, verdict_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
-from tests.concealed import build, cases
+from rotorid.report.deliver import judge, verdict_of
+from rotorid_proof.concealed import build, cases
 from tests.invariance.__main__ import MOST_MOVED, MOST_MOVED_BY_LESS, read, summary
 from tests.invariance.changes import CHANGES, LESS_IS_KNOWN, Changed
 from tests.invariance.compare import difference
@@ -68,7 +68,7 @@ def test_the_kept_table_is_what_the_page_says() -> None:
 
 def flight() -> RecordingSet:
     """The bundled example: two flights."""
-    return read_set(Path(__file__).parents[2] / "src" / "rotorid" / "examples")
+    return read_set(Path(__file__).parents[2] / "src" / "rotorid" / "cli" / "examples")
 
 
 def test_a_turned_world_moves_the_vehicle_alike() -> None:

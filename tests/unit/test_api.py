@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 import rotorid
-from rotorid import templates
-from rotorid.recordings import RecordingSet, read_set, write_set
+from rotorid.recordings import RecordingSet, read_set, templates, write_set
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import yaml
 
-from rotorid.blackbox.compare import conformal_coverage, folds
 from rotorid.config import ConfigError, check, from_command_line
 from rotorid.errors import InputError
-from rotorid.proof import plan
+from rotorid.identify.blackbox.compare import conformal_coverage, folds
+from rotorid_proof import plan
 
 ROOT = Path(__file__).parents[2]
 SOUND = yaml.safe_load((ROOT / "config.yaml").read_text())
@@ -203,7 +203,7 @@ def test_a_misspelled_key_of_each_section_gets_the_right_one(section: str) -> No
 
 
 def test_an_unknown_family_of_the_proof_is_named() -> None:
-    cases = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")
+    cases = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")
     plan.check_families(cases, SOUND["proof"]["seeds"])
     with pytest.raises(
         InputError, match=r"proof\.seeds\.singel is no family of concealed cases; did you mean single\?"
@@ -215,14 +215,14 @@ def test_an_unknown_family_of_the_proof_is_named() -> None:
 
 def test_more_repetitions_than_a_family_has_are_named() -> None:
     """Before: three were taken in place of 300, without a word."""
-    cases = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")
+    cases = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")
     with pytest.raises(InputError, match=r"proof\.seeds\.single is 300, expected at most 3, all that there are"):
         plan.check_families(cases, {"single": 300})
 
 
 def test_a_proof_without_a_case_is_named() -> None:
     """Before: tables of no case were made, and the report's chapter shown from them."""
-    entry = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")[:1]
+    entry = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")[:1]
     plan.check_chosen(entry, [], "")
     plan.check_chosen([], entry, "2026-11-30")
     with pytest.raises(InputError, match=r"proof\.seeds and proof\.cases leave no case; expected"):
@@ -286,7 +286,7 @@ def test_a_wrong_value_in_braces_is_named(text: str, said: str) -> None:
 
 def test_a_misspelled_family_in_braces_gets_the_right_one() -> None:
     """Before: "found '1', expected a whole number", of a family that there is not."""
-    cases = plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")
+    cases = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")
     with pytest.raises(InputError, match=r"proof\.released\.multibdy is no family .*; did you mean multibody\?"):
         plan.check_families(cases, check(over("proof={released: {multibdy: 1}}")).proof.released, "proof.released")
 
@@ -302,7 +302,7 @@ def test_the_library_reads_yaml_in_one_place() -> None:
 
 
 def test_a_pattern_that_fits_no_case_is_named() -> None:
-    cases = [entry.case for entry in plan.read_index(ROOT / "tests" / "concealed" / "cases.tsv")]
+    cases = [entry.case for entry in plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")]
     plan.check_patterns(cases, SOUND["ablation"]["cases"], "ablation.cases")
     with pytest.raises(InputError, match=r"proof\.cases has 'singel/\*', expected a pattern that fits a name, as "):
         plan.check_patterns(cases, ["*", "singel/*"], "proof.cases")

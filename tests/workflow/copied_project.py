@@ -15,10 +15,10 @@ PARTS = (
     "profiles",
     "workflow",
     "src",
+    "proof",
     "notebooks",
     "raw",
     "tests/configs",
-    "tests/concealed",
     "tests/sealed",
     "docs/proof",
 )
@@ -44,7 +44,11 @@ class Project:
         command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
         if "--configfile" not in arguments:
             command += ["--configfile", "tests/configs/small.yaml"]
-        environment = {**os.environ, "PYTHONPATH": str(self.root / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(self.root / "src"), str(self.root / "proof")]),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
         done = subprocess.run(
             command,
             cwd=self.root,

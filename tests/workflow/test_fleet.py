@@ -15,7 +15,7 @@ import slurm
 from copied_project import Project
 
 from rotorid.cli.simulating import fly
-from rotorid.templates import read
+from rotorid.recordings.templates import read
 
 SETTINGS = ("--config", "recordings=sets")
 
@@ -36,7 +36,7 @@ def fleet(project: Project) -> Project:
 def test_killed_in_the_middle_it_repeats_only_what_was_lost(fleet: Project) -> None:
     """SIGKILL to Snakemake and all its jobs while the last set of a batch is judged, then the same command again."""
     command = [sys.executable, "-m", "snakemake", "--cores", "1", "fleet", *SETTINGS]
-    environment = {**os.environ, "PYTHONPATH": str(fleet.root / "src")}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(fleet.root / "src"), str(fleet.root / "proof")])}
     running = subprocess.Popen(command, cwd=fleet.root, env=environment, start_new_session=True)
     memory = fleet.root / "cache" / "fleet"
     try:
@@ -78,7 +78,7 @@ def test_a_fleet_through_slurm_says_what_it_says_here(fleet: Project, tmp_path: 
     settings = fleet.root / "config.yaml"
     settings.write_text(settings.read_text().replace("  batch: 25 #", "  batch: 1 #"))
     with slurm.running(tmp_path / "slurm") as environment:
-        environment |= {"PYTHONPATH": str(fleet.root / "src")}
+        environment |= {"PYTHONPATH": os.pathsep.join([str(fleet.root / "src"), str(fleet.root / "proof")])}
         command = [sys.executable, "-m", "snakemake", "fleet", *SETTINGS]
         profile = ["--workflow-profile", "workflow/profiles/slurm", "--latency-wait", "5"]
         # This SLURM keeps no accounts: without the second option Snakemake asks sacct for ever.

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.importers.public_sets import sets_of
-from rotorid.importers.report import ImportReport, read_report
 from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
+from rotorid.recordings.importers.public_sets import sets_of
+from rotorid.recordings.importers.report import ImportReport, read_report
 from workflow.scripts import check_recordings, fit_rotor_coefficients, import_public, neurobem_residuals
 
 ROOT = Path(__file__).parents[2]

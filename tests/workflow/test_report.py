@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid import prose, typeset
+from rotorid.report import prose, typeset
 from tests.browser import CHROMIUM, Browser
 
 ROOT = Path(__file__).parents[2]

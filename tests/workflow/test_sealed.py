@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from test_rules import RULES, WORKING
 
-from rotorid.codehash import Code
+from rotorid.report.codehash import Code
 
 ROOT = Path(__file__).parents[2]
 OPENS = {"score_proof", "score_ablation", "score_campaign"}
@@ -39,9 +39,9 @@ def test_the_mismatch_stage_does_not_know_that_there_are_answers() -> None:
         text = path.read_text()
         assert "sealed" not in text and "concealed" not in text, path
     judging = Code(ROOT).reached_modules(ROOT / "workflow/scripts/judge.py")
-    assert {path.stem for path in judging if path.parent.name == "proof"} == {"__init__", "judge"}
+    assert {path.stem for path in judging if path.parent.name == "rotorid_proof"} == {"__init__", "judge"}
     ablating = Code(ROOT).reached_modules(ROOT / "workflow/scripts/ablate.py")
-    assert {path.stem for path in ablating if path.parent.name == "proof"} == {"__init__", "without_rules"}
+    assert {path.stem for path in ablating if path.parent.name == "rotorid_proof"} == {"__init__", "without_rules"}
 
 
 def test_judging_and_the_mismatch_rule_never_see_case_names() -> None:

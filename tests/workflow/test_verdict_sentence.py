@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from copied_project import Project
 
-from rotorid import examples
+from rotorid.cli import examples
 
 
 @pytest.mark.slow

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from copied_project import ROOT, Project
 
-from rotorid import prose
-from rotorid.importers import overview
-from rotorid.importers.manifest import read_manifest
+from rotorid.recordings.importers import overview
+from rotorid.recordings.importers.manifest import read_manifest
+from rotorid.report import prose
 from workflow.scripts import import_public
 
 NOWHERE = "http://127.0.0.1:9"

@@ -6,11 +6,11 @@ import time
 from functools import cache
 from pathlib import Path
 
-from rotorid import log as logs
-from rotorid.codehash import Code
+from rotorid.report import log as logs
+from rotorid.report.codehash import Code
 from rotorid.config import check, from_command_line
 from rotorid.errors import InputError
-from rotorid.text_files import read_yaml
+from rotorid.io.text.files import read_yaml
 
 # Jobs run side by side: threads of the linear algebra in each of them cost processor time and save none.
 for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -5,7 +5,7 @@ scored on all of them in minutes. `snakemake decisions_so_far` scores what is ke
 folder of the evidence, cache/evidence without it.
 """
 
-from rotorid.proof.decisions import plan as bench
+from rotorid_proof.decisions import plan as bench
 
 EVIDENCE = os.environ.get("ROTORID_EVIDENCE", "") or "cache/evidence"
 try:
@@ -35,7 +35,7 @@ def hashes_of_evidence():
     judging = [CODE.of(f"src/rotorid/mismatch/{name}.py") for name in JUDGING]
     return {
         "drawing": bench.joint([CODE.of(path) for path in CONCEALING]),
-        "planting": CODE.of("src/rotorid/proof/plantings/sow.py"),
+        "planting": CODE.of("proof/rotorid_proof/plantings/sow.py"),
         "engine": bench.joint([*judging, CONFIG.decisions.chooser]),
     }
 

@@ -4,8 +4,8 @@ Something exact is put into a real flight; the verdict is scored against the one
 `--config 'plantings={cases: ["neurobem/*/large/0"]}'`. What was judged by the code of now is never judged again.
 """
 
-from rotorid.proof.plantings import plan as planted
-from rotorid.proof.plantings.flights import flight as planted_flight
+from rotorid_proof.plantings import plan as planted
+from rotorid_proof.plantings.flights import flight as planted_flight
 
 LISTED = planted.read_list(ROOT / "workflow/plantings.tsv")
 try:

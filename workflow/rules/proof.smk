@@ -6,9 +6,9 @@ Answers lie in results/sealed, which the scoring rule alone opens.
 import sys
 
 from rotorid.errors import InputError
-from rotorid.proof import plan, studies as real
+from rotorid_proof import plan, studies as real
 
-CASES = plan.read_index(ROOT / "tests/concealed/cases.tsv")
+CASES = plan.read_index(ROOT / "proof/rotorid_proof/concealed/cases.tsv")
 ANEW = plan.released(CASES, CONFIG.proof.release)
 TABLES_OF_PROOF = [
     f"{name}.csv" for name in "summary cases families effects confusion power peers real coefficients".split()
@@ -34,7 +34,9 @@ BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)
 # Concealed sets whose delivered vehicle is put to the test: as many, evenly over the whole list.
 DELIVERED = plan.batches(plan.spread(CASES, CONFIG.proof.delivered), CONFIG.proof.batch)
 # Recordings come from code outside the library: its hash stands beside that of the script.
-CONCEALING = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "tests/concealed").rglob("*.py"))]
+CONCEALING = [
+    str(path.relative_to(ROOT)) for path in sorted((ROOT / "proof/rotorid_proof/concealed").rglob("*.py"))
+]
 STUDIES = [study.name for study in real.STUDIES] if CONFIG.proof.real else []
 
 if "proof" in sys.argv:

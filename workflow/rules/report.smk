@@ -1,6 +1,6 @@
 """From the chapters' figures, tables and texts to the report; included last, after every chapter's rule."""
 
-from rotorid.provenance import in_words
+from rotorid.report.provenance import in_words
 
 PARTS = "workflow/report"
 

@@ -1,6 +1,6 @@
 """What the benchmarks measured, for the report: stored tables, made by `python -m benchmarks`."""
 
-from rotorid.provenance import stored_with
+from rotorid.report.provenance import stored_with
 
 
 def stored_benchmarks(wildcards, input):

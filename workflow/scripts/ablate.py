@@ -6,8 +6,8 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.without_rules import fires_in, judged, read_stored, stored
+from rotorid.report import log
+from rotorid_proof.without_rules import fires_in, judged, read_stored, stored
 
 
 def main(sets: str, rule: str, base: str | None, most: int, out: str) -> None:

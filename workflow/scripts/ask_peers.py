@@ -6,8 +6,8 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.peers.asking import ask_folder
+from rotorid.report import log
+from rotorid_proof.peers.asking import ask_folder
 
 
 def main(sets: str, peers: str) -> None:

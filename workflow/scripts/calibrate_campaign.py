@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.bench import calibration_flags, outliers, recalibrate
+from rotorid.identify.bench import calibration_flags, outliers, recalibrate
 from rotorid.io.tables import read_sessions
+from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.calibration")
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.bench import calibration_flags, loadcell, outliers
+from rotorid.identify.bench import calibration_flags, loadcell, outliers
+from rotorid.report import log
 
 TUBE = "Carbon Fiber Tube"
 LOGGER = logging.getLogger("rotorid.calibration")

@@ -6,9 +6,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from rotorid import log
 from rotorid.errors import InputError
 from rotorid.recordings.check import as_text, check_folder
+from rotorid.report import log
 
 
 def main(folders: Sequence[str], out: str) -> None:

@@ -6,24 +6,23 @@
 
 import hashlib
 import json
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rotorid import log
-from rotorid.importers.report import read_report
 from rotorid.mismatch.choosing import KEPT, POSTERIOR
-from rotorid.proof.decisions import truths
-from rotorid.proof.decisions.collect import Made, collect
-from rotorid.proof.decisions.plan import Item, in_order
-from rotorid.proof.plantings.flights import flight
-from rotorid.proof.plantings.judge import cut
-from rotorid.proof.plantings.plan import parsed
-from rotorid.proof.plantings.sow import plant
-from rotorid.proof.real import with_split
-from rotorid.proof.studies import study
 from rotorid.recordings import read_set
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
+from rotorid_proof.decisions import truths
+from rotorid_proof.decisions.collect import Made, collect
+from rotorid_proof.decisions.plan import Item, in_order
+from rotorid_proof.plantings.flights import flight
+from rotorid_proof.plantings.judge import cut
+from rotorid_proof.plantings.plan import parsed
+from rotorid_proof.plantings.sow import plant
+from rotorid_proof.real import with_split
+from rotorid_proof.studies import study
 
 
 class Sets:
@@ -31,16 +30,14 @@ class Sets:
 
     Parameters
     ----------
-    root
-        Top of the project: holds `tests`.
     public
         Folder with the imported public sets.
     drawing, planting
         Hashes of the code that draws sets, and of that which plants.
     """
 
-    def __init__(self, root: Path, public: Path, drawing: str, planting: str) -> None:
-        self.root, self.public = root, public
+    def __init__(self, public: Path, drawing: str, planting: str) -> None:
+        self.public = public
         self.drawing, self.planting = drawing, planting
         self._contents: dict[str, str] = {}
 
@@ -79,9 +76,8 @@ class Sets:
         return Made(with_split(read_set(self.folder_of(item)), wanted), {"expected": list(wanted.expected)})
 
     def _drawn(self, case: str) -> Made:
-        sys.path.insert(0, str(self.root))
-        from tests.concealed import build
-        from tests.concealed import cases as known
+        from rotorid_proof.concealed import build
+        from rotorid_proof.concealed import cases as known
 
         (wanted,) = known.with_names([case])
         with tempfile.TemporaryDirectory() as made:
@@ -93,15 +89,13 @@ class Sets:
 CHOOSERS = {"search": KEPT, "posterior": POSTERIOR}
 
 
-def main(
-    items: Sequence[Item], folder: str, public: str, hashes: Mapping[str, str], chooser: str, root: str, out: str
-) -> None:
+def main(items: Sequence[Item], folder: str, public: str, hashes: Mapping[str, str], chooser: str, out: str) -> None:
     """Keep the evidence of `items` in `folder`, those first that tell most, and write the names of its files to `out`.
 
     `hashes` are those of the code that draws (`drawing`), plants (`planting`) and judges (`engine`); the `chooser`
     chooses the effects of a flight.
     """
-    sets = Sets(Path(root), Path(public), hashes["drawing"], hashes["planting"])
+    sets = Sets(Path(public), hashes["drawing"], hashes["planting"])
     wanted = [item for item in in_order(items) if sets.available(item)]
     stems = collect(wanted, Path(folder), sets.make, sets.source_of, hashes["engine"], CHOOSERS[chooser], log.progress)
     Path(out).write_text(json.dumps({"engine": hashes["engine"], "kept": stems}, indent=1) + "\n", encoding="utf-8")
@@ -115,6 +109,5 @@ if __name__ == "__main__":
             public=snakemake.params.public,
             hashes=snakemake.params.hashes,
             chooser=snakemake.params.chooser,
-            root=str(Path.cwd()),
             out=snakemake.output.kept,
         )

@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student_t
 
-from rotorid import log
-from rotorid.blackbox import models
-from rotorid.blackbox.compare import TrainingRange, conformal_coverage, folds, out_of_fold, scores
-from rotorid.blackbox.experiments import INPUTS, OUTPUTS
+from rotorid.identify.blackbox import models
+from rotorid.identify.blackbox.compare import TrainingRange, conformal_coverage, folds, out_of_fold, scores
+from rotorid.identify.blackbox.experiments import INPUTS, OUTPUTS
 from rotorid.recordings import read_vehicle
+from rotorid.report import log
 
 ASKED = {
     "hover, level": (1.0, 1.0, 1.0, 1.0, 0.0, 0.0),

@@ -4,17 +4,15 @@
 - Writes the answers to another folder, the sealed one.
 """
 
-import sys
 from pathlib import Path
 
-from rotorid import log
+from rotorid.report import log
 
 
-def main(cases: list[str], sets: str, answers: str, root: str) -> None:
-    """Record the cases of these names into `sets`, their answers into `answers`; `root` holds `tests`."""
-    sys.path.insert(0, root)
-    from tests.concealed import build
-    from tests.concealed import cases as known
+def main(cases: list[str], sets: str, answers: str) -> None:
+    """Record the cases of these names into `sets`, their answers into `answers`."""
+    from rotorid_proof.concealed import build
+    from rotorid_proof.concealed import cases as known
 
     Path(sets).mkdir(parents=True, exist_ok=True)
     for case in known.with_names(cases):
@@ -27,5 +25,4 @@ if __name__ == "__main__":
             cases=snakemake.params.cases,
             sets=snakemake.output.sets,
             answers=snakemake.output.answers,
-            root=str(Path.cwd()),
         )

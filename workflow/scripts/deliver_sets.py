@@ -7,8 +7,8 @@
 import json
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.delivered import rows_of
+from rotorid.report import log
+from rotorid_proof.delivered import rows_of
 
 
 def main(sets: str, one: bool, rows: str) -> None:

@@ -6,8 +6,9 @@
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.plots import proof, style
+from rotorid.report import log
+from rotorid.report.plots import style
+from rotorid_proof import plots as proof
 
 
 def main(

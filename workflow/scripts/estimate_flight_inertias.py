@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log
-from rotorid.estimate.flights import band_signals, fit_flights
-from rotorid.importers.report import read_report
+from rotorid.identify.estimate.flights import band_signals, fit_flights
 from rotorid.recordings import read_set
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
 
 DELAYS_S = np.arange(0.0, 0.0201, 0.0025)
 COLUMNS = "set axis published lower estimate upper low_95 high_95 ratio r2 delay_ms".split()

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log
-from rotorid.bench import dynamic
-from rotorid.bench.prepare import CELLS
-from rotorid.bench.reconstruct import Geometry, cell_forces, forces, read_geometry
+from rotorid.identify.bench import dynamic
+from rotorid.identify.bench.prepare import CELLS
+from rotorid.identify.bench.reconstruct import Geometry, cell_forces, forces, read_geometry
 from rotorid.io.tables import by_recording, read_sessions
+from rotorid.report import log
 
 KINDS = ("", "_low_pass", "_zero_phase")
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log
-from rotorid.blackbox.experiments import stand_wrench, thrust_of_throttle
+from rotorid.identify.blackbox.experiments import stand_wrench, thrust_of_throttle
+from rotorid.identify.stand import wrench
+from rotorid.identify.stand.characteristic import PARAMETERS, law, speed_law
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.tables import read_sessions
 from rotorid.recordings import read_set
-from rotorid.stand import wrench
-from rotorid.stand.characteristic import PARAMETERS, law, speed_law
+from rotorid.report import log
 
 
 def main(

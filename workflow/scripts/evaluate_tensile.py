@@ -6,9 +6,9 @@
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.bench import tensile
+from rotorid.identify.bench import tensile
 from rotorid.io.tables import read_sessions
+from rotorid.report import log
 
 
 def main(samples: str, recordings: str, printed: str, specimens: str, infill: str, curves: str) -> None:

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.importers.report import read_report
+from rotorid.identify.rotor.propellers import COLUMNS, summarise
 from rotorid.recordings import read_set
-from rotorid.rotor.propellers import COLUMNS, summarise
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
 
 
 def main(

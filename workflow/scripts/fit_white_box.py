@@ -16,11 +16,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student_t
 
-from rotorid import log, thesis
+from rotorid.identify.rotor.campaign import COLUMNS, thrust_points, torque_points
+from rotorid.identify.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
+from rotorid.identify.rotor.sample_noise import sample_noise
 from rotorid.io.tables import read_sessions
-from rotorid.rotor.campaign import COLUMNS, thrust_points, torque_points
-from rotorid.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
-from rotorid.rotor.sample_noise import sample_noise
+from rotorid.report import log, thesis
 from rotorid.vehicle.mass_properties import compose, read_components
 
 LEAST_TORQUE_SD_N_M = 1e-6

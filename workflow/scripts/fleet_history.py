@@ -6,9 +6,9 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.fleet.history import by_vehicle, history
-from rotorid.plots.fleet import draw_history
+from rotorid.report import log
+from rotorid.report.fleet.history import by_vehicle, history
+from rotorid.report.plots.fleet import draw_history
 
 
 def main(folders: list[str], good: int, numbers: str, events: str, figure: str) -> None:

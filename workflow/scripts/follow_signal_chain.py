@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid import log
-from rotorid.fem import bridge, studies
-from rotorid.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem import bridge, studies
+from rotorid.identify.fem.sizes import read_assumed, read_moduli
 from rotorid.io.wire import bench as wire
+from rotorid.report import log
 
 
 def main(sizes: str, moduli: str, calibration: str, mesh: str, chain: str, variants: str) -> None:

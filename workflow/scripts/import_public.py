@@ -9,11 +9,11 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from rotorid import log
-from rotorid.importers import public_sets
-from rotorid.importers.manifest import read_manifest
-from rotorid.importers.obtain import obtain
-from rotorid.importers.report import read_report
+from rotorid.recordings.importers import public_sets
+from rotorid.recordings.importers.manifest import read_manifest
+from rotorid.recordings.importers.obtain import obtain
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.public")
 

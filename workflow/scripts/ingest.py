@@ -7,9 +7,9 @@
 import logging
 from collections.abc import Sequence
 
-from rotorid import log
 from rotorid.io.metadata_checksum import without_checksum
 from rotorid.io.tables import read_tables
+from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.ingest")
 

@@ -6,8 +6,8 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.judge import judge_folder
+from rotorid.report import log
+from rotorid_proof.judge import judge_folder
 
 
 def main(sets: str, verdicts: str, code: str) -> None:

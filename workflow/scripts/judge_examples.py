@@ -6,7 +6,6 @@
 """
 
 import json
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,11 +14,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rotorid import log
-from rotorid.importers.report import read_report
-from rotorid.mismatch.deliver import analysis_of, write_files
-from rotorid.proof import quoted
 from rotorid.recordings import RecordingSet, Run, read_set
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
+from rotorid.report.deliver import analysis_of, write_files
+from rotorid_proof import quoted
 
 SHOWN_HZ = 50.0
 OTHER_MODEL = "neurobem_"
@@ -38,10 +37,9 @@ def piece(recordings: RecordingSet, flights: Sequence[str], start_s: float, stop
     return RecordingSet(recordings.name, recordings.vehicle, tuple(runs), (flights[-1],))
 
 
-def recorded(case: str, root: str) -> RecordingSet:
-    """A set recorded by the simulators of `tests/concealed`; the answer is thrown away."""
-    sys.path.insert(0, root)
-    from tests.concealed import build, cases
+def recorded(case: str) -> RecordingSet:
+    """A set recorded by the simulators of `proof/rotorid_proof/concealed`; the answer is thrown away."""
+    from rotorid_proof.concealed import build, cases
 
     wanted = {known.name: known for known in cases.all_cases()}[case]
     with tempfile.TemporaryDirectory() as folder:
@@ -68,15 +66,13 @@ def rows_of(example: str, verdict: Mapping[str, Any]) -> tuple[list[dict], list[
     return quoted.channels(example, verdict), effects, locations
 
 
-def main(
-    flights: str, real: Mapping[str, Any], cases: Mapping[str, str], root: str, out: Mapping[str, str], folder: str
-) -> None:
+def main(flights: str, real: Mapping[str, Any], cases: Mapping[str, str], out: Mapping[str, str], folder: str) -> None:
     """Judge the examples and write their state (JSON) and tables (CSV); each verdict's own files go to `folder`."""
     state: dict[str, Any] = {"examples": {}}
     channels, effects, locations, traces = [], [], [], []
     report = read_report(Path(flights))
     state["real_available"], state["real_missing"] = report["available"], report["reason"]
-    sets = {name: recorded(case, root) for name, case in cases.items()}
+    sets = {name: recorded(case) for name, case in cases.items()}
     if report["available"]:
         sets = {"real": piece(read_set(Path(flights)), **real)} | sets
     for name, recordings in sets.items():
@@ -115,7 +111,6 @@ if __name__ == "__main__":
             flights=snakemake.input.flights,
             real=dict(snakemake.params.real),
             cases=dict(snakemake.params.cases),
-            root=str(Path.cwd()),
             out=dict(snakemake.output.items()),
             folder=snakemake.params.folder,
         )

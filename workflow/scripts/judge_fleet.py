@@ -8,8 +8,8 @@
 import sys
 from pathlib import Path
 
-from rotorid import log
-from rotorid.fleet.judge import judge_sets
+from rotorid.report import log
+from rotorid.report.fleet.judge import judge_sets
 
 
 def main(folders: list[str], code: str, verdicts: str, memory: str) -> None:

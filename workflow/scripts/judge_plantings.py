@@ -6,9 +6,9 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.plantings.judge import judge_plantings
-from rotorid.proof.plantings.plan import parsed
+from rotorid.report import log
+from rotorid_proof.plantings.judge import judge_plantings
+from rotorid_proof.plantings.plan import parsed
 
 
 def main(recordings: str, plantings: list[str], code: str, verdicts: str, memory: str) -> None:

@@ -6,8 +6,8 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.plantings.judge import judge_untouched
+from rotorid.report import log
+from rotorid_proof.plantings.judge import judge_untouched
 
 
 def main(recordings: str, flight: str, code: str, out: str, memory: str) -> None:

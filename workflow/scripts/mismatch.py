@@ -8,9 +8,9 @@
 import sys
 from pathlib import Path
 
-from rotorid import log
-from rotorid.mismatch.deliver import deliver
 from rotorid.recordings import read_set
+from rotorid.report import log
+from rotorid.report.deliver import deliver
 
 
 def main(folder: str, verdict: str, page: str, improved: str, off: list[str]) -> None:

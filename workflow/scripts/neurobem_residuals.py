@@ -8,10 +8,10 @@
 import json
 from pathlib import Path
 
-from rotorid import log
-from rotorid.importers.report import read_report
-from rotorid.neurobem_comparison import compare, nothing
+from rotorid.identify.neurobem_comparison import compare, nothing
 from rotorid.recordings import read_set
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
 
 
 def main(folder: str, settings: dict, summary: str, flights: str, bins: str, points: str) -> None:

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.bench.prepare import Filter, prepare
+from rotorid.identify.bench.prepare import Filter, prepare
 from rotorid.io.tables import read_sessions
+from rotorid.report import log
 
 
 def main(samples: str, recordings: str, settings: Mapping, prepared: str) -> None:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.blackbox.experiments import read_experiments, thrust_of_throttle
+from rotorid.identify.blackbox.experiments import read_experiments, thrust_of_throttle
 from rotorid.io.tables import read_sessions
+from rotorid.report import log
 
 
 def main(quadrotor: Sequence[str], wrench: Sequence[str], thrust: str, experiments: str) -> None:

@@ -14,16 +14,16 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
 from rotorid.errors import InputError
-from rotorid.experiment.limits import Limits, read_limits
-from rotorid.experiment.plan import plan
-from rotorid.experiment.questions import Known, known
-from rotorid.experiment.together import joined_sets
-from rotorid.experiment.write import sampled
 from rotorid.mismatch.analyse import analyse
-from rotorid.proof import next_flight as proof
+from rotorid.plan.limits import Limits, read_limits
+from rotorid.plan.plan import plan
+from rotorid.plan.questions import Known, known
+from rotorid.plan.together import joined_sets
+from rotorid.plan.write import sampled
 from rotorid.recordings import RecordingSet, read_set
+from rotorid.report import log
+from rotorid_proof import next_flight as proof
 
 
 def as_read(recording, write_set, name: str) -> RecordingSet:
@@ -81,17 +81,14 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     return replace(row, predicted_sigma=expected.sigma, predicted_low=low, predicted_high=high)
 
 
-def main(
-    table: str, summary: str, so_far: str, limits: str, root: str, code: str = "", most: int | None = None
-) -> None:
+def main(table: str, summary: str, so_far: str, limits: str, code: str = "", most: int | None = None) -> None:
     """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
 
-    `root` holds `tests`; a row of another `code` stays until the case is judged anew; `most` cases are taken at most.
+    A row of another `code` stays until the case is judged anew; `most` cases are taken at most.
     """
-    sys.path.insert(0, root)
     warnings.simplefilter("ignore")
-    from tests.concealed import planned as simulator
-    from tests.concealed.richsim import scene
+    from rotorid_proof.concealed import planned as simulator
+    from rotorid_proof.concealed.richsim import scene
 
     allowed = read_limits(Path(limits))
     kept = Path(so_far)
@@ -126,6 +123,5 @@ if __name__ == "__main__":
             summary=snakemake.output.summary,
             so_far=snakemake.params.so_far,
             limits=snakemake.input.limits,
-            root=str(Path.cwd()),
             code=str(snakemake.params.code),
         )

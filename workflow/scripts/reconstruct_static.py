@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log
-from rotorid.bench import matrix, static
-from rotorid.bench.prepare import CELLS, FORCES
-from rotorid.bench.recalibrate import line_of
-from rotorid.bench.reconstruct import read_geometry
+from rotorid.identify.bench import matrix, static
+from rotorid.identify.bench.prepare import CELLS, FORCES
+from rotorid.identify.bench.recalibrate import line_of
+from rotorid.identify.bench.reconstruct import read_geometry
 from rotorid.io.tables import read_sessions
+from rotorid.report import log
 
 
 def main(

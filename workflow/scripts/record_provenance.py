@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rotorid import log, provenance
+from rotorid.report import log, provenance
 
 
 def main(raw: Sequence[str], lock: str, config: Mapping[str, Any], out: str) -> None:

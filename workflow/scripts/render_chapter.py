@@ -6,7 +6,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rotorid import log, prose
+from rotorid.report import log, prose
 
 
 def main(text: str, files: Mapping[str, str], lacking: Sequence[str], index: str, emulated: bool, out: str) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import papermill
 from traitlets.config import Config
 
-from rotorid import log
+from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.notebook")
 PATIENCE_S = 600

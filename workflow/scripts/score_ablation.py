@@ -5,9 +5,9 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof import ablation
-from rotorid.proof.without_rules import read_stored
+from rotorid.report import log
+from rotorid_proof import ablation
+from rotorid_proof.without_rules import read_stored
 
 
 def main(base: str, without: list[str], answers: str, out: str) -> None:

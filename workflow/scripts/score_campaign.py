@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log
+from rotorid.io.text.files import read_yaml
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
-from rotorid.proof import campaign, quoted
 from rotorid.recordings import read_set
-from rotorid.text_files import read_yaml
+from rotorid.report import log
+from rotorid_proof import campaign, quoted
 
 LINE, STAND = "campaign-bench-al", "campaign-stand"
 SETS = ["set", "verdict", "hidden", "right", "wrong"]

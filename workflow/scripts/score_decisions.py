@@ -6,8 +6,8 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.decisions.bench import write_tables
+from rotorid.report import log
+from rotorid_proof.decisions.bench import write_tables
 
 
 def main(folder: str, engine: str, out: str, cores: int) -> None:

@@ -6,8 +6,8 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.write import write_tables
+from rotorid.report import log
+from rotorid_proof.write import write_tables
 
 
 def main(verdicts: list[str], answers: list[str], peers: list[str], out: str, present: str) -> None:

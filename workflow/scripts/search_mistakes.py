@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.proof.plantings.judge import cut
-from rotorid.proof.plantings.plan import parsed
-from rotorid.proof.plantings.tables import mistake_rows
+from rotorid.report import log
+from rotorid_proof.plantings.judge import cut
+from rotorid_proof.plantings.plan import parsed
+from rotorid_proof.plantings.tables import mistake_rows
 
 
 def main(recordings: str, flight: str, plantings: list[str], code: str, out: str) -> None:

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log
-from rotorid.control.pid import AttitudePid
-from rotorid.control.references import training_reference
 from rotorid.recordings import read_vehicle
+from rotorid.report import log
+from rotorid.vehicle.control.pid import AttitudePid
+from rotorid.vehicle.control.references import training_reference
 from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, simulate
 

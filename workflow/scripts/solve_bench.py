@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.bench.reconstruct import read_geometry
-from rotorid.fem import studies
-from rotorid.fem.answers import ratios
-from rotorid.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.fem import studies
+from rotorid.identify.fem.answers import ratios
+from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.report import log
 
 
 def main(

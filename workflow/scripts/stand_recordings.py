@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.blackbox.experiments import thrust_of_throttle
+from rotorid.identify.blackbox.experiments import thrust_of_throttle
+from rotorid.identify.stand import align
+from rotorid.identify.stand import recordings as sets
 from rotorid.io.tables import read_sessions
 from rotorid.recordings import read_vehicle, write_set
-from rotorid.stand import align
-from rotorid.stand import recordings as sets
+from rotorid.report import log
 
-LOGGER = logging.getLogger("rotorid.stand")
+LOGGER = logging.getLogger("rotorid.identify.stand")
 
 
 def main(

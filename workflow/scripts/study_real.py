@@ -9,12 +9,12 @@ import logging
 import traceback
 from pathlib import Path
 
-from rotorid import log
-from rotorid.importers.report import read_report
-from rotorid.mismatch.deliver import judge
-from rotorid.proof import real
-from rotorid.proof.studies import study
 from rotorid.recordings import read_set
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
+from rotorid.report.deliver import judge
+from rotorid_proof import real
+from rotorid_proof.studies import study
 
 LOGGER = logging.getLogger("rotorid.study")
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.fleet.page import make_page
-from rotorid.fleet.summary import by_effect, by_vehicle, collect
-from rotorid.plots.fleet import draw_fleet
+from rotorid.report import log
+from rotorid.report.fleet.page import make_page
+from rotorid.report.fleet.summary import by_effect, by_vehicle, collect
+from rotorid.report.plots.fleet import draw_fleet
 
 
 def main(

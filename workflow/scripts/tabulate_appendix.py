@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rotorid import log, provenance
-from rotorid.control.pid import THESIS_GAINS
-from rotorid.control.references import AttitudeReference, training_reference, validation_reference
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.plots import style
-from rotorid.plots.rule_graph import rule_graph
-from rotorid.provenance import sha256
+from rotorid.report import log, provenance
+from rotorid.report.plots import style
+from rotorid.report.plots.rule_graph import rule_graph
+from rotorid.report.provenance import sha256
+from rotorid.vehicle.control.pid import THESIS_GAINS
+from rotorid.vehicle.control.references import AttitudeReference, training_reference, validation_reference
 
 AXES = ("roll", "pitch", "yaw")
 

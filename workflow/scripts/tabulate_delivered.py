@@ -6,8 +6,8 @@
 
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.delivered import table
+from rotorid.report import log
+from rotorid_proof.delivered import table
 
 
 def main(files: list[str], out: str) -> None:

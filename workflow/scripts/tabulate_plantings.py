@@ -8,8 +8,8 @@
 import json
 from pathlib import Path
 
-from rotorid import log
-from rotorid.proof.plantings.write import write_tables
+from rotorid.report import log
+from rotorid_proof.plantings.write import write_tables
 
 
 def main(flights, recordings, untouched, verdicts, kept, judge, out) -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.proof import real
-from rotorid.proof.studies import study
+from rotorid.report import log
+from rotorid_proof import real
+from rotorid_proof.studies import study
 
 
 def main(studies: list[str], flights: str, judging: str, table: str, coefficients: str) -> None:

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid import log
-from rotorid.markdown_table import first_table
-from rotorid.plots import speed, style
+from rotorid.io.text.markdown_table import first_table
+from rotorid.report import log
+from rotorid.report.plots import speed, style
 
 COLUMNS = {
     "simulator": ["what", "seconds", "times"],

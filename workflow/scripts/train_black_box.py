@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log
-from rotorid.blackbox.experiments import OUTPUTS
-from rotorid.blackbox.models import fit_thesis_network
 from rotorid.errors import InputError
+from rotorid.identify.blackbox.experiments import OUTPUTS
+from rotorid.identify.blackbox.models import fit_thesis_network
+from rotorid.report import log
 
 
 def main(

@@ -16,9 +16,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import chi2
 
-from rotorid import log, thesis
-from rotorid.estimate.consistency import check_consistency
-from rotorid.estimate.inertial import (
+from rotorid.identify.estimate.consistency import check_consistency
+from rotorid.identify.estimate.inertial import (
     WEIGHT_NAMES,
     NetworkFit,
     fit_least_squares,
@@ -26,8 +25,9 @@ from rotorid.estimate.inertial import (
     inertias_of_weights,
     weights_of_inertias,
 )
-from rotorid.networks.training import Training
+from rotorid.identify.networks.training import Training
 from rotorid.recordings import read_vehicle
+from rotorid.report import log, thesis
 
 THESIS_EPOCHS = 20_000
 """Where the thesis reads off its figure 4.22 that the error of the yaw acceleration has converged."""

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log, thesis
-from rotorid.estimate.aerodynamic import fit_coefficient_network
-from rotorid.networks.training import Training
-from rotorid.rotor.coefficients import Points, fit_coefficient
+from rotorid.identify.estimate.aerodynamic import fit_coefficient_network
+from rotorid.identify.networks.training import Training
+from rotorid.identify.rotor.coefficients import Points, fit_coefficient
+from rotorid.report import log, thesis
 
 HISTORY = ["coefficient", "epoch", "mse"]
 SIZES = ["coefficient", "hidden", "epoch", "mse"]

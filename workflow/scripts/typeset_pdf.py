@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rotorid import log, typeset
+from rotorid.report import log, typeset
 
 
 def main(document: typeset.Document, source: str, pdf: str) -> None:

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid import log, thesis
-from rotorid.control.pid import AttitudePid
-from rotorid.control.references import validation_reference
-from rotorid.estimate.flights import band_signals, fit_flights
-from rotorid.importers.report import read_report
+from rotorid.identify.estimate.flights import band_signals, fit_flights
 from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log, thesis
+from rotorid.vehicle.control.pid import AttitudePid
+from rotorid.vehicle.control.references import validation_reference
 from rotorid.vehicle.simulator import simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid import log
-from rotorid.bench.reconstruct import read_geometry
-from rotorid.fem import statements, studies
-from rotorid.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.fem import statements, studies
+from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.report import log
 
 
 def main(sizes: str, moduli: str, geometry: str, mesh: str, draws: int, seed: int, benches: str, judged: str) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from rotorid.io import index, metadata_checksum
 from rotorid.io.index import metadata_files
 from rotorid.io.session import LARGEST_METADATA, SessionError, read_session, replace_bytes, session_path
-from rotorid.text_files import read_bytes
+from rotorid.io.text.files import read_bytes
 
 
 def metadata_of(place: Path) -> list[Path]:

@@ -40,7 +40,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from rotorid.provenance import own_commit
+        from rotorid.report.provenance import own_commit
 
         try:
             known = f"rotorid {version('rotorid')}"
@@ -72,3 +72,6 @@ app.command("export")(exporting.export)
 app.command("model")(modelling.model)
 app.command("parameters")(parameters.parameters)
 app.command("effects")(effects.effects)
+
+OPEN = ("simulating",)
+"""Modules that other rooms may import; all else is this room's own."""

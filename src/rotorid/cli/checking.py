@@ -14,7 +14,7 @@ from rotorid.errors import InputError
 
 def check_no_log(path: Path) -> None:
     """InputError for a log, whether a file or the folder of a bag: a recording set is made of it first."""
-    from rotorid.importers.logfile import format_of, is_bag
+    from rotorid.recordings.importers.logfile import format_of, is_bag
 
     if path.is_file() and (path.parent / "vehicle.yaml").is_file():
         raise InputError(f"{path}: is a file of a recording set; check the set: `rotorid check {path.parent}`")

@@ -55,7 +55,7 @@ def compare(
         if out is not None:
             write(out, text)
         if page is not None:
-            from rotorid.page.changes import make_changes_page
+            from rotorid.report.page.changes import make_changes_page
 
             write(page, make_changes_page(found))
         if as_json:
@@ -69,7 +69,7 @@ def compare(
 
 def write(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
-    from rotorid.writing import all_or_none
+    from rotorid.io.text.writing import all_or_none
 
     with all_or_none(path) as (part,):
         part.write_text(text, encoding="utf-8")

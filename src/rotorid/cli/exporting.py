@@ -25,10 +25,10 @@ def export(
     Example: `rotorid export flights-verdict/improved_vehicle.yaml --to rotorpy`
     """
     with one_sentence():
-        from rotorid.exports import export_vehicle
-        from rotorid.exports.flown import try_out
+        from rotorid.io.text.writing import all_or_none
         from rotorid.recordings import read_vehicle
-        from rotorid.writing import all_or_none
+        from rotorid.vehicle.exports import export_vehicle
+        from rotorid.vehicle.exports.flown import try_out
 
         vehicle = read_vehicle(vehicle_file)
         exported = export_vehicle(vehicle, to)

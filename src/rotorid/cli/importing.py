@@ -97,10 +97,10 @@ def _as_dict(made: Made, durations: dict[str, float], refused: str) -> dict:
 
 
 def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
-    from rotorid.importers.guessing.guess import guess
-    from rotorid.importers.guessing.text import as_text
-    from rotorid.importers.logfile import format_of
-    from rotorid.importers.mapping import read_columns
+    from rotorid.recordings.importers.guessing.guess import guess
+    from rotorid.recordings.importers.guessing.text import as_text
+    from rotorid.recordings.importers.logfile import format_of
+    from rotorid.recordings.importers.mapping import read_columns
 
     if target.exists():
         raise InputError(f"{target} is there already; choose another name")
@@ -140,8 +140,8 @@ def make_set(
     as_csv: bool = False,
 ) -> Made:
     """Write the set `folder` of logs of one vehicle; a `vehicle.yaml` that is there already stays."""
-    from rotorid.importers.mapping import read_mapping
-    from rotorid.importers.set_of_logs import set_of_logs
+    from rotorid.recordings.importers.mapping import read_mapping
+    from rotorid.recordings.importers.set_of_logs import set_of_logs
 
     mapping = read_mapping(mapping_file) if mapping_file else None
     found = set_of_logs(logs, folder.name, mass_kg, like, vehicle_file, mapping, folder / "vehicle.yaml")

@@ -38,11 +38,11 @@ def model(
     `rotorid model flights --to sdf`
     """
     with one_sentence():
-        from rotorid.exports.next_to_log import FLYERS
+        from rotorid.report.next_to_log import FLYERS
 
         if to not in FLYERS:
             raise InputError(f"no simulator is called {to!r}, expected one of {', '.join(FLYERS)}")
-        from rotorid.importers.logfile import is_bag
+        from rotorid.recordings.importers.logfile import is_bag
 
         is_set = len(paths) == 1 and (paths[0] / "vehicle.yaml").is_file() and not is_bag(paths[0])
         name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
@@ -67,12 +67,12 @@ def write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tupl
         from rotorid.recordings import read_set
 
         recordings = read_set(folder)
-        from rotorid.exports import export_vehicle
-        from rotorid.exports.gazebo_airframe import gazebo_airframe
-        from rotorid.exports.next_to_log import next_to_log
-        from rotorid.mismatch.deliver import analysis_of, write_files
+        from rotorid.io.text.writing import all_or_none
         from rotorid.recordings import read_vehicle
-        from rotorid.writing import all_or_none
+        from rotorid.report.deliver import analysis_of, write_files
+        from rotorid.report.next_to_log import next_to_log
+        from rotorid.vehicle.exports import export_vehicle
+        from rotorid.vehicle.exports.gazebo_airframe import gazebo_airframe
 
         step(f"{recordings.name}: analysing {len(recordings.runs)} runs")
         analysis = analysis_of(recordings)
@@ -102,7 +102,7 @@ def comparison(found, target: Path) -> list[Path]:
     import pandas as pd
 
     from rotorid.mismatch.forward import UNITS
-    from rotorid.plots.next_to_log import draw
+    from rotorid.report.plots.next_to_log import draw
 
     rows = [
         (model, channel, found.error(model, channel), UNITS[channel], len(found.windows))

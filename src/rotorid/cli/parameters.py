@@ -13,7 +13,7 @@ from rotorid.cli.console import one_sentence
 from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile
 
 if TYPE_CHECKING:
-    from rotorid.autopilot.parameters import Parameter
+    from rotorid.identify.autopilot.parameters import Parameter
 
 
 def parameters(
@@ -42,12 +42,12 @@ def parameters(
     """
     with one_sentence():
         from rotorid.api import parameters as of
-        from rotorid.autopilot.parameters import as_text
+        from rotorid.identify.autopilot.parameters import as_text
 
         data = paths[0] if len(paths) == 1 else paths
         found = of(data, to, vehicle=vehicle, mass_kg=mass_kg, like=like, mapping=mapping)
         if out is not None:
-            from rotorid.writing import all_or_none
+            from rotorid.io.text.writing import all_or_none
 
             with all_or_none(out) as (part,):
                 part.write_text(as_text(found, to), encoding="utf-8")

@@ -11,7 +11,7 @@ import typer
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
-from rotorid.names import neighbour
+from rotorid.io.text.names import neighbour
 
 
 def plan(
@@ -35,7 +35,7 @@ def plan(
     Example: `rotorid plan flights-verdict --limits room.yaml`
     """
     with one_sentence():
-        from rotorid.experiment.limits import Limits, SessionLimits, read_limits
+        from rotorid.plan.limits import Limits, SessionLimits, read_limits
 
         wishes = wished(want or [])
         folder, content = read_verdict(verdict)
@@ -59,9 +59,9 @@ def plan(
 
 def flight_plan(source: Path, content: dict, allowed, wishes: dict[str, float], folder: Path, step):
     """Plan a flight and write it: sentences, files, and the picture where there is one."""
-    from rotorid.experiment.plan import plan as make_plan
-    from rotorid.experiment.questions import known
-    from rotorid.experiment.write import text, write
+    from rotorid.plan.plan import plan as make_plan
+    from rotorid.plan.questions import known
+    from rotorid.plan.write import text, write
     from rotorid.recordings import read_set
     from rotorid.recordings.sufficient import sufficient
 
@@ -73,8 +73,8 @@ def flight_plan(source: Path, content: dict, allowed, wishes: dict[str, float], 
 
 def session_plan(source: Path, allowed, folder: Path, step):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
-    from rotorid.experiment.session import known_instrument, plan_session
-    from rotorid.experiment.write_session import text, write
+    from rotorid.plan.session import known_instrument, plan_session
+    from rotorid.plan.write_session import text, write
     from rotorid.recordings import read_set
     from rotorid.recordings.sufficient import sufficient
 
@@ -85,8 +85,8 @@ def session_plan(source: Path, allowed, folder: Path, step):
 
 def onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
     """Put the plan on the verdict's page, where there is one."""
-    from rotorid.experiment.page import with_plan
-    from rotorid.writing import all_or_none
+    from rotorid.io.text.writing import all_or_none
+    from rotorid.plan.page import with_plan
 
     if not page.is_file():
         return
@@ -150,10 +150,10 @@ def together(
     Example: `rotorid together flights next_flight`
     """
     with one_sentence():
-        from rotorid.experiment.together import answers, joined_sets, open_classes
-        from rotorid.mismatch.deliver import analysis_of, write_files
+        from rotorid.io.text.writing import all_or_none
+        from rotorid.plan.together import answers, joined_sets, open_classes
         from rotorid.recordings import read_set
-        from rotorid.writing import all_or_none
+        from rotorid.report.deliver import analysis_of, write_files
 
         sets = [read_set(p) for p in (first, second)]
         whole, notes = joined_sets(*sets)

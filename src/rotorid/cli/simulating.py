@@ -50,8 +50,8 @@ def fly(
     say: Callable[[str], None] = lambda sentence: None,
 ) -> Path:
     """Write `flights` simulated flights of a vehicle as the set `folder`; `say` takes what a reader must know."""
-    from rotorid.control.swings import remarks, swings, turned_over
     from rotorid.recordings import write_set
+    from rotorid.vehicle.control.swings import remarks, swings, turned_over
 
     for sentence in remarks(vehicle):
         say(sentence)

@@ -13,7 +13,7 @@ import typer
 from rotorid.cli.console import one_sentence
 from rotorid.cli.importing import MassKg
 from rotorid.errors import InputError
-from rotorid.wording import printable
+from rotorid.io.text.wording import printable
 
 
 def init(
@@ -35,9 +35,9 @@ def init(
     `rotorid init flights --example`, a set to try things on
     """
 
-    from rotorid import templates
+    from rotorid.io.text.files import as_yaml, parse_yaml
+    from rotorid.recordings import templates
     from rotorid.recordings.files import vehicle_of
-    from rotorid.text_files import as_yaml, parse_yaml
 
     with one_sentence():
         if listing:
@@ -46,7 +46,7 @@ def init(
                 typer.echo(f"{known:24} {vehicle.name}, {vehicle.mass_kg:g} kg")
             return
         if example:
-            from rotorid import examples
+            from rotorid.cli import examples
 
             written = examples.write(folder)
             typer.echo(f"{folder}: {', '.join(p.name for p in written)}. Next: `rotorid verdict {folder}`")

@@ -66,7 +66,7 @@ def verdict(
     `rotorid verdict flights --ci --max-unexplained 20% --no-doubts`
     """
     with one_sentence():
-        from rotorid.importers.logfile import is_bag
+        from rotorid.recordings.importers.logfile import is_bag
 
         start, limit = time.monotonic(), share_of(max_unexplained)
         is_set = len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0])
@@ -139,7 +139,7 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
 
         recordings = read_set(folder)
         # The effects bring a compiler along, whose start takes seconds.
-        from rotorid.mismatch.deliver import analysis_of, write_files
+        from rotorid.report.deliver import analysis_of, write_files
 
     samples = sum(len(run.table) for run in recordings.runs)
     expected = FIXED_S + PER_SAMPLE_S * min(samples, MOST_SAMPLES) if recordings.vehicle.kind == "flight" else None
@@ -152,10 +152,10 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
         # The last step reported is the verdict's own sentence, which the caller prints.
         verdict = write_files(analysis, *files, progress=lambda text: None if text.endswith(".") else step(text))
         if series:
-            from rotorid.result import residuals_of
+            from rotorid.report.result import residuals_of
 
             write_table(residuals_of(analysis), target / "series.parquet")
-            from rotorid.series_files import write_viewers
+            from rotorid.report.series_files import write_viewers
 
             step("writing the series for viewers")
             write_viewers(analysis, target)

@@ -1,1 +1,20 @@
 """Omitted physics, one effect a file."""
+
+OPEN = (
+    "advice",
+    "catalogue",
+    "compiling",
+    "contract",
+    "delay",
+    "describe",
+    "gust",
+    "hysteresis",
+    "loading",
+    "payload",
+    "pendulum",
+    "scale",
+    "steady_wind",
+    "throttle_curve",
+    "thrust_curve",
+)
+"""Modules that other rooms may import; all else is this room's own."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.compiling import compiled
+from rotorid.effects.compiling import compiled
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import TOO_SHORT, change_of_load, one_per_channel
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.compiling import compiled
+from rotorid.effects.compiling import compiled
 from rotorid.effects.contract import LAG, Effect, Parameter, SpeedForm
 
 SLOWEST_S = 0.3

@@ -6,7 +6,7 @@ from math import exp, sqrt
 
 import numpy as np
 
-from rotorid.compiling import compiled
+from rotorid.effects.compiling import compiled
 
 SWING_RATE_HZ = 100.0
 """Rate of the pendulum's own steps: thirty a radian for the shortest cable allowed."""

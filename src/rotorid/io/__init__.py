@@ -1,1 +1,31 @@
-"""Reading and writing: raw logs, recording sets, importers."""
+"""Files: raw logs of instruments and their tables; texts that people write, and sentences to them."""
+
+OPEN = (
+    "experiments",
+    "frames",
+    "index",
+    "intake",
+    "lines",
+    "logs",
+    "metadata_checksum",
+    "models",
+    "rawlog",
+    "sequence",
+    "session",
+    "tables",
+    "text.bounds",
+    "text.files",
+    "text.markdown_table",
+    "text.names",
+    "text.wording",
+    "text.writing",
+    "wire",
+    "wire.base",
+    "wire.bench",
+    "wire.jr3",
+    "wire.quadrotor",
+    "wire.rotor",
+    "wire.tensile",
+    "wire.wrench",
+)
+"""Modules that other rooms may import; all else is this room's own."""

@@ -27,7 +27,7 @@ from rotorid.io.logs import faults_of, same_recording
 from rotorid.io.models import KnownKeys, Number, read_model
 from rotorid.io.rawlog import RECEIVED, Damage, read_raw
 from rotorid.io.session import SessionError, read_session, session_path
-from rotorid.wording import explain
+from rotorid.io.text.wording import explain
 
 MAX_LINE = 4096
 

@@ -20,9 +20,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
-from rotorid.bounds import LARGEST_RAW_LOG, MOST_TRIED_BYTES
 from rotorid.errors import InputError
-from rotorid.text_files import read_bytes
+from rotorid.io.text.bounds import LARGEST_RAW_LOG, MOST_TRIED_BYTES
+from rotorid.io.text.files import read_bytes
 
 MAGIC = b"ROTORLOG1\n"
 CHUNK_HEAD = struct.Struct("<BQH")

@@ -11,11 +11,11 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, field_validator
 
-from rotorid.bounds import LARGEST_METADATA, MOST_METADATA_VALUES
 from rotorid.errors import InputError
 from rotorid.io import metadata_checksum
 from rotorid.io.models import KnownKeys, Number, Whole, read_model
-from rotorid.text_files import read_bytes
+from rotorid.io.text.bounds import LARGEST_METADATA, MOST_METADATA_VALUES
+from rotorid.io.text.files import read_bytes
 
 
 class Ended(StrEnum):

@@ -17,7 +17,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.prepare import assemble_rows
 from rotorid.mismatch.regression import at_least, quadratic_form, spread_of
 from rotorid.mismatch.rows import CHANNELS
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal.kernels import causal
 
 ALARM_P = 1e-5
 SMALLEST_SHARE_OF_NOISE = 0.3

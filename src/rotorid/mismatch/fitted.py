@@ -39,7 +39,7 @@ from rotorid.mismatch.wrench import (
     with_wind,
     wrench_model,
 )
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal.kernels import causal
 
 RUN_P = 1e-6
 RUN_SPREAD = 0.007

@@ -9,10 +9,10 @@ from __future__ import annotations
 import json
 import math
 
+from rotorid.io.text.writing import rounded
 from rotorid.mismatch.findings import Analysis, Finding
 from rotorid.mismatch.rules import RULES
 from rotorid.mismatch.verdict import Verdict
-from rotorid.writing import rounded
 
 
 def ledger(analysis: Analysis, verdict: Verdict) -> list[dict]:

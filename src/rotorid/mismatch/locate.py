@@ -34,7 +34,7 @@ from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import autoregression
 from rotorid.mismatch.shares import effort, segments_of, shares
 from rotorid.mismatch.verdict import SMALLEST_P, Location, Regime, rms
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal.kernels import causal
 
 FAMILY_ERROR = 0.002
 """Chance of any false interval in a whole set."""

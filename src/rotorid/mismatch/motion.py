@@ -12,7 +12,7 @@ from rotorid.effects.contract import Motion
 from rotorid.mismatch.height import quiet_height
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.signal import kernels
+from rotorid.recordings.signal import kernels
 
 SensorNoise = dict[str, np.ndarray]
 """One-sigma per sample of white noise of each column of a sensor, (columns,), by the sensor's key."""

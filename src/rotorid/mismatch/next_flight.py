@@ -2,7 +2,7 @@
 
 By how many standard errors a flight would separate the class is not stated here: that hangs on what can be flown, and
 takes every candidate flown in simulation by every competing model, ten seconds and more. `rotorid plan`
-(`rotorid.experiment.plan`) computes it, and is the only one to state it.
+(`rotorid.plan.plan`) computes it, and is the only one to state it.
 """
 
 from __future__ import annotations

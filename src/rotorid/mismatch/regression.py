@@ -22,7 +22,7 @@ from scipy.stats import chi2, f
 
 from rotorid.mismatch.comparison import LEAST_RUNS, Comparison, environments, folds
 from rotorid.mismatch.rows import Rows, Term
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal.kernels import causal
 
 HIGHEST_AR_ORDER = 12
 WHITE_SHARE = 0.01

@@ -17,7 +17,7 @@ from rotorid.effects.contract import Contribution, Form, Motion
 from rotorid.effects.pendulum import moved
 from rotorid.mismatch.motion import Segment
 from rotorid.recordings import Vehicle
-from rotorid.signal import kernels
+from rotorid.recordings.signal import kernels
 
 GROUPS = ("force", "moment", "accelerometer", "gyroscope")
 CHANNELS = tuple(f"{g}_{a}" for g in GROUPS for a in "xyz")

@@ -21,8 +21,8 @@ from rotorid.effects.delay import shifted
 from rotorid.effects.loading import weights_of_four
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
-from rotorid.signal import kernels
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal import kernels
+from rotorid.recordings.signal.kernels import causal
 
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0

@@ -19,7 +19,7 @@ from rotorid.mismatch.rows import winds_last
 from rotorid.mismatch.select import VALUE_FLOOR
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.wrench import SURE_Z, WrenchModel, after_residual, block_seconds, chosen, model_filters
-from rotorid.signal.kernels import low_pass
+from rotorid.recordings.signal.kernels import low_pass
 
 VALUE_BAND = (0.2, 0.6)
 """Shares of the cutoff. Below, disturbances and what the controller does about them; above, mostly the noise of the

@@ -44,7 +44,7 @@ from rotorid.mismatch.speedpath import (
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal.kernels import causal
 from rotorid.vehicle.mixer import wrench_matrix
 
 LONGEST_BLOCKS = 400

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.names import hint, listed
+from rotorid.io.text.names import hint, listed
 from rotorid.recordings.vehicle import Vehicle
 
 TRUSTED = (

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.bounds import LARGEST_FILE, LEAST_UNPACKED, MOST_CELLS, MOST_GZIP_MEMBERS, MOST_ROWS, MOST_UNPACKED
 from rotorid.errors import InputError
-from rotorid.text_files import check_file, check_text
-from rotorid.wording import printable
+from rotorid.io.text.bounds import LARGEST_FILE, LEAST_UNPACKED, MOST_CELLS, MOST_GZIP_MEMBERS, MOST_ROWS, MOST_UNPACKED
+from rotorid.io.text.files import check_file, check_text
+from rotorid.io.text.wording import printable
 
 BLOCK = 1 << 20
 PACKED_BLOCK = 1 << 16

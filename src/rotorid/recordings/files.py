@@ -10,9 +10,12 @@ import numpy as np
 import yaml
 from pydantic import ValidationError
 
-from rotorid.bounds import MOST_CELLS, MOST_RUNS
 from rotorid.errors import InputError
-from rotorid.names import hint, neighbour
+from rotorid.io.text.bounds import MOST_CELLS, MOST_RUNS
+from rotorid.io.text.files import check_file, read_text, read_yaml, with_exponents
+from rotorid.io.text.names import hint, neighbour
+from rotorid.io.text.wording import explain, printable
+from rotorid.io.text.writing import staging, take_name
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import check_belief
 from rotorid.recordings.manifest import check_manifest
@@ -27,9 +30,6 @@ from rotorid.recordings.tables import (
     write_table,
 )
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.text_files import check_file, read_text, read_yaml, with_exponents
-from rotorid.wording import explain, printable
-from rotorid.writing import staging, take_name
 
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"

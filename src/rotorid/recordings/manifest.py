@@ -12,9 +12,9 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from rotorid.errors import InputError
-from rotorid.text_files import read_text
-from rotorid.wording import printable
-from rotorid.writing import all_or_none
+from rotorid.io.text.files import read_text
+from rotorid.io.text.wording import printable
+from rotorid.io.text.writing import all_or_none
 
 FILE_NAME = "manifest.json"
 

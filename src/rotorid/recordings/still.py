@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rotorid.names import listed
+from rotorid.io.text.names import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.run import RecordingSet

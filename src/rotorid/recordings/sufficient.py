@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.names import listed, nearest, plain
+from rotorid.io.text.names import listed, nearest, plain
 from rotorid.recordings import columns as c
 from rotorid.recordings.own_rates import HOLE_PERIODS, on_own_rates
 from rotorid.recordings.run import RecordingSet, Run

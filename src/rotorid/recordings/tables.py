@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.bounds import (
+from rotorid.errors import InputError
+from rotorid.io.text.bounds import (
     LARGEST_FILE,
     LEAST_UNPACKED,
     LONGEST_JUMP_S,
@@ -17,11 +18,10 @@ from rotorid.bounds import (
     MOST_HOLES,
     MOST_UNPACKED,
 )
-from rotorid.errors import InputError
+from rotorid.io.text.files import check_file
+from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.csv_text import check_heading, check_size, look_through, opened
-from rotorid.text_files import check_file
-from rotorid.wording import printable
 
 MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "<na>", "#n/a", "-nan"))
 """What stands for a missing sample, in small letters."""

@@ -1,1 +1,25 @@
 """Vehicles in motion: rigid body, rotors, mixing, integration, simulation in windows."""
+
+OPEN = (
+    "attitude",
+    "batch",
+    "control.pid",
+    "control.readings",
+    "control.references",
+    "control.swings",
+    "exports",
+    "exports.ardupilot_frame",
+    "exports.flown",
+    "exports.forms",
+    "exports.gazebo_airframe",
+    "exports.sih",
+    "fast",
+    "flyable",
+    "hover",
+    "improved",
+    "mass_properties",
+    "mixer",
+    "simulator",
+    "windows",
+)
+"""Modules that other rooms may import; all else is this room's own."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.compiling import compiled
+from rotorid.effects.compiling import compiled
 from rotorid.vehicle.kernels import call_kernel
 
 MOST_ROUNDS = 30

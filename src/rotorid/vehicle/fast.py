@@ -34,7 +34,8 @@ BLOCK = 8
 
 @dataclass(frozen=True)
 class AttitudeLoop:
-    """An attitude controller laid out for a whole flight, so that it can fly compiled (`rotorid.control.pid`)."""
+    """An attitude controller laid out for a whole flight, so that it can fly compiled
+    (`rotorid.vehicle.control.pid`)."""
 
     proportional: np.ndarray
     """(3,) or (n, 3), N m/rad, likewise the integral and derivative gains."""

@@ -13,12 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from rotorid import templates
 from rotorid.cli import app
 from rotorid.cli.simulating import fly
 from rotorid.errors import InputError
-from rotorid.mismatch.deliver import deliver
-from rotorid.recordings import read_set, read_vehicle
+from rotorid.recordings import read_set, read_vehicle, templates
+from rotorid.report.deliver import deliver
 
 
 def run(*words: str):
@@ -262,7 +261,7 @@ def test_simulate_refuses_to_overwrite(tmp_path: Path, flights: Path) -> None:
 
 
 def test_the_bundled_example_is_a_set_and_nothing_is_overwritten(tmp_path: Path) -> None:
-    from rotorid import examples
+    from rotorid.cli import examples
 
     done = run("init", tmp_path / "flights", "--example")
     assert done.exit_code == 0, done.output
@@ -275,8 +274,8 @@ def test_the_bundled_example_is_a_set_and_nothing_is_overwritten(tmp_path: Path)
 
 @pytest.mark.slow
 def test_the_bundled_example_is_what_its_module_makes_and_the_verdict_finds_what_is_concealed(tmp_path: Path) -> None:
-    from rotorid import examples
-    from rotorid.examples.__main__ import main
+    from rotorid.cli import examples
+    from rotorid.cli.examples.__main__ import main
 
     main(tmp_path)
     for path in examples.write(tmp_path / "shipped"):
@@ -295,7 +294,7 @@ def test_the_bundled_example_is_what_its_module_makes_and_the_verdict_finds_what
 
 
 def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
-    from rotorid.importers.propose import closer_template
+    from rotorid.recordings.importers.propose import closer_template
 
     brushed, brushless = templates.read("crazyflie-2.1"), templates.read("crazyflie-2.1-brushless")
     lift = brushless.thrust_coefficient_n_s2 / brushless.mass_kg
@@ -305,7 +304,7 @@ def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
 
 
 def test_names_of_times_and_commands_are_recognised_and_a_lacking_time_is_told() -> None:
-    from rotorid.importers.guessing.guess import guess
+    from rotorid.recordings.importers.guessing.guess import guess
 
     rpm = np.linspace(8000, 9000, 50)
     names = {f"cmd_rpm{i}": rpm for i in range(1, 5)} | {f"motor_speed_{i}": rpm / 10 for i in range(1, 5)}

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from rotorid.importers.known import ORDERS
+from rotorid.recordings.importers.known import ORDERS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "first-verdict.md").read_text()
 

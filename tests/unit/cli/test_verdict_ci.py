@@ -7,12 +7,11 @@ from types import SimpleNamespace
 import pytest
 from typer.testing import CliRunner
 
-from rotorid import templates
 from rotorid.cli import app
 from rotorid.cli.simulating import fly
 from rotorid.cli.verdicts import faults_of, share_of
 from rotorid.errors import InputError
-from rotorid.recordings import read_set, write_vehicle
+from rotorid.recordings import read_set, templates, write_vehicle
 
 
 def verdict(word="explained", share=0.0, doubts=(), warnings=()):

@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
-from rotorid.neurobem_comparison import compare
+from rotorid.identify.neurobem_comparison import compare
+from rotorid.identify.rigid_body_residuals import by_airspeed, low_pass, measured_wrench, rmse, rotor_wrench
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.rigid_body_residuals import by_airspeed, low_pass, measured_wrench, rmse, rotor_wrench
+from rotorid.recordings.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
 
 VEHICLE = Vehicle(
     name="x",

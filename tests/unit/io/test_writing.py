@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.writing import all_or_none, rounded
+from rotorid.io.text.writing import all_or_none, rounded
 
 
 def test_files_take_their_names_together(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_a_file_that_was_never_written_keeps_the_others_back(tmp_path: Path) -> 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from rotorid import writing
+from rotorid.io.text import writing
 
 left, folder = int(sys.argv[1]), Path(sys.argv[2])
 

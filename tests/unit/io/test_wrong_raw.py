@@ -21,14 +21,14 @@ import pytest
 
 from rotorid.acquire.plan import read_plan, steps_of
 from rotorid.errors import InputError
+from rotorid.identify.networks.network import build
+from rotorid.identify.networks.training import Training, train
 from rotorid.io import rawlog
 from rotorid.io.index import COLUMNS, read_index, with_checksum, write_index
 from rotorid.io.lines import read_description
 from rotorid.io.logs import read_log
 from rotorid.io.session import read_session
 from rotorid.io.tables import read_tables
-from rotorid.networks.network import build
-from rotorid.networks.training import Training, train
 
 MOST_S = 10.0
 SESSION = """\

@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid import templates
 from rotorid.cli.simulating import fly
 from rotorid.errors import InputError
-from rotorid.mismatch.deliver import analysis_of
 from rotorid.mismatch.delivery.stated import delivered_value
 from rotorid.mismatch.delivery.usable import full_thrust_n
-from rotorid.recordings import RecordingSet, Run, read_set
+from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
+from rotorid.report.deliver import analysis_of
 from rotorid.vehicle.mixer import allocation_matrix
 
 FULL_RAD_S = 1500.0

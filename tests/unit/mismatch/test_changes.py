@@ -15,8 +15,8 @@ from rotorid.mismatch.changes import Changes, as_one, changes_between
 from rotorid.mismatch.changes.compare import Change
 from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
-from rotorid.page.changes import make_changes_page
 from rotorid.recordings import RecordingSet, Vehicle, write_set
+from rotorid.report.page.changes import make_changes_page
 from tests.unit.mismatch.flights import Flight
 
 

@@ -7,16 +7,16 @@ import functools
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.importers.manifest import of_one_motor
-from rotorid.importers.obtain import obtain
-from rotorid.importers.public_sets import PUBLIC_SETS, build
-from rotorid.mismatch.deliver import judge
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
-from tests.concealed import build as concealed
-from tests.concealed import cases
-from tests.unit.importers.test_public_sets import MANIFEST, REAL, VEHICLES, needs_data
+from rotorid.recordings.importers.manifest import of_one_motor
+from rotorid.recordings.importers.obtain import obtain
+from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build
+from rotorid.report.deliver import judge
+from rotorid_proof.concealed import build as concealed
+from rotorid_proof.concealed import cases
+from tests.unit.recordings.importers.test_public_sets import MANIFEST, REAL, VEHICLES, needs_data
 
 from .flights import recorded, with_table
 

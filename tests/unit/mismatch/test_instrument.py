@@ -10,7 +10,6 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import Instrument, Loading, at_sensor, forms_of, rotation_of, weight
 from rotorid.errors import InputError
-from rotorid.mismatch.deliver import deliver
 from rotorid.mismatch.delivery.files import read_instruments
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import form_reading, value_column
@@ -20,6 +19,7 @@ from rotorid.mismatch.instrument.sampling import step_of
 from rotorid.mismatch.instrument.setup import set_up
 from rotorid.mismatch.rows import Rows
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_vehicle
+from rotorid.report.deliver import deliver
 
 NEW = (
     "zero_drift",

@@ -12,7 +12,7 @@ from rotorid.mismatch.mistakes import dropout, find_mistakes, lagged
 from rotorid.mismatch.mistakes.lagged import Blocks
 from rotorid.mismatch.mistakes.timing import Lateness, in_agreement, one_quantity
 from rotorid.recordings import RecordingSet, Run, Vehicle
-from rotorid.signal.kernels import gaussian
+from rotorid.recordings.signal.kernels import gaussian
 
 from .flights import COLUMNS, quad, recorded, with_table
 

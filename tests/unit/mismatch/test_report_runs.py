@@ -14,7 +14,6 @@ import pytest
 from rotorid.mismatch.analyse import analyse, with_noise_held_out
 from rotorid.mismatch.choosing import KEPT, POSTERIOR, chosen_by
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
-from rotorid.mismatch.deliver import verdict_of
 from rotorid.mismatch.evidence import evidence, ratio_of, weighed
 from rotorid.mismatch.findings import Trace
 from rotorid.mismatch.instrument.analyse import analyse_instrument
@@ -23,6 +22,7 @@ from rotorid.mismatch.posterior.evidence import evidence_of
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.report.deliver import verdict_of
 from tests.unit.mismatch.flights import Flight
 
 HELD = "run02"

@@ -2,8 +2,8 @@
 
 import json
 
-from rotorid.proof import ablation
-from rotorid.proof.without_rules import Judged, fires_in, read_stored, stored
+from rotorid_proof import ablation
+from rotorid_proof.without_rules import Judged, fires_in, read_stored, stored
 
 ANSWER = {
     "case": "single/drag/0", "expected": ["rotor_drag"], "wrong_parameters": {}, "outside_catalogue": [],

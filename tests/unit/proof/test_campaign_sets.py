@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotorid.proof import campaign
+from rotorid_proof import campaign
 
 
 def verdict(*effects: dict) -> dict:

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.choosing import KEPT
-from rotorid.proof.decisions import truths
-from rotorid.proof.decisions.bench import rows_of
-from rotorid.proof.decisions.collect import Made, collect
-from rotorid.proof.decisions.decisions import posterior, selection
-from rotorid.proof.decisions.label import Label
-from rotorid.proof.decisions.plan import Item, drawn, in_order
-from rotorid.proof.decisions.score import Counts, score_drawn, score_planted, score_real, statements
-from rotorid.proof.decisions.store import Kept, read_all, write
-from rotorid.proof.decisions.table import markdown, sets, table
-from rotorid.proof.plan import Entry
-from rotorid.proof.plantings.kinds import Ratio, Size, named
+from rotorid_proof.decisions import truths
+from rotorid_proof.decisions.bench import rows_of
+from rotorid_proof.decisions.collect import Made, collect
+from rotorid_proof.decisions.decisions import posterior, selection
+from rotorid_proof.decisions.label import Label
+from rotorid_proof.decisions.plan import Item, drawn, in_order
+from rotorid_proof.decisions.score import Counts, score_drawn, score_planted, score_real, statements
+from rotorid_proof.decisions.store import Kept, read_all, write
+from rotorid_proof.decisions.table import markdown, sets, table
+from rotorid_proof.plan import Entry
+from rotorid_proof.plantings.kinds import Ratio, Size, named
 
 ANSWER = {
     "set": "set-1",
@@ -162,7 +162,7 @@ def test_a_collection_goes_on_where_it_stopped_and_one_bad_set_does_not_end_it(t
             raise ValueError("no such file")
         return Made(Runs(), {"expected": []})
 
-    monkeypatch.setattr("rotorid.proof.decisions.collect.judged", lambda recordings: ({"verdict": "explained"}, None))
+    monkeypatch.setattr("rotorid_proof.decisions.collect.judged", lambda recordings: ({"verdict": "explained"}, None))
     wanted = items(3, 5.0, "somewhere")
 
     def go(engine):

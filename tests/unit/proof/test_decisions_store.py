@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
-from rotorid.proof.decisions import truths
-from rotorid.proof.decisions.label import Label
-from rotorid.proof.decisions.store import SEALED, Kept, key_of, newest, read_all, read_evidence, read_truth, write
-from rotorid.proof.plantings.kinds import Ratio, Size, named
+from rotorid_proof.decisions import truths
+from rotorid_proof.decisions.label import Label
+from rotorid_proof.decisions.store import SEALED, Kept, key_of, newest, read_all, read_evidence, read_truth, write
+from rotorid_proof.plantings.kinds import Ratio, Size, named
 
 LABEL = Label("planted/somewhere/values/mass/large/0", "flight", "somewhere", "values")
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rotorid.proof import delivered
-from rotorid.proof.delivered import COLUMNS, not_flown_by, refused_by, table
+from rotorid_proof import delivered
+from rotorid_proof.delivered import COLUMNS, not_flown_by, refused_by, table
 from tests.unit.vehicle.test_exports import FLAT, six_rotors, with_effects
 
 
@@ -18,7 +18,7 @@ def test_what_a_tool_does_not_take_is_told_from_what_it_does_not_fly():
 def test_an_engine_that_refuses_a_file_is_named(monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.setattr(delivered, "refused_by", lambda vehicle: {"rotorpy": "", "gym-pybullet-drones": ""})
-    monkeypatch.setattr("rotorid.exports.forms.refusal", lambda *asked: "")
+    monkeypatch.setattr("rotorid.vehicle.exports.forms.refusal", lambda *asked: "")
     (said,) = not_flown_by(FLAT)
     assert said.startswith("mjcf (MuJoCo does not read the exported vehicle")
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.proof.keep_release import keep
+from rotorid_proof.keep_release import keep
 
 DATE = "2026-11-26"
 

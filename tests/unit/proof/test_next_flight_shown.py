@@ -3,9 +3,9 @@
 import pandas as pd
 import pytest
 
-from rotorid.plots.proof import next_flight
-from rotorid.proof.next_flight import Row, summary, table
-from rotorid.proof.show import asked_of_flights, of_next_flights
+from rotorid_proof.next_flight import Row, summary, table
+from rotorid_proof.plots import next_flight
+from rotorid_proof.show import asked_of_flights, of_next_flights
 
 ROWS = table(
     [

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rotorid.proof.peers import boosting, refit_only, sample_split, sindy, stepwise
-from rotorid.proof.peers.problem import Problem, as_verdict, least_squares
+from rotorid_proof.peers import boosting, refit_only, sample_split, sindy, stepwise
+from rotorid_proof.peers.problem import Problem, as_verdict, least_squares
 
 NAMES = ("rotor_drag", "com_offset", "thrust_curve", "gyro_error")
 

@@ -5,16 +5,16 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rotorid.proof import plan
-from tests.concealed.build import index_text
-from tests.concealed.cases import with_names
+from rotorid_proof import plan
+from rotorid_proof.concealed.build import index_text
+from rotorid_proof.concealed.cases import with_names
 
 ROOT = Path(__file__).parents[3]
-INDEX = ROOT / "tests/concealed/cases.tsv"
+INDEX = ROOT / "proof/rotorid_proof/concealed/cases.tsv"
 
 
 def test_the_list_of_cases_is_current() -> None:
-    assert INDEX.read_text() == index_text(), "python -m tests.concealed.build --write-index"
+    assert INDEX.read_text() == index_text(), "python -m rotorid_proof.concealed.build --write-index"
 
 
 def test_names_of_sets_say_nothing_and_are_unique() -> None:

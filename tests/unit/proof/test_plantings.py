@@ -10,11 +10,11 @@ import pytest
 
 from rotorid.effects.motor_lag import lagged
 from rotorid.effects.throttle_curve import root
-from rotorid.proof.plantings import judge, plan, score, sow, tables
-from rotorid.proof.plantings.flights import FLIGHTS, flight, taken
-from rotorid.proof.plantings.kinds import Ratio, Size, Truth, named
 from rotorid.recordings import Inertia, RecordingSet, Rotor, Run, Vehicle
 from rotorid.recordings import columns as c
+from rotorid_proof.plantings import judge, plan, score, sow, tables
+from rotorid_proof.plantings.flights import FLIGHTS, flight, taken
+from rotorid_proof.plantings.kinds import Ratio, Size, Truth, named
 
 ROOT = Path(__file__).parents[3]
 RATE_HZ, ARM = 400.0, 0.1

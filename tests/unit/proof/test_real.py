@@ -6,8 +6,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from rotorid.proof import real
-from rotorid.proof.studies import STUDIES, Published, Study
+from rotorid_proof import real
+from rotorid_proof.studies import STUDIES, Published, Study
 from workflow.scripts import tabulate_real
 
 

@@ -5,11 +5,11 @@ import math
 
 import pytest
 
-from rotorid.proof import table
-from rotorid.proof.intervals import bootstrap_mean, wilson
-from rotorid.proof.score import f1_of_times, oracle_rms, score_case
-from rotorid.proof.spelling import translated
-from rotorid.proof.units import same_unit
+from rotorid_proof import table
+from rotorid_proof.intervals import bootstrap_mean, wilson
+from rotorid_proof.score import f1_of_times, oracle_rms, score_case
+from rotorid_proof.spelling import translated
+from rotorid_proof.units import same_unit
 
 
 def effect(id, status="established", alternatives=(), parameters=(), p=1e-9):

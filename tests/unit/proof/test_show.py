@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.plots import proof
-from rotorid.proof import show
+from rotorid_proof import plots as proof
+from rotorid_proof import show
 
 
 def test_small_coefficients_stand_in_units_of_a_power_of_ten() -> None:

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid import templates
 from rotorid.cli.simulating import fly
-from rotorid.recordings import RecordingSet, Run, read_set
+from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.check import doubts_of
 from rotorid.recordings.doubts import Doubt

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid import templates
 from rotorid.cli.simulating import fly
-from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle
+from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import body_of, impossible
 from rotorid.recordings.check import doubts_of
@@ -166,8 +165,8 @@ def doubts_without_flight(vehicle: Vehicle) -> list[Doubt]:
 
 VEHICLES = [
     *(ROOT / "workflow" / "vehicles").glob("*.yaml"),
-    *(ROOT / "src" / "rotorid" / "templates").glob("*.yaml"),
-    ROOT / "src" / "rotorid" / "examples" / "vehicle.yaml",
+    *(ROOT / "src" / "rotorid" / "recordings" / "templates").glob("*.yaml"),
+    ROOT / "src" / "rotorid" / "cli" / "examples" / "vehicle.yaml",
 ]
 
 

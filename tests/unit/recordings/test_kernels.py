@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
-from rotorid.signal import kernels
+from rotorid.recordings.signal import kernels
 
 RATE_HZ, CUTOFF_HZ = 250.0, 20.0
 

@@ -19,10 +19,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rotorid.errors import InputError
+from rotorid.io.text.writing import rounded
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_run, read_set, read_vehicle, write_set, write_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
-from rotorid.writing import rounded
 from tests.unit.recordings.wrong_inputs import RUN, VEHICLE, sound
 
 LONG = os.environ.get("HYPOTHESIS_PROFILE") == "long"

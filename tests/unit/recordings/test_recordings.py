@@ -243,7 +243,7 @@ def test_the_unit_is_read_from_the_name(column: str, unit: str) -> None:
 
 
 def test_without_pyarrow_runs_are_packed_csv_and_parquet_is_refused_by_name(tmp_path, monkeypatch):
-    from rotorid import examples
+    from rotorid.cli import examples
     from rotorid.recordings import tables
 
     folder = tmp_path / "example"

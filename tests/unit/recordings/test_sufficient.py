@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 
 from rotorid.cli import app
 from rotorid.errors import InputError
-from rotorid.mismatch.deliver import deliver, judge
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, write_set
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
+from rotorid.report.deliver import deliver, judge
 from tests.unit.mismatch.flights import QUAD
 
 SPEEDS = c.rotor_columns("rotor_speed", 4)

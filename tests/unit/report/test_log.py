@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rotorid import log
 from rotorid.errors import InputError
+from rotorid.report import log
 
 
 def test_messages_and_warnings_are_in_the_file(tmp_path: Path) -> None:

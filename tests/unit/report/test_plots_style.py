@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.plots import style
+from rotorid.report.plots import style
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".png", ".pdf"])

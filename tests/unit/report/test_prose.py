@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid import prose
+from rotorid.report import prose
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy
 import pytest
 
-from rotorid import provenance
+from rotorid.report import provenance
 
 
 def test_versions_are_those_installed_of_what_is_locked() -> None:

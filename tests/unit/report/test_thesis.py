@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotorid import thesis
+from rotorid.report import thesis
 
 
 @pytest.mark.parametrize(

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.control.excitation import ExcitedHold, Multisine
-from rotorid.control.pid import AttitudePid, Gains
-from rotorid.control.references import training_reference
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.gust import window_form
 from rotorid.errors import InputError
+from rotorid.identify.estimate.excitation import ExcitedHold, Multisine
 from rotorid.vehicle import kernels
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.compiled import _invert
+from rotorid.vehicle.control.pid import AttitudePid, Gains
+from rotorid.vehicle.control.references import training_reference
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.kernels import ADDED, INSTANT, body_of, kernel_values, kernels_of
 from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Noise, Start, simulate

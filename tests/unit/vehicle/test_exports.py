@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rotorid import templates
 from rotorid.cli import app
 from rotorid.errors import InputError
-from rotorid.exports import export_vehicle, flown, forms
-from rotorid.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
-from rotorid.recordings import Vehicle, write_vehicle
+from rotorid.recordings import Vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
+from rotorid.vehicle.exports import export_vehicle, flown, forms
+from rotorid.vehicle.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 
 
 def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from rotorid.control.excitation import ExcitedHold, Multisine
-from rotorid.control.pid import AttitudePid, Gains, Memory, pid_step
-from rotorid.control.references import training_reference
 from rotorid.effects.catalogue import catalogue
+from rotorid.identify.estimate.excitation import ExcitedHold, Multisine
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,
     quaternion_from_euler,
     rates_to_euler_rates,
     rotation_from_quaternion,
 )
+from rotorid.vehicle.control.pid import AttitudePid, Gains, Memory, pid_step
+from rotorid.vehicle.control.references import training_reference
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.params import RigidBody
 from rotorid.vehicle.rigid_body import angular_acceleration, kinetic_energy_j
@@ -313,7 +313,7 @@ def test_pid_by_hand():
 
 def test_anti_windup_shortens_the_overshoot():
     """A roll step that saturates the moment: with the integral held the overshoot is smaller."""
-    from rotorid.control.references import AttitudeReference
+    from rotorid.vehicle.control.references import AttitudeReference
 
     vehicle = thesis_vehicle()
     step = AttitudeReference("step", 6.4, lambda t: np.array([0.8, 0.0, 0.0]))

@@ -13,7 +13,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict
 
 from rotorid.acquire.geometry import INTERCEPT, SLOPE
-from rotorid.text_files import read_yaml
+from rotorid.io.text.files import read_yaml
 
 
 class _Truth(BaseModel):

@@ -15,10 +15,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
+from rotorid.io.text.files import read_yaml
+from rotorid.io.text.writing import rounded
 from rotorid.mismatch.delivery.parts import delivered, form_of
 from rotorid.mismatch.findings import Analysis, Finding, RunWind
-from rotorid.text_files import read_yaml
-from rotorid.writing import rounded
 
 CONDITIONS, INSTRUMENTS = "conditions.yaml", "instruments.yaml"
 ABOUT = {

@@ -10,13 +10,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rotorid.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.errors import InputError
-from rotorid.exports.forms import FORMS, export_vehicle
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import NO_BODY
 from rotorid.recordings.body import body_of, unfit
+from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
+from rotorid.vehicle.exports.forms import FORMS, export_vehicle
 from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import wrench_at_rest
 from rotorid.vehicle.improved import command_path

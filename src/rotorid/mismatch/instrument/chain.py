@@ -22,7 +22,7 @@ from rotorid.mismatch.findings import Estimate, Finding, Trace
 from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces_of, with_speed
 from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal.kernels import causal
 
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0

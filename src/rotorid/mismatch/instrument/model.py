@@ -32,7 +32,7 @@ from rotorid.mismatch.select import (
     Selection,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.signal.kernels import causal
+from rotorid.recordings.signal.kernels import causal
 
 SHORT = 60
 """Stretches of fewer rows are too short to learn the colour of their noise from: they are taken as blocks."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal.windows import hann
 
 from rotorid.mismatch.motion import stretches
-from rotorid.signal import kernels
+from rotorid.recordings.signal import kernels
 
 BLOCK_S = 2.56
 OVERSAMPLING = 5.0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.mismatch.deliver import write_files
 from rotorid.mismatch.delivery.files import (
     conditions_of,
     empty,
@@ -19,6 +18,7 @@ from rotorid.mismatch.delivery.model import model_of
 from rotorid.mismatch.findings import RunWind
 from rotorid.mismatch.forward import delivered_model, errors_of, forward_channels
 from rotorid.mismatch.shares import segments_of
+from rotorid.report.deliver import write_files
 from tests.unit.mismatch.delivery.test_parts import WIND, sensor_error
 from tests.unit.mismatch.synthetic import HOVER, K_D, analysis, drag_finding
 

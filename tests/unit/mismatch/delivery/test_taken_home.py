@@ -12,17 +12,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from rotorid import templates
 from rotorid.cli import app, verdicts
 from rotorid.cli.simulating import fly
-from rotorid.control.swings import swings
-from rotorid.mismatch.deliver import analysis_of, verdict_of, write_files
 from rotorid.mismatch.delivery.parts import delivered, improved_vehicle
 from rotorid.mismatch.findings import Analysis
 from rotorid.mismatch.verdict import Verdict
-from rotorid.proof.delivered import row_of
-from rotorid.recordings import RecordingSet, Vehicle, write_set, write_vehicle
+from rotorid.recordings import RecordingSet, Vehicle, templates, write_set, write_vehicle
 from rotorid.recordings import columns as c
+from rotorid.report.deliver import analysis_of, verdict_of, write_files
+from rotorid.vehicle.control.swings import swings
+from rotorid_proof.delivered import row_of
 from tests.unit.mismatch.flights import QUAD, quad, recorded, with_table
 
 LIMITS = {"rotor_speed_limits_rad_s": (0.0, 1800.0)}

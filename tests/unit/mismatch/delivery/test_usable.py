@@ -6,9 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid import templates
 from rotorid.cli.simulating import simulate
-from rotorid.control.swings import FLIGHTS, SECONDS, SEED
 from rotorid.mismatch.delivery import usable
 from rotorid.mismatch.delivery.usable import (
     cannot_fly,
@@ -20,7 +18,8 @@ from rotorid.mismatch.delivery.usable import (
     question_of,
     recorded_share,
 )
-from rotorid.recordings import Run
+from rotorid.recordings import Run, templates
+from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED
 from tests.unit.vehicle.thesis import thesis_vehicle
 
 LIMITS = {"rotor_speed_limits_rad_s": (0.0, 1600.0)}

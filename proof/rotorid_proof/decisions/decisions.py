@@ -1,0 +1,81 @@
+"""Decisions: what is said of a set by the evidence that is kept of it.
+
+A decision takes what is kept and gives effects and values as `verdict.json` states them, so that the rules that score
+verdicts score it. Each effect may carry a `probability`, that one of its class is at work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.findings import CLAIMED
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.search import decide
+from rotorid.mismatch.posterior.statements import Statement, statements_of
+from rotorid_proof.decisions.store import Kept
+
+Said = Mapping[str, Any]
+"""`effects`, `parameters` and `verdict` of a verdict, or `{"failed": reason}`."""
+Decision = Callable[[Kept], Said]
+NOTHING, SOMETHING = "no_mismatch", "explained"
+"""Word of a decision that has none of its own, by whether it states anything."""
+PROBABILITY_OF = {"established": 0.99, "ambiguous": 0.99, "suggested": 0.5}
+"""What the contract's statuses promise, for a decision that states no probability."""
+
+
+def engine(kept: Kept) -> Said:
+    """The verdict as the engine delivers it."""
+    return kept.verdict
+
+
+def selection(kept: Kept) -> Said:
+    """What the engine selects from the fitted runs, before its rules for words lower it."""
+    if kept.selection is None:
+        return kept.verdict
+    return said(kept.selection["effects"], kept.selection["parameters"])
+
+
+def posterior(kept: Kept) -> Said:
+    """Effects of force, moment and sensors by the posterior; the rest, and values, by the engine's selection."""
+    if kept.evidence is None:
+        return kept.verdict
+    found = statements_of(decide(kept.evidence, Prior(), kept.evidence.active))
+    # What is unlikely, or too small to matter, is not stated.
+    stated = [as_effect(s, kept.selection["commanded"]) for s in found if s.status != "not_established"]
+    return said([*kept.selection["outside"], *stated], kept.selection["parameters"])
+
+
+DECISIONS: Mapping[str, Decision] = {"engine": engine, "selection": selection, "posterior": posterior}
+
+
+def said(effects: Iterable[Mapping[str, Any]], values: Mapping[str, Any]) -> Said:
+    """Effects and values with a word."""
+    stated = list(effects)
+    claims = bool(values) or any(e["status"] in CLAIMED for e in stated)
+    return {"effects": stated, "parameters": dict(values), "verdict": SOMETHING if claims else NOTHING}
+
+
+def as_effect(statement: Statement, commanded: bool) -> dict[str, Any]:
+    """A statement as `verdict.json` has it.
+
+    Where rotor speeds are known from `commanded` ones alone, some ids have the very columns of another.
+    """
+    status, members = statement.status, set(statement.alternatives)
+    same = catalogue()[statement.id].same_on_commands if statement.id in catalogue() else ""
+    if commanded and same and status in CLAIMED:
+        status, members = "ambiguous", members | {statement.id, same}
+    return {
+        "id": statement.id,
+        "status": status,
+        "alternatives": sorted(members),
+        "probability": statement.probability,
+        "p_value": float(np.exp(-max(statement.odds, 0.0))),
+        "parameters": [
+            {"symbol": p.symbol, "value": p.value, "unit": p.unit, "interval_95": [p.low, p.high]}
+            for p in statement.parameters
+        ],
+    }

@@ -1,0 +1,131 @@
+"""The proof of the next flight: an open question, the flight planned for it, and what both sets together say.
+
+A row is one concealed set that the engine left open, or that holds a pair of confusers flown so that little tells them
+apart. The plan knows the set alone; the simulator that made it records the planned flight, and as a yardstick a
+standard flight of the same length; both sets are judged together by the engine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+import pandas as pd
+
+from rotorid.mismatch.findings import Finding
+from rotorid.plan.plan import Plan
+from rotorid.plan.questions import Known, Question, best_of
+from rotorid.plan.separation import Separation
+from rotorid.plan.together import answers
+from rotorid_proof.intervals import wilson
+
+WITHIN = 1.5
+"""Factor within which a predicted separation counts as right."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of one set."""
+
+    case: str
+    truth: str
+    open: str
+    """Ids that the set left open; empty where it left none."""
+    planned_s: float = float("nan")
+    predicted_sigma: float = float("nan")
+    """Of the true model against its nearest rival, both sets together; NaN where truth is none of the open ids."""
+    predicted_low: float = float("nan")
+    """Its 95 % interval as the plan states it."""
+    predicted_high: float = float("nan")
+    measured_sigma: float = float("nan")
+    """The same between the two as recorded: √ of the whitened squares that the true one explains more."""
+    standard_sigma: float = float("nan")
+    """The same with the standard flight in the planned one's place."""
+    promised: bool = False
+    """Whether the plan said that all would be settled."""
+    outcome: str = ""
+    """`right`, `wrong`, `open`, or `no plan` where it said that no flight settles this."""
+    standard_outcome: str = ""
+    """The same with the standard flight in the planned one's place."""
+    said: str = ""
+    judged_by: str = ""
+    """Hash of the code that planned and judged it."""
+
+
+def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:
+    """`right`, `wrong` (also where something untrue of the class is established beside) or `open`, and the sentence."""
+    (answer,) = answers([ids], findings)
+    if not answer.answer:
+        return "open", answer.sentence
+    named = {f.id for f in findings if f.status == "established" and f.id in ids}
+    return ("right" if named <= truth else "wrong"), answer.sentence
+
+
+def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
+    """Separation of the true model from its nearest rival; None where the truth is none of the class."""
+    found = [s for own, separations in plan.questions if set(own) == set(ids) for s in separations]
+    return next((s for s in found if s.true in truth), None)
+
+
+def measured(joint: Known, question: Question | None, true: str) -> float:
+    """√ of the whitened squares that the true model still explains beside its nearest rival, in both sets together.
+
+    This is what the engine asks before it names a class: is the term still needed with the other in its place? Of each
+    rival every form of the question as it was asked of the first set is tried; what as many coefficients explain of
+    noise alone is taken off. NaN where truth is none of the models, or is no term of forces and moments (between
+    command and rotor speed).
+    """
+    if question is None or true not in question.rivals:
+        return float("nan")
+    search, active = joint.fitted.model.search, joint.fitted.model.selection.active
+    shared = [*search.always, *(k for k in active if search.terms[k].effect not in question.ids)]
+
+    def able(name: str) -> list[tuple[str, ...]]:
+        return [keys for keys in question.rivals[name] if all(k in search.terms for k in keys)]
+
+    if not able(true):
+        return float("nan")
+    own = best_of(joint.regression, shared, able(true), search.terms)
+    left = []
+    for keys in (keys for name in question.rivals if name != true for keys in able(name)):
+        more = [k for k in own if k not in keys]
+        if more:
+            beside = [*shared, *keys]
+            gain = joint.regression.explained([*beside, *more]) - joint.regression.explained(beside)
+            left.append(gain - sum(search.terms[k].size for k in more))
+    return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
+
+
+def table(rows: list[Row]) -> pd.DataFrame:
+    """The rows as a table."""
+    return pd.DataFrame([asdict(r) for r in rows], columns=[f.name for f in fields(Row)])
+
+
+def summary(rows: pd.DataFrame) -> pd.DataFrame:
+    """Shares over the sets that were open, with 95 % intervals (Wilson), and how many they are of."""
+    sigmas = ["predicted_sigma", "predicted_low", "predicted_high", "measured_sigma", "standard_sigma"]
+    rows = rows.assign(**{name: rows[name].replace("", np.nan).astype(float) for name in sigmas})
+    asked = rows[rows["open"].fillna("") != ""]
+    planned = asked[asked["outcome"] != "no plan"]
+    both = asked.dropna(subset=["predicted_sigma", "measured_sigma"])
+    faster = planned.dropna(subset=["measured_sigma", "standard_sigma"])
+    ratio = both["measured_sigma"] / both["predicted_sigma"].clip(lower=1e-9)
+    inside = both["measured_sigma"].between(both["predicted_low"], both["predicted_high"])
+    fast = faster["measured_sigma"] ** 2 >= 2 * faster["standard_sigma"] ** 2
+    counted = (
+        ("settled rightly, of all open", asked["outcome"] == "right"),
+        ("settled wrongly, of all open", asked["outcome"] == "wrong"),
+        ("settled rightly, where a flight was planned", planned["outcome"] == "right"),
+        ("settled rightly by a standard flight as long", planned["standard_outcome"] == "right"),
+        ("settled wrongly by a standard flight as long", planned["standard_outcome"] == "wrong"),
+        (f"prediction within a factor of {WITHIN:g}", (ratio < WITHIN) & (ratio > 1 / WITHIN)),
+        ("measured within the interval stated", inside),
+        ("planned at least twice as fast (squares a second)", fast),
+    )
+    out = []
+    for name, hits in counted:
+        count, of = int(hits.sum()), len(hits)
+        low, high = wilson(count, of)
+        share = count / of if of else float("nan")
+        out.append({"what": name, "count": count, "of": of, "share": share, "low": low, "high": high})
+    return pd.DataFrame(out)

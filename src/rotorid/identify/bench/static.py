@@ -1,0 +1,218 @@
+"""Static tests: what the bench gives for a known load, per platform and axis (thesis 2.8.1, figs 2.42 and 2.45).
+
+Each recording becomes one point: the mean force while the load was read, by the thesis's equations and, on the
+aluminium bench, by the calibration matrix, each with the uncertainty that the calibration and the noise leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t as student_t
+
+from rotorid.errors import InputError
+from rotorid.identify.bench.loadcell import LineFit, fit_line
+from rotorid.identify.bench.matrix import Calibration, calibrate
+from rotorid.identify.bench.reconstruct import (
+    GF_N,
+    PULLED,
+    Geometry,
+    cell_forces,
+    cell_variance,
+    force_covariance,
+    forces,
+)
+from rotorid.io.tables import by_recording
+
+UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
+AXES = "xyz"
+
+
+def direction(axis: str) -> np.ndarray:
+    """Unit vector of a load, shape (3,), body axes; `xz` is halfway between x and z. Loads along z pull up, −z."""
+    if not axis or any(letter not in UNIT for letter in axis):
+        raise InputError(f"a load's axis is x, y, z or several of them, not {axis!r}")
+    together = np.sum([UNIT[letter] for letter in axis], axis=0)
+    return together / np.linalg.norm(together)
+
+
+@dataclass(frozen=True)
+class Means:
+    """Mean readings of recordings while the load was read, in the order of `sessions`."""
+
+    sessions: pd.DataFrame
+    values: np.ndarray
+    """Cells' tared voltages, V, shape (n, 6), or the sensor's tared forces, N, shape (n, 3)."""
+    variance: np.ndarray
+    """Variance of these means from the samples' scatter, that of the tare included, same shape."""
+    applied_n: np.ndarray
+    """Known loads, N, shape (n, 3), body axes."""
+
+
+def mean_readings(prepared: pd.DataFrame, sessions: pd.DataFrame, channels: tuple[str, ...]) -> Means:
+    """Mean of each channel between the marks `read_start` and `read_stop`, flagged samples left out."""
+    parts = by_recording(prepared)
+    means, variances, applied = [], [], []
+    for session in sessions.itertuples():
+        table = parts[session.id]
+        table = table[table["quality"] == 0]
+        read = table.loc[table["index"].between(session.mark_read_start, session.mark_read_stop), list(channels)]
+        rest = table.loc[table["index"].between(session.mark_tare_start, session.mark_tare_stop), list(channels)]
+        if len(read) < 2 or len(rest) < 2:
+            raise InputError(f"{session.id}: fewer than two good samples at rest or under load")
+        means.append(read.mean().to_numpy())
+        variances.append((read.var(ddof=1) / len(read) + rest.var(ddof=1) / len(rest)).to_numpy())
+        applied.append(direction(session.axis) * session.load_gf * GF_N)
+    return Means(sessions.reset_index(drop=True), np.array(means), np.array(variances), np.array(applied))
+
+
+def by_equations(means: Means, lines: list[LineFit], geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
+    """Force and its standard uncertainty, N, shape (n, 3) each, by eqs 2.3 to 2.8."""
+    coefficients = np.array([[line.a0, line.a1] for line in lines])
+    cells = cell_forces(means.values, coefficients)
+    covariance = force_covariance(cells, cell_variance(means.values, lines, means.variance), geometry)
+    return forces(cells, geometry), np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+
+
+def by_matrix(means: Means, calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
+    """Force and its standard uncertainty, N, shape (n, 3) each, by the calibration matrix."""
+    force = calibration.force(means.values)
+    noise_v = np.sqrt(means.variance.mean(axis=0))
+    return force, np.sqrt(np.diagonal(calibration.force_covariance(force, noise_v), axis1=1, axis2=2))
+
+
+def lateral_as_vertical(calibration: Calibration, lines: list[LineFit], geometry: Geometry) -> dict[str, dict]:
+    """What eq. 2.8 makes of one newton along x or y alone, N: `force_z_n`, and of it the absolute values' part.
+
+    The cells answer as the matrix has measured it, so it is the equation that turns a lateral load into a vertical one.
+    `absolute_n` is −(|F1| + |F3| + |F5|); it does not change sign with the load.
+    """
+    slopes = np.array([line.a1 for line in lines]) * 1e5 * GF_N
+    cells = (slopes[:, None] * calibration.response_v_n[:, :2]).T
+    along_z = forces(cells, geometry)[:, 2]
+    absolute = -np.abs(cells[:, PULLED]).sum(axis=1)
+    return {
+        axis: {"force_z_n": float(f), "absolute_n": float(a)}
+        for axis, f, a in zip("xy", along_z, absolute, strict=True)
+    }
+
+
+def matrix_of(means: Means, largest_n: float, repeats: set[int] | None = None) -> Calibration:
+    """Calibration matrix from loads along one axis at a time, up to `largest_n`; of some `repeats` only if given."""
+    use = (np.linalg.norm(means.applied_n, axis=1) <= largest_n) & (means.sessions["axis"].str.len() == 1).to_numpy()
+    if repeats is not None:
+        use &= means.sessions["repeat"].isin(repeats).to_numpy()
+    return calibrate(means.values[use], means.applied_n[use])
+
+
+def points(means: Means, force_n: np.ndarray, uncertainty_n: np.ndarray, method: str) -> pd.DataFrame:
+    """One row a recording: load and force along the load, the error, what appears across, the uncertainty."""
+    load = np.linalg.norm(means.applied_n, axis=1)
+    unit = means.applied_n / load[:, None]
+    along = np.einsum("ij,ij->i", force_n, unit)
+    across = np.linalg.norm(force_n - along[:, None] * unit, axis=1)
+    out = means.sessions[["id", "platform", "axis", "repeat"]].copy()
+    out["method"] = method
+    out["load_n"] = load
+    out["force_n"] = along
+    out["error_n"] = along - load
+    out["across_n"] = across
+    out["uncertainty_n"] = np.sqrt(np.einsum("ij,ij->i", unit**2, uncertainty_n**2))
+    for k, axis in enumerate(AXES):
+        out[f"error_{axis}_n"] = force_n[:, k] - means.applied_n[:, k]
+    return out
+
+
+def by_load(table: pd.DataFrame) -> pd.DataFrame:
+    """Mean error of each platform, axis and load with its interval, spread of the repeats, propagated uncertainty."""
+    rows = []
+    for (platform, axis, method, load), part in table.groupby(["platform", "axis", "method", "load_n"]):
+        n, spread = len(part), part["error_n"].std(ddof=1)
+        half = student_t.ppf(0.975, n - 1) * spread / np.sqrt(n)
+        mean = part["error_n"].mean()
+        rows.append(
+            {
+                "platform": platform,
+                "axis": axis,
+                "method": method,
+                "load_n": load,
+                "repeats": n,
+                "error_n": mean,
+                "low_95_n": mean - half,
+                "high_95_n": mean + half,
+                "error_percent": 100 * mean / load,
+                "repeatability_n": spread,
+                "across_n": part["across_n"].mean(),
+                "uncertainty_n": part["uncertainty_n"].mean(),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def by_series(table: pd.DataFrame) -> pd.DataFrame:
+    """Each platform and axis: r (fig. 2.45), slope with its interval, largest error, repeatability, error's growth.
+
+    `bend_percent_per_n` is the slope of the relative error over the load with its interval: not zero where the
+    platform reads further off as the load grows.
+    """
+    rows = []
+    for (platform, axis, method), part in table.groupby(["platform", "axis", "method"]):
+        line = fit_line(part["load_n"], part["force_n"])
+        # A weight along the load's axis of 1/load: the relative error is what a bench that gives way changes.
+        bend = fit_line(part["load_n"], part["error_n"] / part["load_n"])
+        within = part.groupby("load_n")["error_n"]
+        freedom = (within.count() - 1).clip(lower=0)
+        pooled = np.sqrt((within.var(ddof=1) * freedom).sum() / freedom.sum())
+        low, high = line.interval(1)
+        low_bend, high_bend = bend.interval(1)
+        rows.append(
+            {
+                "platform": platform,
+                "axis": axis,
+                "method": method,
+                "recordings": len(part),
+                "r": line.r,
+                "one_minus_r": 1 - line.r,
+                "slope": line.a1,
+                "slope_low_95": low,
+                "slope_high_95": high,
+                "rms_error_n": float(np.sqrt((part["error_n"] ** 2).mean())),
+                "largest_mean_error_n": float(within.mean().abs().max()),
+                "repeatability_n": float(pooled),
+                "across_n": float(part["across_n"].mean()),
+                "bend_percent_per_n": 100 * bend.a1,
+                "bend_low_95": 100 * low_bend,
+                "bend_high_95": 100 * high_bend,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def only(means: Means, kept: np.ndarray) -> Means:
+    """The recordings for which `kept` is true."""
+    sessions = means.sessions[kept].reset_index(drop=True)
+    return Means(sessions, means.values[kept], means.variance[kept], means.applied_n[kept])
+
+
+def methods_compared(table: pd.DataFrame) -> dict:
+    """Equations and matrix on the same loads: RMS error per component, N, and of the whole as a share of the load.
+
+    Along one axis only recordings that the matrix has not seen are compared.
+    """
+    out = {}
+    matrix = table[table["method"] == "matrix"]
+    for name, single in (("one_axis", True), ("several_axes", False)):
+        seen = matrix[(matrix["axis"].str.len() == 1) == single]
+        entry = {"recordings": len(seen), "largest_load_n": float(seen["load_n"].max())}
+        for method in ("equations", "matrix"):
+            part = table[(table["method"] == method) & table["id"].isin(seen["id"])]
+            squares = part[[f"error_{axis}_n" for axis in AXES]].to_numpy() ** 2
+            entry[method] = {
+                "rms_n": np.sqrt(squares.mean(axis=0)).tolist(),
+                "rms_share_of_load": float(np.sqrt(squares.sum() / (part["load_n"] ** 2).sum())),
+                "largest_share_of_load": float((np.sqrt(squares.sum(axis=1)) / part["load_n"]).max()),
+            }
+        out[name] = entry
+    return out

@@ -1,0 +1,201 @@
+"""Models of the stand's wrench, alike in use: fit on a table of samples, predict (n, 6) for another.
+
+- `thesis_network`: 6-20-20-6, sigmoid inside, linear out, batch, rate 0.1 (thesis 4.4).
+- `linear`: least squares on the six inputs and a constant.
+- `ridge_physics`: ridge on products of the motors' forces with the cosines and sines of the tilt.
+- `boosting`: gradient boosting, one ensemble an output.
+- `white_box`: the equations of chapter 4.1 with the believed values; nothing is fitted.
+- `white_box_effects`: the same with the effects that the stand's recordings show (unequal rotors and torques,
+shifted
+  sensor origin, tilted mount) fitted by least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import least_squares
+
+from rotorid.identify.blackbox.experiments import INPUTS, OUTPUTS, stand_wrench
+from rotorid.identify.networks.network import build
+from rotorid.identify.networks.training import Trained, Training, train
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
+
+Predict = Callable[[pd.DataFrame], np.ndarray]
+NAMES = {
+    "thesis_network": "thesis's network",
+    "linear": "least squares",
+    "ridge_physics": "ridge on physical features",
+    "boosting": "gradient boosting",
+    "white_box": "white box",
+    "white_box_effects": "white box with effects",
+}
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Even scaling of columns to 0-1 over the training data, as networks want it."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> Scale:
+        low, high = values.min(axis=0), values.max(axis=0)
+        return cls(low, np.where(high > low, high, low + 1.0))
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        return (values - self.low) / (self.high - self.low)
+
+    def back(self, values: np.ndarray) -> np.ndarray:
+        return self.low + values * (self.high - self.low)
+
+
+def fit_thesis_network(
+    table: pd.DataFrame,
+    epochs: int,
+    rate: float = 0.1,
+    hidden: tuple[int, ...] = (20, 20),
+    seed: int = 0,
+    every: int = 10,
+    checkpoint: Path | None = None,
+) -> tuple[Predict, Trained]:
+    """Train the network of thesis 4.4 on a table with `INPUTS` and `OUTPUTS`."""
+    x, y = table[list(INPUTS)].to_numpy(), table[list(OUTPUTS)].to_numpy()
+    scale_x, scale_y = Scale.of(x), Scale.of(y)
+    sizes = (len(INPUTS), *hidden, len(OUTPUTS))
+    activations = ("sigmoid",) * len(hidden) + ("linear",)
+    network = build(sizes, activations, np.random.default_rng(seed))
+    how = Training(rate, epochs, every=every, seed=seed, checkpoint_every=10_000)
+    trained = train(network, scale_x.apply(x), scale_y.apply(y), how, checkpoint)
+
+    def predict(other: pd.DataFrame) -> np.ndarray:
+        return scale_y.back(trained.network(scale_x.apply(other[list(INPUTS)].to_numpy())))
+
+    return predict, trained
+
+
+def fit_linear(table: pd.DataFrame) -> Predict:
+    def design(t):
+        return np.column_stack([t[list(INPUTS)].to_numpy(), np.ones(len(t))])
+
+    found, *_ = np.linalg.lstsq(design(table), table[list(OUTPUTS)].to_numpy(), rcond=None)
+    return lambda other: design(other) @ found
+
+
+def physical_features(table: pd.DataFrame) -> np.ndarray:
+    """Each motor's force times 1, sin and cos of roll and pitch and their product, (n, 24)."""
+    forces = table[list(INPUTS[:4])].to_numpy()
+    roll, pitch = table["roll_rad"].to_numpy(), table["pitch_rad"].to_numpy()
+    ways = [
+        np.ones(len(table)),
+        np.sin(roll),
+        np.cos(roll) - 1,
+        np.sin(pitch),
+        np.cos(pitch) - 1,
+        np.sin(roll) * np.sin(pitch),
+    ]
+    return np.concatenate([forces * way[:, None] for way in ways], axis=1)
+
+
+def fit_ridge_physics(table: pd.DataFrame, groups: np.ndarray) -> Predict:
+    """Ridge with the penalty chosen per output by leaving whole experiments out."""
+    from sklearn.linear_model import Ridge
+    from sklearn.model_selection import GroupKFold, cross_val_score
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    x, y = physical_features(table), table[list(OUTPUTS)].to_numpy()
+    models = []
+    for output in y.T:
+        scores = {}
+        for penalty in (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0):
+            model = make_pipeline(StandardScaler(), Ridge(alpha=penalty))
+            scores[penalty] = cross_val_score(
+                model, x, output, groups=groups, cv=GroupKFold(5), scoring="neg_mean_squared_error"
+            ).mean()
+        best = max(scores, key=scores.get)
+        models.append(make_pipeline(StandardScaler(), Ridge(alpha=best)).fit(x, output))
+    return lambda other: np.column_stack([m.predict(physical_features(other)) for m in models])
+
+
+def fit_boosting(table: pd.DataFrame, seed: int = 0) -> Predict:
+    from sklearn.ensemble import GradientBoostingRegressor
+
+    x = table[list(INPUTS)].to_numpy()
+    models = [
+        GradientBoostingRegressor(
+            n_estimators=300, max_depth=3, learning_rate=0.05, subsample=0.7, random_state=seed
+        ).fit(x, table[name].to_numpy())
+        for name in OUTPUTS
+    ]
+    return lambda other: np.column_stack([m.predict(other[list(INPUTS)].to_numpy()) for m in models])
+
+
+def white_box(vehicle: Vehicle) -> Predict:
+    return lambda other: stand_wrench(
+        vehicle,
+        other[list(INPUTS[:4])].to_numpy(),
+        other["roll_rad"].to_numpy(),
+        other["pitch_rad"].to_numpy(),
+    )
+
+
+EFFECT_PARAMETERS = (
+    *(f"thrust_factor_{i}" for i in (1, 2, 3, 4)),
+    *(f"torque_factor_{i}" for i in (1, 2, 3, 4)),
+    "sensor_origin_x_m",
+    "sensor_origin_y_m",
+    "mount_roll_rad",
+    "mount_pitch_rad",
+)
+
+
+def effects_wrench(vehicle: Vehicle, table: pd.DataFrame, values: np.ndarray) -> np.ndarray:
+    """The stand's wrench with `EFFECT_PARAMETERS` (neutral: ones, ones, zeros), (n, 6)."""
+    factors, torques, mount = values[:4], values[4:8], values[10:12]
+    # Along the thrust a shift of the sensor changes nothing.
+    origin = np.array([values[8], values[9], 0.0])
+    forces = table[list(INPUTS[:4])].to_numpy() * factors
+    ratio = vehicle.torque_coefficients_n_m_s2() / vehicle.thrust_coefficients_n_s2()
+    places = vehicle.rotor_positions_m() - np.asarray(vehicle.sensor_position_m) - origin
+    # r × (0, 0, -F) = (-y F, x F, 0)
+    moment = np.column_stack(
+        [
+            -forces @ places[:, 1],
+            forces @ places[:, 0],
+            table[list(INPUTS[:4])].to_numpy() * torques @ (vehicle.yaw_signs() * ratio),
+        ]
+    )
+    force = np.zeros_like(moment)
+    force[:, 2] = -forces.sum(axis=1)
+    angles = np.column_stack([table["roll_rad"], table["pitch_rad"], np.zeros(len(table))])
+    turn = rotation_from_quaternion(quaternion_from_euler(angles))
+    level = rotation_from_quaternion(quaternion_from_euler(np.array([mount[0], mount[1], 0.0])))
+    turn = level @ turn
+    return np.concatenate([np.einsum("nij,nj->ni", turn, v) for v in (force, moment)], axis=1)
+
+
+def fit_white_box_effects(vehicle: Vehicle, table: pd.DataFrame) -> tuple[Predict, np.ndarray, np.ndarray]:
+    """Effects by least squares: model, `EFFECT_PARAMETERS` and their standard errors, shape (12,) each.
+
+    Forces are weighted by 0.1 N and moments by 0.001 N m, the sensor's resolution. The errors hold for residuals that
+    the samples of one experiment share (cluster-robust over experiments); what the model itself lacks they do not know.
+    """
+    measured = table[list(OUTPUTS)].to_numpy()
+    neutral = np.concatenate([np.ones(8), np.zeros(4)])
+    sigma = np.repeat([0.1, 0.001], 3)
+    found = least_squares(
+        lambda v: ((effects_wrench(vehicle, table, v) - measured) / sigma).ravel(), neutral, x_scale=0.01
+    )
+    rows = np.repeat(table["experiment"].to_numpy(), len(OUTPUTS))
+    scores = np.array([found.jac[rows == number].T @ found.fun[rows == number] for number in np.unique(rows)])
+    inverse = np.linalg.inv(found.jac.T @ found.jac)
+    factor = len(scores) / (len(scores) - 1)
+    errors = np.sqrt(np.diag(factor * inverse @ (scores.T @ scores) @ inverse))
+    return lambda other: effects_wrench(vehicle, other, found.x), found.x, errors

@@ -1,0 +1,206 @@
+"""An excitation that makes all inertias and gyroscopic terms identifiable: multisines within what motors can
+do.
+
+Each axis gets its own harmonics of one period (so the axes are orthogonal). Amplitudes, phases and the axes'
+shares are searched from a seed; each candidate is scaled to the largest that keeps every rotor
+within its limits and roll and pitch within a tilt, and judged by the standard errors it promises (worst of
+inertias and gyroscopic weights, each against what is wanted). The search uses the motion without controller:
+rates are integrals of moment over inertia.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.identify.estimate.inertial import regressors, weights_of_inertias
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.control.pid import AttitudePid, Gains
+from rotorid.vehicle.control.references import AttitudeReference
+from rotorid.vehicle.fast import AttitudeLoop
+from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
+
+HOLD_GAINS = Gains((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
+"""A soft attitude hold, slower than the excitation: it keeps the attitude but does not undo the motion."""
+
+
+FIRST_SHARES_N_M = np.array([0.1, 0.1, 0.03])
+"""Where the search for the axes' shares begins: roll and pitch can be pushed far harder than yaw."""
+WINDOW_S = 0.25
+"""Length of the windows that the estimate is expected to use."""
+
+
+@dataclass(frozen=True)
+class Multisine:
+    """Moment about each axis: Σ_h amplitude cos(2π h t / period + phase); arrays (harmonics, 3)."""
+
+    period_s: float
+    harmonics: np.ndarray
+    amplitude_n_m: np.ndarray
+    phase_rad: np.ndarray
+
+    def moment(self, time_s: np.ndarray) -> np.ndarray:
+        """(n, 3), N m, at times (n,), s."""
+        return self._sum(time_s, 0)
+
+    def integral(self, time_s: np.ndarray, order: int) -> np.ndarray:
+        """The `order`-th integral over time without its constants, (n, 3)."""
+        return self._sum(time_s, order)
+
+    def _sum(self, time_s, order):
+        rate = 2 * np.pi * self.harmonics[:, None] / self.period_s
+        angle = rate * np.asarray(time_s, float) - order * np.pi / 2
+        waves = np.cos(angle[:, :, None] + self.phase_rad[:, None, :]) / rate[:, :, None] ** order
+        return np.einsum("ha,hta->ta", self.amplitude_n_m, waves)
+
+    def scaled(self, factor) -> Multisine:
+        return Multisine(self.period_s, self.harmonics, self.amplitude_n_m * factor, self.phase_rad)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Limits of the search and what its result is measured against."""
+
+    speed_limits_rad_s: tuple[float, float]
+    tilt_rad: float
+    harmonics: tuple[int, int]
+    period_s: float
+    inertia_error: float = 0.001
+    gyroscopic_error: float = 0.04
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Noise of the readings: of the rates (rad/s) and, through the rotor speeds, of the moments (3,), N m,
+    one sigma per sample at `rate_hz` samples a second."""
+
+    rates_rad_s: float
+    moments_n_m: np.ndarray
+    rate_hz: float
+
+    @classmethod
+    def at_hover(cls, vehicle: Vehicle, rates_rad_s: float, speed_relative: float, rate_hz: float) -> Readings:
+        """Noise of the moments from relative noise of each rotor's speed, all rotors at hover."""
+        matrix = wrench_matrix(vehicle)
+        square = allocation_matrix(vehicle) @ [vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0]
+        return cls(rates_rad_s, np.sqrt(np.sum((2 * speed_relative * square * matrix[1:]) ** 2, 1)), rate_hz)
+
+
+def promised_errors(
+    rates: np.ndarray,
+    moments: np.ndarray,
+    inertias: np.ndarray,
+    noise: Readings,
+    dt_s: float,
+    window_s: float,
+) -> np.ndarray:
+    """Standard errors (6,) of w11, w22, w33 (absolute) and of the torque weights (relative).
+
+    Two parts, added as squares. Noise of the rates: output error in windows with free starts, where the
+    sensitivity of a rate to a weight is the integral of its regressor within the window, less its mean. Noise
+    of the moments: it acts as noise of the acceleration, w σ_τ, against the regressors themselves.
+    """
+    length = int(round(window_s / dt_s))
+    count = len(rates) // length
+    true = weights_of_inertias(inertias)
+    inputs = regressors(rates, moments)[: count * length]
+    within = np.cumsum(inputs.reshape(count, length, 6), axis=1) * dt_s
+    within = (within - within.mean(axis=1, keepdims=True)).reshape(-1, 6)
+    # The candidate is sampled more coarsely than the sensors: more readings for each of its samples.
+    more = noise.rate_hz * dt_s
+    out = np.empty(6)
+    for axis in range(3):
+        pick = [axis, 3 + axis]
+        by_rates = noise.rates_rad_s**2 * np.linalg.inv(within[:, pick].T @ within[:, pick])
+        sigma = noise.moments_n_m[axis] * true[3 + axis]
+        by_moments = sigma**2 * np.linalg.inv(inputs[:, pick].T @ inputs[:, pick])
+        out[pick] = np.sqrt(np.diag(by_rates + by_moments) / more)
+    out[3:] /= np.abs(true[3:])
+    return out
+
+
+def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, wanted: Wanted) -> Multisine:
+    """Scaled to the largest that keeps rotor speeds (together) and tilt (per axis) within their limits."""
+    mean = allocation @ np.array([thrust_n, 0.0, 0.0, 0.0])
+    low, high = wanted.speed_limits_rad_s[0] ** 2, wanted.speed_limits_rad_s[1] ** 2
+
+    def room(candidate: Multisine) -> float:
+        swing = candidate.moment(time_s) @ allocation[:, 1:].T
+        return float(np.min(np.where(swing > 0, high - mean, mean - low) / np.maximum(np.abs(swing), 1e-9)))
+
+    multisine = multisine.scaled(room(multisine))
+    tilt = np.abs(multisine.integral(time_s, 2) / inertias)[:, :2].max(axis=0)
+    multisine = multisine.scaled(np.append(np.minimum(1.0, wanted.tilt_rad / np.maximum(tilt, 1e-12)), 1.0))
+    # Where two axes cancelled each other in a rotor, less of one may be more for the rotor.
+    return multisine.scaled(min(1.0, room(multisine)))
+
+
+def design(
+    vehicle: Vehicle,
+    wanted: Wanted,
+    noise: Readings,
+    candidates: int,
+    rng: np.random.Generator,
+) -> tuple[Multisine, np.ndarray]:
+    """The best of `candidates` multisines and the standard errors (6,) that one period of it promises."""
+    allocation = allocation_matrix(vehicle)
+    thrust = vehicle.mass_kg * vehicle.gravity_m_s2
+    inertias = np.diag(vehicle.inertia_kg_m2.matrix())
+    harmonics = np.arange(wanted.harmonics[0], wanted.harmonics[1] + 1)
+    dt_s = wanted.period_s / (harmonics[-1] * 12)
+    time_s = np.arange(0.0, wanted.period_s, dt_s)
+    target = np.repeat([wanted.gyroscopic_error, wanted.inertia_error], 3)
+    owner = np.arange(len(harmonics)) % 3
+    mine = owner[:, None] == np.arange(3)
+
+    def trial(levels, phases, share):
+        amplitude = np.where(mine, np.exp(levels), 0.0) * np.exp(share) * FIRST_SHARES_N_M
+        made = Multisine(wanted.period_s, harmonics.astype(float), amplitude, phases)
+        return _largest(made, time_s, allocation, thrust, inertias, wanted)
+
+    best, best_cost, best_errors, best_point = None, np.inf, None, None
+    for number in range(candidates):
+        if number < candidates // 4:
+            point = (
+                rng.normal(0, 1, mine.shape),
+                rng.uniform(0, 2 * np.pi, mine.shape),
+                rng.uniform(-2, 0, 3),
+            )
+        else:
+            # Smaller and smaller moves around the best so far.
+            move = 1.0 - number / candidates
+            point = tuple(
+                part + move * size * rng.normal(0, 1, part.shape)
+                for part, size in zip(best_point, (0.7, 0.7, 0.3), strict=True)
+            )
+        made = trial(*point)
+        rates = made.integral(time_s, 1) / inertias
+        errors = promised_errors(rates, made.moment(time_s), inertias, noise, dt_s, WINDOW_S)
+        cost = float(np.max(errors / target))
+        if cost < best_cost:
+            best, best_cost, best_errors, best_point = made, cost, errors, point
+    return best, best_errors
+
+
+class ExcitedHold:
+    """A soft attitude hold with an excitation added to its moments (a `Controller`)."""
+
+    def __init__(self, vehicle: Vehicle, multisine: Multisine, limits_rad_s: tuple[float, float]):
+        hold = AttitudeReference("level", vehicle.mass_kg * vehicle.gravity_m_s2, lambda t: np.zeros(3))
+        self._pid = AttitudePid(vehicle, hold, HOLD_GAINS, derivative_time_s=0.02)
+        self._multisine = multisine
+        self._allocation = allocation_matrix(vehicle)
+        self._limits = limits_rad_s
+
+    def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
+        """(n, k), rad/s."""
+        square = self._pid.rotor_command(time_s, euler_rad) ** 2
+        square = square + self._multisine.moment(np.array([time_s])) @ self._allocation[:, 1:].T
+        return np.clip(np.sqrt(np.maximum(square, 0.0)), *self._limits)
+
+    def attitude_loop(self, time_s: np.ndarray) -> AttitudeLoop | None:
+        """As of the attitude controller, with the excitation's squared speeds added."""
+        hold = self._pid.attitude_loop(time_s)
+        more = self._multisine.moment(time_s) @ self._allocation[:, 1:].T
+        return None if hold is None else replace(hold, more=more, limits_rad_s=self._limits)

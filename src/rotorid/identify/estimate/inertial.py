@@ -1,0 +1,153 @@
+"""Principal inertias by the masked single-layer network (thesis 4.3.2, eqs 4.74-4.80), and by least squares.
+
+Both fit dp/dt = w11 qr + w14 τ_φ and its two companions; inertias are the reciprocals of the torque weights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotorid.effects.compiling import compiled
+from rotorid.identify.networks.training import Training
+
+MASK = np.array([[1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]], float)
+"""Which weights of eq. 4.74 are there."""
+WEIGHT_NAMES = ("w11", "w22", "w33", "w14", "w25", "w36")
+
+
+def regressors(rates: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Inputs (n, 6): qr, pr, pq, τ_φ, τ_θ, τ_ψ, of rates (n, 3), rad/s, and moments (n, 3), N m."""
+    p, q, r = rates.T
+    return np.column_stack([q * r, p * r, p * q, moments])
+
+
+def weights_of_inertias(inertias: np.ndarray) -> np.ndarray:
+    """The six weights (w11, w22, w33, w14, w25, w36) that inertias (3,), kg m2, imply (eq. 4.79)."""
+    x, y, z = inertias
+    return np.array([(y - z) / x, (z - x) / y, (x - y) / z, 1 / x, 1 / y, 1 / z])
+
+
+def six_weights(matrix: np.ndarray) -> np.ndarray:
+    """(w11, w22, w33, w14, w25, w36) of the weight matrix (3, 6)."""
+    return np.array([matrix[i, i] for i in range(3)] + [matrix[i, 3 + i] for i in range(3)])
+
+
+def inertias_of_weights(weights: np.ndarray) -> np.ndarray:
+    """J_xx, J_yy, J_zz = 1 / (w14, w25, w36) (eq. 4.80), kg m2."""
+    return 1.0 / np.asarray(weights)[3:]
+
+
+@dataclass(frozen=True)
+class WeightFit:
+    """Six weights, their covariance (6, 6), residual of the accelerations (n, 3)."""
+
+    weights: np.ndarray
+    covariance: np.ndarray
+    residual: np.ndarray
+
+    @property
+    def inertias(self) -> np.ndarray:
+        return inertias_of_weights(self.weights)
+
+    @property
+    def inertia_errors(self) -> np.ndarray:
+        """Standard errors of the inertias, (3,), kg m2 (first order)."""
+        return np.sqrt(np.diag(self.covariance)[3:]) * self.inertias**2
+
+
+@dataclass(frozen=True)
+class NetworkFit:
+    """Six weights in physical units, the error by epoch (kept, 3), and the epochs (6,) in which each weight's error
+    shrinks to 1/e under the batch method.
+
+    `epochs_to_settle` is 1 / (rate <x²>) of the weight's input: what the plain gradient rule needs, other weights
+    apart.
+    """
+
+    weights: np.ndarray
+    epochs: np.ndarray
+    mse: np.ndarray
+    epochs_to_settle: np.ndarray
+
+    @property
+    def inertias(self) -> np.ndarray:
+        return inertias_of_weights(self.weights)
+
+
+@compiled()
+def _delta_rule(weights, inputs, targets, order, rate, epochs, group, every):  # pragma: no cover - compiled
+    """Train the weights (3, 6) in place; the mean squared error (kept, 3) of each `every`-th epoch.
+
+    A step is the mean over `group` samples, taken in `order` (count,).
+    """
+    count = len(inputs)
+    kept = (epochs + every - 1) // every
+    history = np.zeros((kept, 3))
+    for epoch in range(epochs):
+        for start in range(0, count, group):
+            stop = min(start + group, count)
+            step = np.zeros((3, 2))
+            for place in range(start, stop):
+                row = inputs[order[place]]
+                for axis in range(3):
+                    product, moment = row[axis], row[3 + axis]
+                    known = weights[axis, axis] * product + weights[axis, 3 + axis] * moment
+                    error = targets[order[place], axis] - known
+                    step[axis, 0] += error * product
+                    step[axis, 1] += error * moment
+                    if epoch % every == 0:
+                        history[epoch // every, axis] += error * error / count
+            for axis in range(3):
+                weights[axis, axis] += rate * step[axis, 0] / (stop - start)
+                weights[axis, 3 + axis] += rate * step[axis, 1] / (stop - start)
+    return history
+
+
+def fit_masked_network(
+    rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, training: Training, scaled: bool = False
+) -> NetworkFit:
+    """Train the masked network from random weights by the generalised delta rule, with any of the data methods.
+
+    `scaled` divides every input and output by its largest magnitude, as eqs 4.67-4.73 do for the rotor networks;
+    the thesis trains this network without. The history is of scaled or plain accelerations alike.
+    """
+    inputs = regressors(rates, moments)
+    k_x = 1 / np.abs(inputs).max(axis=0) if scaled else np.ones(6)
+    k_d = 1 / np.abs(accelerations).max(axis=0) if scaled else np.ones(3)
+    rng = np.random.default_rng(training.seed)
+    matrix = rng.uniform(-1, 1, (3, 6)) * MASK
+    group = {"batch": len(inputs), "stochastic": 1, "mini-batch": training.group}[training.method]
+    order = rng.permutation(len(inputs))
+    mse = _delta_rule(
+        matrix, inputs * k_x, accelerations * k_d, order, training.rate, training.epochs, group, training.every
+    )
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"training ran away: lower the rate {training.rate}")
+    matrix = matrix * k_x / k_d[:, None]
+    with np.errstate(divide="ignore"):  # an input that is always zero never settles
+        settle = 1 / (training.rate * np.mean((inputs * k_x) ** 2, axis=0))
+    return NetworkFit(six_weights(matrix), np.arange(len(mse)) * training.every, mse, settle)
+
+
+def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, block: int = 50) -> WeightFit:
+    """The weights where the network would end, with a covariance that holds for residuals correlated in time.
+
+    Scores are summed over blocks of `block` samples (cluster-robust), so that correlation shorter than a
+    block is counted.
+    """
+    inputs = regressors(rates, moments)
+    weights, covariance = np.empty(6), np.zeros((6, 6))
+    residual = np.empty_like(accelerations)
+    edges = np.arange(0, len(inputs), block)
+    for axis in range(3):
+        x = inputs[:, [axis, 3 + axis]]
+        inverse = np.linalg.inv(x.T @ x)
+        found = inverse @ (x.T @ accelerations[:, axis])
+        residual[:, axis] = accelerations[:, axis] - x @ found
+        scores = np.add.reduceat(x * residual[:, axis, None], edges, axis=0)
+        spread = len(edges) / max(len(edges) - 2, 1) * inverse @ (scores.T @ scores) @ inverse
+        weights[[axis, 3 + axis]] = found
+        covariance[np.ix_([axis, 3 + axis], [axis, 3 + axis])] = spread
+    return WeightFit(weights, covariance, residual)

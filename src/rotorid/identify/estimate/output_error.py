@@ -1,0 +1,233 @@
+"""Inertias by output error: body rates simulated in windows are brought to the measured ones.
+
+No measured signal is differentiated, so noise of the gyroscope does not bias the estimate. The rates at each
+window's start, and on request a constant moment in each window (slow aerodynamics), are unknowns of that
+window and are projected out; what stays are a few parameters shared by all windows. Their covariance is
+cluster-robust over windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from rotorid.effects.compiling import compiled
+from rotorid.identify.estimate.inertial import weights_of_inertias
+
+
+@dataclass(frozen=True)
+class RateWindows:
+    """Measured rates (w, m, 3), rad/s, and moments (w, m, 3), N m, of w windows sampled evenly at `dt_s`."""
+
+    rates: np.ndarray
+    moments: np.ndarray
+    dt_s: float
+
+
+def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0) -> RateWindows:
+    """Consecutive windows of an evenly sampled flight (n, 3); windows with missing samples are left out."""
+    length = int(round(window_s / dt_s)) + 1
+    first = np.arange(start, len(rates) - length + 1, length - 1)
+    index = first[:, None] + np.arange(length)
+    good = np.isfinite(rates[index]).all((1, 2)) & np.isfinite(moments[index]).all((1, 2))
+    return RateWindows(rates[index[good]], moments[index[good]], dt_s)
+
+
+def joined(parts: list[RateWindows]) -> RateWindows:
+    """Windows of several flights with the same sample time and length."""
+    return RateWindows(
+        np.concatenate([p.rates for p in parts]), np.concatenate([p.moments for p in parts]), parts[0].dt_s
+    )
+
+
+@compiled(error_model="numpy")
+def _slope(weights, p, q, r, a, b, c, out):
+    out[0] = weights[0] * q * r + weights[3] * a - weights[6] * p
+    out[1] = weights[1] * p * r + weights[4] * b - weights[7] * q
+    out[2] = weights[2] * p * q + weights[5] * c - weights[8] * r
+
+
+@compiled(error_model="numpy")
+def _simulate(weights, start, moments, extra, dt, out):
+    k1, k2, k3, k4 = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for w in range(start.shape[0]):
+        p, q, r = start[w, 0], start[w, 1], start[w, 2]
+        out[w, 0, 0], out[w, 0, 1], out[w, 0, 2] = p, q, r
+        last = moments.shape[1] - 1
+        for j in range(last):
+            m0, m1 = moments[w, j], moments[w, j + 1]
+            before, after = moments[w, max(j - 1, 0)], moments[w, min(j + 2, last)]
+            inner = 1.0 if 0 < j < last - 1 else 0.0
+            e = extra[w]
+            # Half way the cubic through four samples (see rotorid.vehicle.windows.halfway).
+            ha = 0.5 * (m0[0] + m1[0]) + inner * (m0[0] + m1[0] - before[0] - after[0]) / 16.0 + e[0]
+            hb = 0.5 * (m0[1] + m1[1]) + inner * (m0[1] + m1[1] - before[1] - after[1]) / 16.0 + e[1]
+            hc = 0.5 * (m0[2] + m1[2]) + inner * (m0[2] + m1[2] - before[2] - after[2]) / 16.0 + e[2]
+            h = 0.5 * dt
+            _slope(weights, p, q, r, m0[0] + e[0], m0[1] + e[1], m0[2] + e[2], k1)
+            _slope(weights, p + h * k1[0], q + h * k1[1], r + h * k1[2], ha, hb, hc, k2)
+            _slope(weights, p + h * k2[0], q + h * k2[1], r + h * k2[2], ha, hb, hc, k3)
+            _slope(
+                weights,
+                p + dt * k3[0],
+                q + dt * k3[1],
+                r + dt * k3[2],
+                m1[0] + e[0],
+                m1[1] + e[1],
+                m1[2] + e[2],
+                k4,
+            )
+            p += dt / 6.0 * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0])
+            q += dt / 6.0 * (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1])
+            r += dt / 6.0 * (k1[2] + 2.0 * (k2[2] + k3[2]) + k4[2])
+            out[w, j + 1, 0], out[w, j + 1, 1], out[w, j + 1, 2] = p, q, r
+
+
+def simulate_rates(weights: np.ndarray, start: np.ndarray, moments: np.ndarray, dt_s: float, extra=None):
+    """Rates (w, m, 3), rad/s, from starts (w, 3) under moments (w, m, 3), N m, and constant `extra` ones (w,
+    3).
+
+    `weights` (9,): the six of eq. 4.79 and three damping rates (1/s) of the body rates.
+    """
+    out = np.empty_like(moments)
+    extra = np.zeros_like(start) if extra is None else extra
+    _simulate(np.ascontiguousarray(weights, float), np.ascontiguousarray(start), moments, extra, dt_s, out)
+    return out
+
+
+Model = Callable[[np.ndarray], np.ndarray]
+"""From the parameters to the nine weights of `simulate_rates`."""
+
+
+def tied(parameters: np.ndarray) -> np.ndarray:
+    """Parameters: logarithms of the three inertias; gyroscopic terms follow from them."""
+    return np.concatenate([weights_of_inertias(np.exp(parameters[:3])), np.zeros(3)])
+
+
+def untied(parameters: np.ndarray) -> np.ndarray:
+    """Parameters: logarithms of the inertias and three gyroscopic weights of their own."""
+    return np.concatenate([parameters[3:6], np.exp(-parameters[:3]), np.zeros(3)])
+
+
+@dataclass(frozen=True)
+class OutputErrorFit:
+    """Parameters (p,), covariance (p, p); residual rms per axis (3,), rad/s; share of variance explained."""
+
+    parameters: np.ndarray
+    covariance: np.ndarray
+    residual_rms: np.ndarray
+    explained: np.ndarray
+    windows: int
+    iterations: int
+
+    @property
+    def inertias(self) -> np.ndarray:
+        """J_xx, J_yy, J_zz, kg m2."""
+        return np.exp(self.parameters[:3])
+
+    @property
+    def inertia_intervals_95(self) -> np.ndarray:
+        """(3, 2), kg m2."""
+        half = student_t.ppf(0.975, max(self.windows - len(self.parameters), 1)) * np.sqrt(np.diag(self.covariance)[:3])
+        return np.exp(self.parameters[:3, None] + half[:, None] * np.array([-1.0, 1.0]))
+
+
+def _walk_power(samples: int) -> float:
+    """Expected sum of squares of a unit random walk over a window, its mean taken off."""
+    walk = np.tril(np.ones((samples, samples)), -1)
+    walk = walk - walk.mean(axis=0)
+    return float(np.sum(walk**2))
+
+
+def fit_output_error(
+    windows: RateWindows,
+    model: Model,
+    start: np.ndarray,
+    window_moment: bool = False,
+    iterations: int = 30,
+    tolerance: float = 1e-7,
+    cluster: int = 4,
+    moment_noise_n_m: np.ndarray | None = None,
+) -> OutputErrorFit:
+    """Gauss-Newton with the windows' own unknowns projected out.
+
+    Noise of the moments (3,), one sigma a sample, blurs the regressors and would make the inertias too large by
+    noise power over signal power; where `moment_noise_n_m` states it, that is taken off again. The covariance is
+    robust over clusters of `cluster` neighbouring windows. ValueError where there are too few
+    windows or the estimate does not converge.
+    """
+    parameters = np.asarray(start, float).copy()
+    w, m, _ = windows.rates.shape
+    if w <= len(parameters):
+        raise ValueError(f"{w} windows cannot tell {len(parameters)} parameters apart: record longer")
+    moments = np.ascontiguousarray(windows.moments)
+    begin, extra = windows.rates[:, 0].copy(), np.zeros((w, 3))
+    scale = np.ones(3)
+    moment_step = 1e-3 * max(float(np.std(moments)), 1e-9)
+
+    def simulate(values, begin, extra):
+        return simulate_rates(model(values), begin, moments, windows.dt_s, extra)
+
+    for iteration in range(iterations):
+        predicted = simulate(parameters, begin, extra)
+        residual = windows.rates - predicted
+        own = []
+        for axis in range(3):
+            moved = begin.copy()
+            moved[:, axis] += 1e-4
+            own.append((simulate(parameters, moved, extra) - predicted) / 1e-4)
+        for axis in range(3 if window_moment else 0):
+            moved = extra.copy()
+            moved[:, axis] += moment_step
+            own.append((simulate(parameters, begin, moved) - predicted) / moment_step)
+        shared = []
+        for k in range(len(parameters)):
+            moved = parameters.copy()
+            step = 1e-5 * max(1.0, abs(moved[k]))
+            moved[k] += step
+            shared.append((simulate(moved, begin, extra) - predicted) / step)
+        own, shared = np.stack(own, -1), np.stack(shared, -1)
+        a = (own / scale[:, None]).reshape(w, 3 * m, -1)
+        s = (shared / scale[:, None]).reshape(w, 3 * m, -1)
+        y = (residual / scale).reshape(w, 3 * m)
+        q, r = np.linalg.qr(a)
+        s_free = s - q @ (np.swapaxes(q, 1, 2) @ s)
+        y_free = y - np.einsum("wik,wk->wi", q, np.einsum("wik,wi->wk", q, y))
+        information = np.einsum("wik,wil->kl", s_free, s_free)
+        scores = np.einsum("wik,wi->wk", s_free, y_free)
+        change = np.linalg.solve(information, scores.sum(0))
+        rest = y - np.einsum("wik,k->wi", s, change)
+        own_change = np.linalg.solve(r, np.einsum("wik,wi->wk", q, rest)[..., None])[..., 0]
+        parameters = parameters + change
+        begin = begin + own_change[:, :3]
+        if window_moment:
+            extra = extra + own_change[:, 3:]
+        scale_used = scale
+        scale = np.sqrt(np.mean((y_free.reshape(w, m, 3) * scale) ** 2, axis=(0, 1)))
+        if iteration > 1 and np.max(np.abs(change)) < tolerance:
+            break
+    else:
+        raise ValueError("the output-error estimate did not converge: the flight may not excite every axis")
+    inverse = np.linalg.inv(information)
+    if moment_noise_n_m is not None:
+        torque = model(parameters)[3:6]
+        power = w * (np.asarray(moment_noise_n_m) * torque * windows.dt_s / scale_used) ** 2 * _walk_power(m)
+        parameters = parameters.copy()
+        parameters[:3] += np.log1p(-power / np.diag(information)[:3])
+    # Neighbouring windows share slow disturbances: their scores are summed before they are squared.
+    clustered = np.add.reduceat(scores, np.arange(0, w, cluster), axis=0)
+    spread_of_scores = clustered.T @ clustered
+    count = len(clustered)
+    covariance = count / max(count - len(parameters), 1) * inverse @ spread_of_scores @ inverse
+    spread = windows.rates - windows.rates.mean(axis=1, keepdims=True)
+    return OutputErrorFit(
+        parameters,
+        covariance,
+        scale,
+        1.0 - scale**2 / np.mean(spread**2, axis=(0, 1)),
+        w,
+        iteration + 1,
+    )

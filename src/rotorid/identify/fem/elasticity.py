@@ -1,0 +1,273 @@
+"""Linear elasticity of isotropic bodies on quadratic tetrahedra, with parts bonded to each other.
+
+A mesh's unknowns are the displacements of its nodes (corners and middles of edges), first all of x, then all of y, then
+all of z: shape (3 n,). The stiffness is a sum of matrices that hold no material, weighted by Lamé's constants, so that
+another material needs no new integration. What binds nodes is a matrix C with u = C q; solved is CᵀKC q = Cᵀf.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+from skfem import Basis, BilinearForm, ElementTetP2, FacetBasis, LinearForm, MeshTet, MeshTet2
+
+from rotorid.errors import InputError
+from rotorid.identify.fem.sizes import Material
+from rotorid.identify.fem.tets import Tets
+
+INTEGRATED = 3
+"""Degree of the polynomials that are integrated exactly."""
+LEFT_OVER = 1e-6
+"""Share of the forces that a solution may leave unbalanced."""
+OUTSIDE = 0.02
+"""A point may lie outside of its tetrahedron by so much of its size: curved surfaces are meshed by flat ones."""
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A round hole through a part."""
+
+    part: str
+    middle_m: np.ndarray
+    """A point on its axis [m], shape (3,)."""
+    axis: np.ndarray
+    """Unit vector, shape (3,)."""
+    radius_m: float
+
+    def from_axis_m(self, points_m: np.ndarray) -> np.ndarray:
+        """Vectors from the axis to points [m], shape (k, 3)."""
+        offset = points_m - self.middle_m
+        return offset - np.outer(offset @ self.axis, self.axis)
+
+
+@dataclass(frozen=True)
+class Body:
+    """Parts with a mesh each, not yet held together."""
+
+    names: tuple[str, ...]
+    """Of the parts."""
+    mesh: MeshTet
+    part: np.ndarray
+    """Index of each tetrahedron's part, shape (m,)."""
+    groups: tuple[str, ...]
+    """Name of the material of each part."""
+
+    @classmethod
+    def of(cls, parts: Mapping[str, Tets], holes: Sequence[Hole] = (), groups: Mapping[str, str] | None = None) -> Body:
+        """All parts in one mesh; edges between corners on the wall of a hole are bent onto it.
+
+        `groups` names the material of each part; without it each part has one of its own name.
+        """
+        starts = np.cumsum([0] + [len(tets.points_m) for tets in parts.values()])
+        points = np.concatenate([tets.points_m for tets in parts.values()])
+        cells = np.concatenate([tets.cells + start for tets, start in zip(parts.values(), starts, strict=False)])
+        part = np.repeat(np.arange(len(parts)), [len(tets.cells) for tets in parts.values()])
+        flat = MeshTet(points.T.copy(), cells.T.copy(), validate=False)
+        mesh = _bent(flat, part, tuple(parts), holes) if holes else flat
+        return cls(tuple(parts), mesh, part, tuple((groups or {}).get(name, name) for name in parts))
+
+    @property
+    def group(self) -> np.ndarray:
+        """Name of each tetrahedron's material, shape (m,)."""
+        return np.array(self.groups)[self.part]
+
+    @cached_property
+    def basis(self) -> Basis:
+        """Quadratic shape functions of one component, with points that integrate products of their gradients."""
+        return Basis(self.mesh, ElementTetP2(), intorder=INTEGRATED)
+
+    @property
+    def nodes_m(self) -> np.ndarray:
+        """Places of the nodes [m], shape (n, 3)."""
+        return self.basis.doflocs.T
+
+    @cached_property
+    def part_of_node(self) -> np.ndarray:
+        """Index of each node's part, shape (n,)."""
+        found = np.empty(self.basis.N, int)
+        found[self.basis.element_dofs] = self.part
+        return found
+
+    def nodes_of(self, name: str) -> np.ndarray:
+        """Indices of a part's nodes."""
+        return np.flatnonzero(self.part_of_node == self.names.index(name))
+
+    @cached_property
+    def _products(self) -> dict[str, dict[tuple[int, int], sparse.csr_matrix]]:
+        """∫ ∂φ/∂x_a ∂ψ/∂x_b over all of each material: shape (n, n) each, by (a, b)."""
+        found = {}
+        for name in dict.fromkeys(self.groups):
+            own = np.flatnonzero(self.group == name)
+            basis = Basis(self.mesh, ElementTetP2(), intorder=INTEGRATED, elements=own)
+            half = {(a, b): _product(a, b).assemble(basis) for a in range(3) for b in range(a, 3)}
+            found[name] = half | {(b, a): matrix.T.tocsr() for (a, b), matrix in half.items() if a != b}
+        return found
+
+    def stiffness(self, materials: Mapping[str, Material]) -> sparse.csr_matrix:
+        """Stiffness [N/m], shape (3 n, 3 n); `materials` by the names of `groups`."""
+        blocks = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]
+        for name, products in self._products.items():
+            lam, mu = materials[name].lame_pa
+            trace = sum(products[c, c] for c in range(3))
+            for a in range(3):
+                for b in range(3):
+                    # Component a of the virtual displacement, b of the displacement.
+                    blocks[a][b] = blocks[a][b] + lam * products[a, b] + mu * products[b, a]
+                    if a == b:
+                        blocks[a][b] = blocks[a][b] + mu * trace
+        return sparse.bmat(blocks, format="csr")
+
+    def traction(self, facets: np.ndarray, force_n: np.ndarray) -> np.ndarray:
+        """Nodal forces, shape (3 n,), of an even load on facets (their indices) with this resultant, shape (3,)."""
+        basis = FacetBasis(self.mesh, ElementTetP2(), facets=facets, intorder=3)
+        share = LinearForm(lambda v, w: v).assemble(basis)
+        return np.concatenate([share / share.sum() * component for component in force_n])
+
+    def area_m2(self, facets: np.ndarray) -> float:
+        """Area of facets."""
+        return float(FacetBasis(self.mesh, ElementTetP2(), facets=facets, intorder=1).dx.sum())
+
+    def weights(self, points_m: np.ndarray, name: str) -> sparse.csr_matrix:
+        """What the nodes' values count at points, shape (k, 3), of a part: shape (k, n).
+
+        Raises
+        ------
+        InputError
+            A point that is not in or on the part.
+        """
+        own = np.flatnonzero(self.part == self.names.index(name))
+        corners = self.mesh.p[:, self.mesh.t[:, own]].transpose(2, 1, 0)
+        local = np.einsum(
+            "mab,kmb->kma",
+            np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)),
+            points_m[:, None] - corners[:, 0],
+        )
+        inside = np.minimum(local.min(axis=-1), 1 - local.sum(axis=-1))
+        best = inside.argmax(axis=1)
+        rows = np.arange(len(points_m))
+        if (inside[rows, best] < -OUTSIDE).any():
+            raise InputError(f"a part is bonded to {name} where {name} is not; the sizes do not go together")
+        elements, local = own[best], local[rows, best].T
+        shape = np.array([self.basis.elem.lbasis(local, i)[0] for i in range(self.basis.Nbfun)])
+        columns = self.basis.element_dofs[:, elements]
+        return sparse.csr_matrix(
+            (shape.ravel(), (np.tile(rows, len(shape)), columns.ravel())), (len(rows), self.basis.N)
+        )
+
+    def gradients(self, displacement_m: np.ndarray) -> np.ndarray:
+        """∂u_a/∂x_b at the nodes of each tetrahedron, shape (3, 3, m, 10), from displacements, shape (3 n,)."""
+        parts = displacement_m.reshape(3, -1)
+        return np.array([np.asarray(self._at_nodes.interpolate(component).grad) for component in parts])
+
+    @cached_property
+    def _at_nodes(self) -> Basis:
+        """The same shape functions, looked at in the nodes; its weights are of no use."""
+        places = self.basis.elem.doflocs.T
+        return Basis(self.mesh, ElementTetP2(), quadrature=(places, np.full(places.shape[1], 0.1)))
+
+    def stress(self, displacement_m: np.ndarray, materials: Mapping[str, Material]) -> np.ndarray:
+        """Stress at the nodes [Pa], shape (3, 3, n): mean over the tetrahedra that meet there."""
+        gradient = self.gradients(displacement_m)
+        strain = (gradient + gradient.transpose(1, 0, 2, 3)) / 2
+        lam, mu = np.array([materials[name].lame_pa for name in self.groups]).T[:, self.part, None]
+        stress = 2 * mu * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None]
+        places = self.basis.element_dofs.T.ravel()
+        count = np.bincount(places, minlength=self.basis.N)
+        summed = [[np.bincount(places, stress[a, b].ravel(), self.basis.N) for b in range(3)] for a in range(3)]
+        return np.array(summed) / count
+
+
+def _bent(flat: MeshTet, part: np.ndarray, names: tuple[str, ...], holes: Sequence[Hole]) -> MeshTet2:
+    """The mesh with quadratic edges, those on the holes' walls round."""
+    mesh = MeshTet2.from_mesh(flat)
+    places = mesh.doflocs.copy()
+    corners = flat.p.shape[1]
+    for hole in holes:
+        own = np.unique(flat.t2e[:, part == names.index(hole.part)])
+        ends = [np.linalg.norm(hole.from_axis_m(flat.p[:, flat.edges[end, own]].T), axis=1) for end in (0, 1)]
+        wall = own[np.all(np.abs(np.array(ends) - hole.radius_m) < 1e-9, axis=0)]
+        middle = places[:, corners + wall].T
+        out = hole.from_axis_m(middle)
+        out *= (hole.radius_m / np.linalg.norm(out, axis=1) - 1)[:, None]
+        places[:, corners + wall] += out.T
+    bent = MeshTet2(places, mesh.t, validate=False)
+    size = bent.mapping().detDF(ElementTetP2().doflocs.T)
+    if np.any(np.sign(size) != np.sign(size[:, :1])):
+        raise InputError("a hole's wall bends an element over; expected a finer mesh or a thicker wall")
+    return bent
+
+
+def _product(a: int, b: int) -> BilinearForm:
+    return BilinearForm(lambda u, v, w: u.grad[b] * v.grad[a])
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """Equivalent stress of tensors, shape (3, 3, ...)."""
+    deviator = stress - np.trace(stress) / 3 * np.eye(3).reshape(3, 3, *[1] * (stress.ndim - 2))
+    return np.sqrt(1.5 * np.einsum("ab...,ab...->...", deviator, deviator))
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Nodes that follow others: each row of a node's displacement as weights of others' displacements."""
+
+    nodes: np.ndarray
+    """Shape (k,)."""
+    weights: sparse.csr_matrix
+    """Shape (k, n)."""
+    turn: np.ndarray
+    """Matrix that turns what they follow, shape (3, 3)."""
+
+
+def constraints(nodes: int, bound: Sequence[Sequence[Bound]], fixed: np.ndarray) -> sparse.csr_matrix:
+    """The matrix C of u = C q, shape (3 n, free unknowns).
+
+    Parameters
+    ----------
+    nodes
+        Their number n.
+    bound
+        In stages: nodes that others follow in one stage may follow others in a later one, not the other way round.
+    fixed
+        Which displacements are 0, shape (3, n).
+    """
+    whole = sparse.identity(3 * nodes, format="csr")
+    for stage in bound:
+        keep = np.ones(nodes)
+        moved = [[sparse.csr_matrix((nodes, nodes)) for _ in range(3)] for _ in range(3)]
+        for one in stage:
+            keep[one.nodes] = 0
+            k = len(one.nodes)
+            put = sparse.csr_matrix((np.ones(k), (one.nodes, np.arange(k))), (nodes, k))
+            for a, b in np.argwhere(one.turn != 0):
+                moved[a][b] = moved[a][b] + one.turn[a, b] * (put @ one.weights)
+        whole = whole @ (sparse.bmat(moved, format="csr") + sparse.diags(np.tile(keep, 3)))
+    used = np.asarray(abs(whole).sum(axis=0)).ravel() > 0
+    return whole[:, np.flatnonzero(used & ~fixed.ravel())]
+
+
+def solve(stiffness: sparse.csr_matrix, binding: sparse.csr_matrix, forces: np.ndarray) -> np.ndarray:
+    """Displacements [m], shape (3 n, loads), under nodal forces [N], shape (3 n, loads).
+
+    Factors of a symmetric matrix in the order of least degree; for these long, thin bodies they stay small.
+
+    Raises
+    ------
+    InputError
+        Parts that can move freely.
+    """
+    reduced = (binding.T @ stiffness @ binding).tocsc()
+    given = binding.T @ forces
+    try:
+        factors = splu(reduced, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        free = factors.solve(given)
+    except RuntimeError:
+        free = np.full_like(given, np.nan)
+    if not np.linalg.norm(reduced @ free - given) <= LEFT_OVER * np.linalg.norm(given):
+        raise InputError("the parts are not held: the stiffness has no inverse")
+    return binding @ free

@@ -1,0 +1,264 @@
+"""The tables of the report's chapter: loads, meshes, sizes, the signal chain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import brentq
+
+from rotorid.errors import InputError
+from rotorid.identify.bench.reconstruct import GF_N, Geometry
+from rotorid.identify.fem import answers, bridge, closed_forms
+from rotorid.identify.fem.answers import Answers, by_part, compare, ratios
+from rotorid.identify.fem.model import Bench, Solved
+from rotorid.identify.fem.single_cell import strain_per_newton
+from rotorid.identify.fem.sizes import MATERIALS, Assumed, Sizes, in_file, materials
+
+SHORT = dict(zip(MATERIALS, ("aluminium", "pla"), strict=True))
+"""Ending of a column that holds one material's value."""
+ELECTRIC = ("gauge_factor", "excitation_v")
+"""Assumed values that no stress depends on."""
+OF_THE_CELL = ("cell_", "gauge_length", "poisson_aluminium")
+"""Beginnings of the names that a single cell's sensitivity depends on."""
+RATED_N = 1000 * GF_N
+"""Load that the cells are rated for."""
+TRIES = 5
+"""Times as many benches are drawn at most as are wanted."""
+LARGEST_LIGAMENT = 0.8
+"""Share of half the bar's side up to which a ligament is looked for that gives the printed sensitivity."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """How fine the meshes are, as multiples of the coarsest."""
+
+    study: tuple[float, ...]
+    """Of the bench as assumed; the last one's answers are the results."""
+    sizes: float
+    """Of benches of other sizes."""
+    chain: float
+    """Of a single cell."""
+
+
+LEVELS = {
+    "coarse": Levels(study=(1.0, 1.5, 2.0), sizes=1.0, chain=2.0),
+    "full": Levels(study=(1.0, 1.5, 2.0, 3.0), sizes=1.5, chain=3.0),
+}
+"""By the setting `fem`."""
+
+
+@dataclass(frozen=True)
+class Finest:
+    """The bench on the finest mesh of the study, with pieces of each material."""
+
+    bench: Bench
+    solved: Mapping[str, Solved]
+    answers: Mapping[str, Answers]
+
+
+def mesh_study(
+    assumed: Assumed, moduli_pa: Mapping[str, float], geometry: Geometry, finenesses: Sequence[float]
+) -> tuple[pd.DataFrame, Finest]:
+    """A mesh a row with what it says per newton, and all of the last one."""
+    rows = []
+    for fineness in finenesses:
+        of = {name: materials(assumed.sizes, moduli_pa, name) for name in MATERIALS}
+        bench = Bench.of(assumed, assumed.sizes, geometry.distance_m, fineness)
+        cell_strain = strain_per_newton(assumed.sizes, of["PLA"]["cells"], fineness)
+        solved = {name: bench.solve(of[name]) for name in MATERIALS}
+        found = {name: answers.ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
+        row = {"fineness": fineness, "elements": bench.body.mesh.nelements, "nodes": bench.body.basis.N}
+        rows.append(row | {"cell_strain_per_n": cell_strain} | _row(found))
+    return pd.DataFrame(rows), Finest(bench, solved, found)
+
+
+def _row(found: Mapping[str, Answers]) -> dict[str, float | str]:
+    row = {f"ratio_{name}": value for name, value in ratios(found).items()}
+    for name, end in SHORT.items():
+        row |= {f"{key}_{end}": value for key, value in asdict(found[name]).items()}
+    return row
+
+
+def loads(found: Mapping[str, Answers], loads_gf: Sequence[float], area_m2: float) -> pd.DataFrame:
+    """Deformation and stresses against the load: linear, a load a row."""
+    force = np.asarray(loads_gf, float) * GF_N
+    table = {"load_gf": np.asarray(loads_gf, float), "load_n": force, "pressure_pa": force / area_m2}
+    for name, end in SHORT.items():
+        for key in ("deformation_m", "stress_pa", "narrow_upper_pa", "narrow_lower_pa"):
+            table[f"{key}_{end}"] = force * getattr(found[name], key)
+    return pd.DataFrame(table)
+
+
+def parts(finest: Finest) -> dict[str, dict[str, dict[str, float]]]:
+    """Largest displacement [m/N] and equivalent stress [Pa/N] by material and part."""
+    return {SHORT[name]: by_part(finest.bench, finest.solved[name]) for name in MATERIALS}
+
+
+def surface(finest: Finest) -> pd.DataFrame:
+    """Triangles of the leg's surface: places of their corners [m], and per newton their mean displacement and stress.
+
+    Columns: `part`, `x_1_m` to `z_3_m`, and `deformation_m` and `stress_pa` with the ending of each material.
+    """
+    body = finest.bench.body
+    facets = body.mesh.boundary_facets()
+    corners = body.mesh.facets[:, facets]
+    table: dict[str, np.ndarray] = {"part": np.array(body.names)[body.part[body.mesh.f2t[0, facets]]]}
+    for number in range(3):
+        for axis, name in enumerate("xyz"):
+            table[f"{name}_{number + 1}_m"] = body.mesh.p[axis, corners[number]]
+    nodes = body.basis.nodal_dofs[0][corners]
+    for name, end in SHORT.items():
+        solved = finest.solved[name]
+        table[f"deformation_m_{end}"] = np.linalg.norm(solved.displacement_m[nodes], axis=-1).mean(axis=0)
+        table[f"stress_pa_{end}"] = solved.von_mises_pa[nodes].mean(axis=0)
+    return pd.DataFrame(table)
+
+
+def verification() -> pd.DataFrame:
+    """Closed forms and what the solver says, a quantity and mesh a row."""
+    return pd.DataFrame([asdict(row) | {"error": row.error} for row in closed_forms.all_checks()])
+
+
+def size_study(
+    assumed: Assumed,
+    moduli_pa: Mapping[str, float],
+    geometry: Geometry,
+    fineness: float,
+    draws: int,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Benches of other sizes, a row each.
+
+    First all as assumed (`end` empty), then each size in turn at its least and its largest (`low`, `high`), then as
+    many as `draws` with all sizes drawn at once (`drawn`). Drawn sizes that do not go together are drawn anew.
+
+    Raises
+    ------
+    InputError
+        One size at one of its ends makes no bench.
+    """
+    rows = []
+    for name, end, sizes in [("", "", assumed.sizes), *assumed.variants()]:
+        if name in ELECTRIC:
+            continue
+        try:
+            found = compare(assumed, sizes, moduli_pa, geometry, fineness)
+        except InputError as error:
+            raise InputError(f"{in_file(name)[0]} at its {end} end: {error}") from None
+        rows.append(_named(name, end, sizes) | _row(found))
+    wanted = len(rows) + draws
+    for _ in range(TRIES * draws):
+        if len(rows) == wanted:
+            break
+        try:
+            found = compare(assumed, assumed.draw(rng), moduli_pa, geometry, fineness)
+        except InputError:
+            continue
+        rows.append({"size": "all", "end": "drawn", "value": np.nan} | _row(found))
+    if len(rows) < wanted:
+        raise InputError("of the benches with all sizes drawn at once too few go together; narrow their ranges")
+    return pd.DataFrame(rows)
+
+
+def _named(name: str, end: str, sizes: Sizes) -> dict[str, str | float]:
+    written, factor = in_file(name)
+    return {"size": written, "end": end, "value": getattr(sizes, name) / factor if name else np.nan}
+
+
+def chain_study(
+    assumed: Assumed, moduli_pa: Mapping[str, float], fineness: float, fineness_of_sizes: float
+) -> pd.DataFrame:
+    """Sensitivity of a single cell, as assumed (first row) and with each size in turn at its ends.
+
+    What a size changes is computed on the coarser mesh, `fineness_of_sizes`, and applied to the finer one's answer.
+    """
+    of_cell = materials(assumed.sizes, moduli_pa, "PLA")["cells"]
+    fine, coarse = (strain_per_newton(assumed.sizes, of_cell, level) for level in (fineness, fineness_of_sizes))
+    rows = [_named("", "", assumed.sizes) | _chain(assumed.sizes, fine)]
+    for name, end, sizes in assumed.variants():
+        if name in ELECTRIC:
+            rows.append(_named(name, end, sizes) | _chain(sizes, fine))
+        elif name.startswith(OF_THE_CELL):
+            of_cell = materials(sizes, moduli_pa, "PLA")["cells"]
+            strain = strain_per_newton(sizes, of_cell, fineness_of_sizes)
+            rows.append(_named(name, end, sizes) | _chain(sizes, fine * strain / coarse))
+    return pd.DataFrame(rows)
+
+
+def sensitivity(sizes: Sizes, moduli_pa: Mapping[str, float], fineness: float) -> dict[str, float]:
+    """From newtons to strain, volts and counts, and the slope as table 2.8 prints it."""
+    return _chain(sizes, strain_per_newton(sizes, materials(sizes, moduli_pa, "PLA")["cells"], fineness))
+
+
+def _chain(sizes: Sizes, strain_per_n: float) -> dict[str, float]:
+    volts = bridge.volts_per_newton(sizes, strain_per_n)
+    return {
+        "strain_per_n": strain_per_n,
+        "volts_per_n": volts,
+        "counts_per_n": bridge.counts_per_newton(volts),
+        "slope_gf_per_10uv": bridge.printed_slope(volts),
+        "rated_mv_per_v": 1e3 * volts * RATED_N / sizes.excitation_v,
+    }
+
+
+def steps(computed: Mapping[str, float], volts_per_n: float, sizes: Sizes) -> list[dict[str, str | float]]:
+    """The chain step by step: as computed, and backwards from a calibrated sensitivity [V/N]."""
+    measured = _chain(sizes, volts_per_n / (sizes.excitation_v * sizes.gauge_factor))
+    names = {
+        "strain_per_n": "strain (1/N)",
+        "volts_per_n": "bridge (V/N)",
+        "counts_per_n": "converter (counts/N)",
+        "slope_gf_per_10uv": "slope as in table 2.8 (gf per 10 µV)",
+        "rated_mv_per_v": "at the rated load (mV/V)",
+    }
+    return [{"step": name, "computed": float(computed[key]), "measured": measured[key]} for key, name in names.items()]
+
+
+def ligament_for(sizes: Sizes, moduli_pa: Mapping[str, float], volts_per_n: float, fineness: float) -> float:
+    """Thickness of the ligament [m] with which a cell has this sensitivity.
+
+    Raises
+    ------
+    InputError
+        None between the assumed one and most of the bar's half side has.
+    """
+    thickest = LARGEST_LIGAMENT * sizes.cell_side_m / 2
+
+    def excess(log_ligament: float) -> float:
+        cell = replace(sizes, cell_ligament_m=float(np.exp(log_ligament)))
+        return float(np.log(sensitivity(cell, moduli_pa, fineness)["volts_per_n"] / volts_per_n))
+
+    ends = np.log([sizes.cell_ligament_m, thickest])
+    try:
+        return float(np.exp(brentq(excess, *ends, xtol=1e-2)))
+    except ValueError:
+        raise InputError(
+            f"no ligament between {1e3 * sizes.cell_ligament_m:g} and {1e3 * thickest:.1f} mm gives "
+            f"{1e6 * volts_per_n:.1f} µV/N"
+        ) from None
+
+
+def change_of_last_mesh(table: pd.DataFrame) -> dict[str, float]:
+    """Change from the last mesh but one to the last, as a share, of every number of the mesh study."""
+    numbers = table.select_dtypes("number").drop(columns=["fineness", "elements", "nodes"])
+    return {name: float(numbers[name].iloc[-1] / numbers[name].iloc[-2] - 1) for name in numbers}
+
+
+def ranges(table: pd.DataFrame) -> dict[str, list[float]]:
+    """Least and largest of every number over all benches of the size study."""
+    numbers = table.select_dtypes("number").drop(columns="value")
+    return {name: [float(numbers[name].min()), float(numbers[name].max())] for name in numbers}
+
+
+def strongest(table: pd.DataFrame, most: int = 3) -> dict[str, list[str]]:
+    """The sizes that move each ratio, and the place of the plate's largest displacement, most."""
+    alone = table[table["end"].isin(["low", "high"])]
+    found = {}
+    for name in [*(column for column in table if column.startswith("ratio_")), "plate_middle_pla"]:
+        ends = alone.groupby("size")[name].agg(["min", "max"])
+        moved = ends["max"].clip(lower=table[name].iloc[0]) - ends["min"].clip(upper=table[name].iloc[0])
+        found[name] = [str(size) for size in moved.nlargest(most).index]
+    return found

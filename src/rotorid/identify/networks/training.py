@@ -1,0 +1,170 @@
+"""Training by the delta rule and back-propagation with the thesis's three data methods (section 4.2).
+
+Stochastic: one step for each sample. Batch: one step for all samples. Mini-batch: one step for each group.
+The order of samples is drawn anew each epoch, from the seed. Training can stop after any epoch and go on from
+its checkpoint to the very same weights.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+
+from rotorid.errors import InputError
+from rotorid.identify.networks.compiled import batch_epochs
+from rotorid.identify.networks.network import Network, gradients
+from rotorid.io.text.bounds import LARGEST_CHECKPOINT
+from rotorid.io.text.files import check_file
+from rotorid.io.text.wording import printable
+
+LOGGER = logging.getLogger("rotorid.identify.networks")
+Method = Literal["batch", "stochastic", "mini-batch"]
+
+
+@dataclass(frozen=True)
+class Training:
+    """How to train."""
+
+    rate: float
+    epochs: int
+    method: Method = "batch"
+    group: int = 8
+    """Samples in a mini-batch."""
+    seed: int = 0
+    every: int = 1
+    """Keep the error of each `every`-th epoch."""
+    checkpoint_every: int = 5000
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A trained network and its mean squared error (before each kept epoch) per output, (kept, n_out)."""
+
+    network: Network
+    epochs: np.ndarray
+    mse: np.ndarray
+
+
+def train(
+    network: Network,
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    training: Training,
+    checkpoint: Path | None = None,
+) -> Trained:
+    """Train and return the network with its history.
+
+    `inputs` (n, n_in), `targets` (n, n_out). With `checkpoint` (.npz) the state is written every
+    `checkpoint_every` epochs (atomically) and an existing file is continued. ValueError where the weights run
+    away.
+    """
+    inputs, targets = np.ascontiguousarray(inputs, float), np.ascontiguousarray(targets, float)
+    if len(inputs) != len(targets) or len(inputs) == 0:
+        raise ValueError(f"{len(inputs)} inputs and {len(targets)} targets, expected as many, at least one")
+    weights = [w.copy() for w in network.weights]
+    biases = [None if b is None else b.copy() for b in network.biases]
+    kept = (training.epochs + training.every - 1) // training.every
+    history = np.full((kept, targets.shape[1]), np.nan)
+    first = 0
+    if checkpoint is not None and Path(checkpoint).exists():
+        first = _restore(Path(checkpoint), weights, biases, history)
+        LOGGER.info("continued after epoch %d", first)
+    current = replace(network, weights=tuple(weights), biases=tuple(biases))
+    run = _batch if training.method == "batch" else _by_groups
+    for start in range(first, training.epochs, training.checkpoint_every):
+        stop = min(start - start % training.checkpoint_every + training.checkpoint_every, training.epochs)
+        mse = run(current, inputs, targets, training, range(start, stop), history)
+        if not all(np.isfinite(w).all() for w in weights):
+            raise ValueError(f"training ran away by epoch {stop}: lower the rate {training.rate}")
+        LOGGER.info("epoch %d of %d, mse %s", stop, training.epochs, mse.round(9))
+        if checkpoint is not None:
+            _store(Path(checkpoint), stop, weights, biases, history)
+    epochs = np.arange(kept) * training.every
+    return Trained(current, epochs, history)
+
+
+def _batch(network, inputs, targets, training: Training, epochs: range, history: np.ndarray) -> np.ndarray:
+    """Train the network in place by some epochs, one step each; the last epoch's mean squared errors (n_out,)."""
+    errors = batch_epochs(network, inputs, targets, training.rate, len(epochs), training.every, epochs.start)
+    start = -(-epochs.start // training.every)
+    history[start : start + len(errors) - 1] = errors[:-1]
+    return errors[-1]
+
+
+def _by_groups(network, inputs, targets, training: Training, epochs: range, history: np.ndarray) -> np.ndarray:
+    """The same with one step for each group of samples."""
+    errors = np.empty_like(targets)
+    for epoch in epochs:
+        for rows in _groups(training, epoch, len(inputs)):
+            weight_steps, bias_steps, errors[rows] = gradients(network, inputs[rows], targets[rows])
+            for w, step in zip(network.weights, weight_steps, strict=True):
+                w += training.rate * step
+            for b, step in zip(network.biases, bias_steps, strict=True):
+                if b is not None:
+                    b += training.rate * step
+        if epoch % training.every == 0:
+            history[epoch // training.every] = np.mean(errors**2, axis=0)
+    return np.mean(errors**2, axis=0)
+
+
+def _groups(training: Training, epoch: int, count: int) -> list:
+    """Rows of each step of an epoch."""
+    order = np.random.default_rng([training.seed, epoch]).permutation(count)
+    size = 1 if training.method == "stochastic" else training.group
+    return [order[i : i + size] for i in range(0, count, size)]
+
+
+def _store(path: Path, epoch: int, weights, biases, history) -> None:
+    arrays = {f"w{i}": w for i, w in enumerate(weights)}
+    arrays |= {f"b{i}": b for i, b in enumerate(biases) if b is not None}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part.npz")
+    np.savez(part, epoch=epoch, history=history, **arrays)
+    os.replace(part, path)
+
+
+def _restore(path: Path, weights, biases, history) -> int:
+    """Fill weights, biases and history from a checkpoint; the epoch to go on with. InputError where it is none."""
+    stored = _stored_arrays(path)
+    mine = {f"w{i}": w for i, w in enumerate(weights)} | {f"b{i}": b for i, b in enumerate(biases) if b is not None}
+    if set(mine) | {"epoch", "history"} != set(stored) or any(stored[n].shape != m.shape for n, m in mine.items()):
+        raise InputError(f"{path}: a checkpoint of another network; delete it to start anew")
+    epoch, past = stored["epoch"], stored["history"]
+    numbers = all(array.dtype == float for name, array in stored.items() if name != "epoch")
+    counted = epoch.shape == () and epoch.dtype.kind in "iu" and epoch >= 0
+    if not numbers or not counted or past.ndim != 2 or past.shape[1] != history.shape[1]:
+        raise InputError(f"{path}: no checkpoint of a training; delete it to start anew")
+    if not all(np.isfinite(stored[name]).all() for name in mine):
+        raise InputError(f"{path}: holds weights that are no numbers; delete it to start anew")
+    for name, array in mine.items():
+        array[...] = stored[name]
+    rows = min(len(history), len(past))
+    history[:rows] = past[:rows]
+    return int(epoch)
+
+
+def _stored_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Arrays of an .npz, no code of it run, its unpacked size looked at first."""
+    try:
+        check_file(path)
+        with ZipFile(path) as parts:
+            size = sum(part.file_size for part in parts.infolist())
+            if size > LARGEST_CHECKPOINT:
+                most = f"{LARGEST_CHECKPOINT / 1e6:g}"
+                raise InputError(f"{path}: unpacks to {size / 1e6:.3g} MB, expected at most {most}")
+            if parts.testzip() is not None:  # numpy stops reading before the checksum
+                raise BadZipFile("its checksum does not fit")
+        with np.load(path, allow_pickle=False) as held:
+            return {name: held[name] for name in held.files}
+    except InputError:
+        raise
+    except (OSError, EOFError, BadZipFile, ValueError, TypeError, KeyError, RuntimeError, zlib.error) as error:
+        what = printable(error)
+        raise InputError(f"{path}: cannot be read as a checkpoint ({what}); delete it to start anew") from None

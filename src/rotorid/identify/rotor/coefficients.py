@@ -1,0 +1,289 @@
+"""Thrust coefficient of a propeller from stand runs: through the origin, with an offset, per motor, pooled.
+
+- Through the origin, F = C_F ω² (thesis eq. 4.25), and with an offset of each run, F = C_F ω² + F_0.
+- Speeds are noisy too: where their noise σ_ω is given, the fit is the maximum-likelihood one with errors in
+  both variables, min Σ (F - F_0 - C_F Ω²)²/σ_F² + (ω - Ω)²/σ_ω² over C_F, F_0 and the true speeds Ω. At its
+  solution each point weighs 1/(σ_F² + (2 C_F Ω σ_ω)²); σ_F is what gives weighted residuals unit variance.
+- Without a noise of the speed the covariance allows each point a variance of its own (HC2, MacKinnon and White 1985),
+  with Satterthwaite's degrees of freedom: points at high speed count for more, and if they scatter more, an interval
+  that takes all points as equally noisy is too narrow. Where the samples behind the points show that all are equally
+  noisy (`rotorid.identify.rotor.sample_noise`), `equal_noise` gives the usual formula.
+- One motor's interval says how well that motor's points fit a curve, not how well the propeller is known: the
+  same propeller differs from motor to motor. The pooled value is therefore a random-effects mean
+  (Paule and Mandel 1982) with Hartung's and Knapp's interval (2001), which holds for few motors.
+- A motor is called outlying where its modified z-score, 0.6745 |C - median| / MAD, exceeds a threshold of 3.5
+  (Iglewicz and Hoaglin 1993): neither centre nor scale is moved by the outlier itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import t as student_t
+
+from rotorid.errors import InputError
+from rotorid.recordings.lost_speeds import lost_speed
+
+
+@dataclass(frozen=True)
+class Points:
+    """Steady points of one run: rotor speed (rad/s) and thrust (N), shape (n,) each."""
+
+    run: str
+    speed_rad_s: np.ndarray
+    thrust_n: np.ndarray
+
+
+@dataclass(frozen=True)
+class CoefficientFit:
+    """A thrust coefficient with its interval; offsets are empty for a fit through the origin."""
+
+    value: float
+    """C_F, N s²."""
+    standard_error: float
+    interval_95: tuple[float, float]
+    offsets_n: tuple[float, ...]
+    offset_intervals_n: tuple[tuple[float, float], ...]
+    residual_rms_n: float
+    points: int
+    freedom: float
+    """Degrees of freedom of Student's t that the interval is made with."""
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """Random-effects mean over motors."""
+
+    value: float
+    interval_95: tuple[float, float]
+    between_sd: float
+    """Standard deviation of the true values between motors, the unit of the values."""
+    prediction_95: tuple[float, float]
+    """Where the value of one further motor is expected."""
+
+
+def usable(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
+    """Points with a speed: a reading of 0 while there is thrust is a missing speed, not a rotor at rest."""
+    known = np.isfinite(speed_rad_s) & np.isfinite(thrust_n) & (speed_rad_s > 0)
+    return known & ~lost_speed(speed_rad_s, thrust_n)
+
+
+def _design(runs: Sequence[Points], kept: Sequence[np.ndarray], offset: bool) -> np.ndarray:
+    """Columns of the offsets, shape (n, runs) or (n, 0)."""
+    counts = [int(k.sum()) for k in kept]
+    if not offset:
+        return np.zeros((sum(counts), 0))
+    return np.repeat(np.eye(len(runs)), counts, axis=0)
+
+
+def _true_speeds(speed, thrust, offsets, c_f, force_sd, speed_sd):
+    """Speeds nearest to reading and curve together: min (F - F_0 - C_F Ω²)²/σ_F² + (ω - Ω)²/σ_ω²."""
+    found = speed.copy()
+    for _ in range(8):
+        left = thrust - offsets - c_f * found**2
+        slope = -2 * c_f * found * left / force_sd**2 - (speed - found) / speed_sd**2
+        bend = ((2 * c_f * found) ** 2 - 2 * c_f * np.minimum(left, 0)) / force_sd**2 + 1 / speed_sd**2
+        found = found - slope / bend
+    return found
+
+
+def _both_noisy(speed, thrust, offset_columns, start, force_sd, speed_noise_relative):
+    """Maximum-likelihood fit with noise in thrust and speed: estimate, covariance, chi-square."""
+    theta, true = start.copy(), speed
+    for _ in range(60):
+        offsets = offset_columns @ theta[1:]
+        # A share of the true speed: a share of the reading would trust low readings more and raise C_F.
+        speed_sd = speed_noise_relative * true
+        true = _true_speeds(speed, thrust, offsets, theta[0], force_sd, speed_sd)
+        slope = 2 * theta[0] * true
+        residual = thrust - offsets - theta[0] * true**2 - slope * (speed - true)
+        weight = 1 / (force_sd**2 + (slope * speed_sd) ** 2)
+        columns = np.column_stack([true**2, offset_columns])
+        scale = np.linalg.norm(columns, axis=0)
+        inverse = np.linalg.inv((columns / scale).T @ (weight[:, None] * columns / scale))
+        step = inverse @ ((columns / scale).T @ (weight * residual)) / scale
+        theta = theta + step
+        if abs(step[0]) < 1e-12 * abs(theta[0]):
+            break
+    return theta, inverse / np.outer(scale, scale), float(np.sum(weight * residual**2))
+
+
+def _each_its_own_noise(
+    columns: np.ndarray, inverse: np.ndarray, residual: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance (k, k) of least squares whose points have variances of their own, and degrees of freedom (k,).
+
+    Residuals are enlarged by their leverage (HC2). The degrees of freedom are those of a chi-square with the mean and
+    variance that each coefficient's variance has where all points are in truth equally noisy.
+    """
+    scale = np.linalg.norm(columns, axis=0)
+    unit = columns / scale
+    weights = (inverse * np.outer(scale, scale)) @ unit.T
+    leverage = np.einsum("nk,kn->n", unit, weights)
+    # A point that alone determines an unknown leaves no residual, and says nothing of its noise.
+    free = np.where(1 - leverage > 1e-9, 1 / np.maximum(1 - leverage, 1e-9), 0.0)
+    covariance = (weights * (residual**2 * free)) @ weights.T
+    rest = np.eye(len(columns)) - unit @ weights
+    freedom = []
+    for row in weights:
+        shape = rest @ ((row**2 * free)[:, None] * rest)
+        freedom.append(np.trace(shape) ** 2 / np.sum(shape * shape.T))
+    return covariance / np.outer(scale, scale), np.array(freedom)
+
+
+LEAST_FORCE_SD_N = 1e-4
+"""The balance is never taken as more exact than this."""
+
+
+def fit_coefficient(
+    runs: Sequence[Points],
+    offset: bool,
+    speed_noise_relative: float = 0.0,
+    least_sd: float = LEAST_FORCE_SD_N,
+    equal_noise: bool = False,
+) -> CoefficientFit:
+    """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
+
+    Parameters
+    ----------
+    runs
+        Steady points of each run.
+    offset
+        Whether each run has a force offset of its own.
+    speed_noise_relative
+        One-sigma noise of the speed reading, as a share of the speed; 0 for ordinary least squares.
+    least_sd
+        The force (or torque) is never taken as more exact than this, N (N m); where the speed's noise is considered.
+    equal_noise
+        Whether all points are equally noisy; otherwise each has a variance of its own.
+
+    Raises
+    ------
+    InputError
+        Not more points than unknowns.
+    """
+    kept = [usable(p.speed_rad_s, p.thrust_n) for p in runs]
+    speed = np.concatenate([p.speed_rad_s[k] for p, k in zip(runs, kept, strict=True)])
+    thrust = np.concatenate([p.thrust_n[k] for p, k in zip(runs, kept, strict=True)])
+    offset_columns = _design(runs, kept, offset)
+    unknowns = 1 + offset_columns.shape[1]
+    freedom = len(speed) - unknowns
+    if freedom < 1:
+        names = ", ".join(p.run for p in runs)
+        raise InputError(f"runs {names}: {len(speed)} points for {unknowns} unknowns")
+    columns = np.column_stack([speed**2, offset_columns])
+    scale = np.linalg.norm(columns, axis=0)
+    inverse = np.linalg.inv((columns / scale).T @ (columns / scale)) / np.outer(scale, scale)
+    values = inverse @ (columns.T @ thrust)
+    residual = thrust - columns @ values
+    variance = np.sum(residual**2) / freedom
+    if equal_noise:
+        covariance, freedoms = variance * inverse, np.full(unknowns, float(freedom))
+    else:
+        covariance, freedoms = _each_its_own_noise(columns, inverse, residual)
+    if speed_noise_relative > 0:
+
+        def fit_at(force_sd):
+            return _both_noisy(speed, thrust, offset_columns, values, force_sd, speed_noise_relative)
+
+        ceiling = 3 * np.sqrt(variance) + 2 * least_sd
+        force_sd = least_sd
+        if fit_at(force_sd)[2] > freedom:
+            force_sd = brentq(lambda sd: fit_at(sd)[2] - freedom, force_sd, ceiling, rtol=1e-3)
+        values, covariance, _ = fit_at(force_sd)
+        freedoms = np.full(unknowns, float(freedom))
+    half = student_t.ppf(0.975, freedoms) * np.sqrt(np.diag(covariance))
+    intervals = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
+    return CoefficientFit(
+        value=float(values[0]),
+        standard_error=float(np.sqrt(covariance[0, 0])),
+        interval_95=intervals[0],
+        offsets_n=tuple(float(v) for v in values[1:]),
+        offset_intervals_n=intervals[1:],
+        residual_rms_n=float(np.sqrt(np.mean((thrust - columns @ values) ** 2))),
+        points=len(speed),
+        freedom=float(freedoms[0]),
+    )
+
+
+def fit_exponent(runs: Sequence[Points]) -> tuple[float, tuple[float, float]]:
+    """Exponent n of F = C ω^n with one C a run, and its 95 % interval: 2 where C_F is truly constant.
+
+    Least squares of log F on log ω; points below 2 % of the largest thrust are left out, since there the
+    balance's own offset rules the logarithm.
+    """
+    x, y, group = [], [], []
+    for number, points in enumerate(runs):
+        keep = usable(points.speed_rad_s, points.thrust_n)
+        keep &= points.thrust_n > 0.02 * np.nanmax(points.thrust_n)
+        log_speed, log_thrust = np.log(points.speed_rad_s[keep]), np.log(points.thrust_n[keep])
+        x.append(log_speed - log_speed.mean())
+        y.append(log_thrust - log_thrust.mean())
+        group.append(number)
+    x, y = np.concatenate(x), np.concatenate(y)
+    freedom = len(x) - len(group) - 1
+    exponent = np.sum(x * y) / np.sum(x**2)
+    error = np.sqrt(np.sum((y - exponent * x) ** 2) / freedom / np.sum(x**2))
+    half = student_t.ppf(0.975, freedom) * error
+    return float(exponent), (float(exponent - half), float(exponent + half))
+
+
+def pool(values: Sequence[float], standard_errors: Sequence[float]) -> Pooled:
+    """Random-effects mean of the motors' values.
+
+    τ² solves Σ (C_i - C̄)² / (s_i² + τ²) = k - 1 (Paule and Mandel); the interval is Hartung's and Knapp's,
+    with Student's t for k - 1 degrees of freedom.
+    """
+    values, variances = np.asarray(values, float), np.asarray(standard_errors, float) ** 2
+    k = len(values)
+    if k < 2 or len(variances) != k:
+        raise InputError(f"pooling needs the values of at least two motors, found {k}")
+
+    def mean_of(tau2):
+        weight = 1 / (variances + tau2)
+        return np.sum(weight * values) / np.sum(weight), weight
+
+    def excess(tau2):
+        mean, weight = mean_of(tau2)
+        return np.sum(weight * (values - mean) ** 2) - (k - 1)
+
+    ceiling = 10 * np.var(values, ddof=1) + 1e-300
+    tau2 = brentq(excess, 0.0, ceiling, xtol=1e-12 * ceiling) if excess(0.0) > 0 else 0.0
+    mean, weight = mean_of(tau2)
+    spread = np.sum(weight * (values - mean) ** 2) / ((k - 1) * np.sum(weight))
+    half = student_t.ppf(0.975, k - 1) * np.sqrt(spread)
+    ahead = student_t.ppf(0.975, k - 1) * np.sqrt(tau2 + spread)
+    return Pooled(
+        value=float(mean),
+        interval_95=(float(mean - half), float(mean + half)),
+        between_sd=float(np.sqrt(tau2)),
+        prediction_95=(float(mean - ahead), float(mean + ahead)),
+    )
+
+
+def modified_z_scores(values: Sequence[float]) -> np.ndarray:
+    """0.6745 (C - median) / MAD of each value, shape (n,); zeros where the median deviation is zero."""
+    values = np.asarray(values, float)
+    deviation = values - np.median(values)
+    scale = np.median(np.abs(deviation))
+    return np.zeros_like(values) if scale == 0 else 0.6745 * deviation / scale
+
+
+def rest_reading(thrust_n: Sequence[float]) -> dict:
+    """Mean thrust (N) of points with the rotor at rest, its 95 % interval and their number.
+
+    A true zero error of the balance would show here too; an offset that does not is a bend of the curve.
+    """
+    thrust_n = np.asarray(thrust_n, float)
+    if len(thrust_n) < 2:
+        return {"mean_n": None, "interval_95_n": None, "points": len(thrust_n)}
+    half = student_t.ppf(0.975, len(thrust_n) - 1) * thrust_n.std(ddof=1) / np.sqrt(len(thrust_n))
+    mean = float(thrust_n.mean())
+    return {
+        "mean_n": mean,
+        "interval_95_n": [float(mean - half), float(mean + half)],
+        "points": len(thrust_n),
+    }

@@ -1,0 +1,263 @@
+"""Steady wrenches of the experiments on the stand: means with intervals, rest reading, weight under tilt.
+
+The sensor stays level and the vehicle is tilted on it, so the weight pulls along the sensor's z whatever the tilt;
+what turns with the vehicle is the arm from the sensor to the centre of mass, and with it the weight's moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t as student_t
+
+from rotorid.errors import InputError
+from rotorid.identify.stand import plateaus
+from rotorid.recordings import columns as c
+from rotorid.recordings.run import Run
+from rotorid.recordings.signal.average import block_count, mean_and_error
+
+WRENCH = (*c.FORCE, *c.MOMENT)
+SETTLE_S = 0.5
+"""Left off the beginning of a plateau and of the rest after a programme: motors and structure settle."""
+REST_MARGIN_S = 0.15
+
+
+def tilt(roll_rad: float, pitch_rad: float) -> np.ndarray:
+    """Body axes to level axes, shape (3, 3), R_y(pitch) R_x(roll), yaw zero (thesis eq. 4.10)."""
+    cr, sr, cp, sp = np.cos(roll_rad), np.sin(roll_rad), np.cos(pitch_rad), np.sin(pitch_rad)
+    return np.array([[cp, sr * sp, cr * sp], [0.0, cr, -sr], [-sp, sr * cp, cr * cp]])
+
+
+def weight_wrench(mass_kg: float, gravity_m_s2: float, centre_m: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """What the weight exerts on the level sensor, shape (6,), N and N m.
+
+    `centre_m` is the centre of mass from the sensor in body axes, `rotation` body to level.
+    """
+    weight = np.array([0.0, 0.0, mass_kg * gravity_m_s2])
+    return np.concatenate([weight, np.cross(rotation @ np.asarray(centre_m, float), weight)])
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Mean wrench of one stretch, N and N m, shape (6,), and its standard error from the means of some blocks."""
+
+    mean: np.ndarray
+    error: np.ndarray
+    samples: int
+    blocks: int
+
+    @property
+    def half_width_95(self) -> np.ndarray:
+        """Half width of the 95 % intervals, shape (6,)."""
+        return student_t.ppf(0.975, self.blocks - 1) * self.error
+
+
+def steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = None) -> Steady:
+    """Mean wrench between two times, which hold `periods` of a periodic signal if given.
+
+    Raises InputError for fewer than two samples.
+    """
+    inside = (run.time_s >= start_s) & (run.time_s <= stop_s)
+    if inside.sum() < 2:
+        raise InputError(f"{run.name}: no samples between {start_s:.2f} and {stop_s:.2f} s")
+    blocks = periods or block_count(int(inside.sum()))
+    pairs = [mean_and_error(column, blocks) for column in run.array(WRENCH)[inside].T]
+    return Steady(np.array([m for m, _ in pairs]), np.array([e for _, e in pairs]), int(inside.sum()), blocks)
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """One experiment: rest before and after, and the steady stretch with the rest reading off."""
+
+    name: str
+    roll_rad: float
+    pitch_rad: float
+    throttle: np.ndarray
+    """Mean throttles of the steady stretch, shape (4,)."""
+    voltage_v: float
+    rest: Steady
+    drift: np.ndarray
+    """Rest after minus rest before, shape (6,)."""
+    steady: Steady
+    """With the rest reading (interpolated between before and after) taken off; the rest's error is in it."""
+    start_s: float
+    stop_s: float
+    kind: str
+    """plateau, or cycles where the programme has none (a sine)."""
+
+
+def evaluate(run: Run, frequency_hz: float | None) -> Evaluated:
+    """Steady wrench of one experiment.
+
+    Of a trapezoid the plateau, of a sine (`frequency_hz` given) as many whole cycles as the programme holds, so
+    that the mean is one over the cycle.
+    """
+    throttle = run.array(c.rotor_columns("throttle", 4))
+    found = plateaus.segments(run.time_s, throttle)
+    active = plateaus.programme(found)
+    flat = plateaus.longest(found, plateaus.PLATEAU)
+    cycles = None
+    if frequency_hz:
+        cycles = int((active.length_s - SETTLE_S) * frequency_hz)
+        if cycles < 2:
+            raise InputError(f"{run.name}: less than two cycles of {frequency_hz:g} Hz")
+        start, stop, kind = active.start_s + SETTLE_S, active.start_s + SETTLE_S + cycles / frequency_hz, "cycles"
+    elif flat is not None:
+        start, stop, kind = flat.start_s + SETTLE_S, flat.stop_s - REST_MARGIN_S, "plateau"
+    else:
+        raise InputError(f"{run.name}: no plateau and no frequency of a sine")
+    before = steady_mean(run, -np.inf, active.start_s - REST_MARGIN_S)
+    after = steady_mean(run, active.stop_s + SETTLE_S, np.inf)
+    loaded = steady_mean(run, start, stop, cycles)
+    first, last = active.start_s / 2, (active.stop_s + run.time_s[-1]) / 2
+    share = ((start + stop) / 2 - first) / (last - first)
+    rest = before.mean + share * (after.mean - before.mean)
+    rest_error = np.hypot((1 - share) * before.error, share * after.error)
+    steady = Steady(loaded.mean - rest, np.hypot(loaded.error, rest_error), loaded.samples, loaded.blocks)
+    inside = (run.time_s >= start) & (run.time_s <= stop)
+    return Evaluated(
+        name=run.name,
+        roll_rad=float(run.column("roll_rad")[0]),
+        pitch_rad=float(run.column("pitch_rad")[0]),
+        throttle=throttle[inside].mean(axis=0),
+        voltage_v=float(np.nanmean(run.column(c.BATTERY_VOLTAGE)[inside])),
+        rest=before,
+        drift=after.mean - before.mean,
+        steady=steady,
+        start_s=float(start),
+        stop_s=float(stop),
+        kind=kind,
+    )
+
+
+def mean_thrust(run: Run, entry: Evaluated, thrust_of: Callable) -> np.ndarray:
+    """Thrust that the throttles ask of each motor, N, shape (4,), mean over the steady stretch.
+
+    The mean of the thrust, not the thrust of the mean throttle: over a sine they differ.
+    """
+    inside = (run.time_s >= entry.start_s) & (run.time_s <= entry.stop_s)
+    return np.clip(thrust_of(run.array(c.rotor_columns("throttle", 4))[inside]), 0.0, None).mean(axis=0)
+
+
+@dataclass(frozen=True)
+class Weight:
+    """What the readings at rest say of the vehicle: mass, centre of mass from the sensor, body axes."""
+
+    mass_kg: float
+    mass_interval_95: tuple[float, float]
+    centre_m: np.ndarray
+    centre_interval_95: np.ndarray
+    """Shape (3, 2)."""
+    rms_before: np.ndarray
+    """RMS over the experiments of what the believed weight leaves at rest, shape (6,)."""
+    rms_after: np.ndarray
+    """… and of what the fitted one leaves."""
+
+
+def weights(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:
+    """The weight's wrench in the attitude of each experiment, shape (n, 6)."""
+    return np.array([weight_wrench(mass_kg, gravity_m_s2, centre_m, tilt(e.roll_rad, e.pitch_rad)) for e in evaluated])
+
+
+def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> Weight:
+    """Mass and centre of mass from the readings at rest under all tilts, beside the believed ones.
+
+    Fz gives the mass, the moments M = (R c) × W give c: under tilt also its height. The sensor's own zero is
+    taken as zero (it was zeroed without the vehicle), and its frame as level.
+    """
+    rest = np.array([e.rest.mean for e in evaluated])
+    rotations = [tilt(e.roll_rad, e.pitch_rad) for e in evaluated]
+    freedom = len(rest) - 1
+    if freedom < 3:
+        raise InputError(f"a weight under tilt needs at least four experiments, found {len(rest)}")
+    mass = rest[:, 2].mean() / gravity_m_s2
+    mass_half = student_t.ppf(0.975, freedom) * rest[:, 2].std(ddof=1) / np.sqrt(len(rest)) / gravity_m_s2
+    pull = mass * gravity_m_s2
+    # (R c) × (0, 0, W) = W (c_y', −c_x', 0) with c' = R c
+    rows = np.concatenate([pull * np.array([r[1], -r[0]]) for r in rotations])
+    moments = rest[:, 3:5].reshape(-1)
+    centre, *_ = np.linalg.lstsq(rows, moments, rcond=None)
+    left = moments - rows @ centre
+    covariance = np.linalg.inv(rows.T @ rows) * (left @ left) / (len(left) - 3)
+    # The moments give W c; that the weight itself is known so well only adds to the arm along c.
+    mass_share = rest[:, 2].std(ddof=1) / np.sqrt(len(rest)) / pull
+    covariance += mass_share**2 * np.outer(centre, centre)
+    half = student_t.ppf(0.975, len(left) - 3) * np.sqrt(np.diag(covariance))
+
+    def rms(m: float, place: np.ndarray) -> np.ndarray:
+        return np.sqrt(((rest - weights(evaluated, m, place, gravity_m_s2)) ** 2).mean(axis=0))
+
+    return Weight(
+        mass_kg=float(mass),
+        mass_interval_95=(float(mass - mass_half), float(mass + mass_half)),
+        centre_m=centre,
+        centre_interval_95=np.column_stack([centre - half, centre + half]),
+        rms_before=rms(mass_kg, np.asarray(centre_m, float)),
+        rms_after=rms(mass, centre),
+    )
+
+
+def table(
+    evaluated: list[Evaluated],
+    numbers: list[int],
+    expected: np.ndarray,
+    believed_rest: np.ndarray,
+    fitted_rest: np.ndarray,
+) -> pd.DataFrame:
+    """One row an experiment: throttles, attitude, voltage, mean wrench with its interval, the model's, rest, drift.
+
+    `numbers` are the experiments' numbers in table A.1, `expected` is the believed vehicle's wrench at these throttles
+    without weight, `believed_rest` and `fitted_rest` that of the weight with the believed and the fitted centre of
+    mass, shape (n, 6) each.
+    """
+    rows = []
+    entries = zip(evaluated, numbers, expected, believed_rest, fitted_rest, strict=True)
+    for entry, number, model, believed, fitted in entries:
+        row = {
+            "name": entry.name,
+            "experiment": number,
+            "kind": entry.kind,
+            **{f"throttle_{i + 1}": value for i, value in enumerate(entry.throttle)},
+            "roll_deg": np.degrees(entry.roll_rad),
+            "pitch_deg": np.degrees(entry.pitch_rad),
+            "voltage_v": entry.voltage_v,
+            "start_s": entry.start_s,
+            "stop_s": entry.stop_s,
+            "samples": entry.steady.samples,
+        }
+        for k, name in enumerate(WRENCH):
+            row |= {
+                name: entry.steady.mean[k],
+                f"{name}_half_95": entry.steady.half_width_95[k],
+                f"{name}_model": model[k],
+                f"{name}_rest": entry.rest.mean[k],
+                f"{name}_rest_believed": believed[k],
+                f"{name}_rest_fitted": fitted[k],
+                f"{name}_drift": entry.drift[k],
+            }
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def weight_as_dict(found: Weight, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
+    """The weight for a JSON file, beside the believed one, and how far the believed vehicle's steady wrench is off."""
+    off = np.array([experiments[name] - experiments[f"{name}_model"] for name in WRENCH])
+    half = np.array([experiments[f"{name}_half_95"] for name in WRENCH])
+    axes = ("x", "y", "z")
+    return {
+        "experiments": len(experiments),
+        "mass_kg": found.mass_kg,
+        "mass_interval_95": found.mass_interval_95,
+        "mass_believed_kg": mass_kg,
+        "mass_believed_inside": found.mass_interval_95[0] <= mass_kg <= found.mass_interval_95[1],
+        "centre_m": dict(zip(axes, found.centre_m.tolist(), strict=True)),
+        "centre_interval_95_m": dict(zip(axes, found.centre_interval_95.tolist(), strict=True)),
+        "centre_believed_m": dict(zip(axes, np.asarray(centre_m).tolist(), strict=True)),
+        "rest_rms_before": dict(zip(WRENCH, found.rms_before.tolist(), strict=True)),
+        "rest_rms_after": dict(zip(WRENCH, found.rms_after.tolist(), strict=True)),
+        "steady_rms_off_model": dict(zip(WRENCH, np.sqrt((off**2).mean(axis=1)).tolist(), strict=True)),
+        "steady_half_width_95": dict(zip(WRENCH, half.mean(axis=1).tolist(), strict=True)),
+    }

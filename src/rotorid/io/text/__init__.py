@@ -1,0 +1,1 @@
+"""Texts: files that people write, read with limits; names, sentences and numbers as people read them."""

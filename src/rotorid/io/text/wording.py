@@ -1,0 +1,135 @@
+"""Faults that a pydantic model finds, in plain words: no wording of the validator's own reaches a user."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from rotorid.io.text.names import hint, listed
+
+_EXACT = {
+    "greater_than": "a number greater than {gt:g}",
+    "greater_than_equal": "a number of {ge:g} or more",
+    "less_than": "a number less than {lt:g}",
+    "less_than_equal": "a number of at most {le:g}",
+    "literal_error": "{expected}",
+    "enum": "{expected}",
+    "finite_number": "a finite number",
+    "int_from_float": "a whole number",
+    "string_too_short": "text of at least {min_length} character",
+    "string_pattern_mismatch": "a name of small letters, digits and underscores",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
+}
+_BY_START = (
+    ("float", "a number"),
+    ("int", "a whole number"),
+    ("string", "text"),
+    ("bool", "true or false"),
+    ("dict", "keys with values"),
+    ("model", "keys with values"),
+    ("mapping", "keys with values"),
+    ("tuple", "a list"),
+    ("list", "a list"),
+)
+_BRANCHES = ("float", "tuple[float, ...]", "constrained-float", "int", "str", "constrained-int")
+"""Parts of a pydantic location that name a kind of value, not a key."""
+LONGEST = 80
+"""Characters of a value that is quoted."""
+MOST_KEYS = 8
+"""Keys that are listed where none is like the one given."""
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first fault of a pydantic error as one clause: key, found, expected, the nearest name."""
+    return explained(error, model)[0]
+
+
+def explained(error: ValidationError, model: type[BaseModel]) -> list[str]:
+    """Every fault of a pydantic error as a clause.
+
+    A misspelled key is also a missing one: it comes first, as its name says more. A list that is too short only because
+    what is in it is wrong is passed over.
+    """
+    entries = error.errors()
+    faults = [
+        entry
+        for entry in entries
+        if entry["type"] != "too_short"
+        or not any(e is not entry and e["loc"][: len(entry["loc"])] == entry["loc"] for e in entries)
+    ]
+    return [_clause(entry, model) for entry in sorted(faults, key=lambda e: e["type"] != "extra_forbidden")]
+
+
+def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
+    location, kind = entry["loc"], entry["type"]
+    key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
+    if kind == "extra_forbidden":
+        known = sorted(keys_at(model, location))
+        near = hint(str(location[-1]), known) or f"; known here are {listed(known, MOST_KEYS)}"
+        return f"{key}: no such key is known{near}"
+    if kind == "missing":
+        return f"{key}: is missing"
+    if kind == "value_error":
+        return ": ".join(x for x in (key, printable(entry["ctx"]["error"])) if x)
+    wanted = expected(entry)
+    clause = f"{key}: found {found(entry)}, expected {wanted}"
+    if "number" in wanted and _reads_as_number(entry.get("input")):
+        clause += " (without quotes, and where it has an exponent with a point and a sign: 1.0e-3)"
+    return clause
+
+
+def _reads_as_number(given: Any) -> bool:
+    if not isinstance(given, str):
+        return False
+    try:
+        float(given)
+    except ValueError:
+        return False
+    return True
+
+
+def keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
+    """Keys that `model` knows where a location of a pydantic error lies."""
+    for part in location[:-1]:
+        if isinstance(part, str) and part in model.model_fields:
+            model = next(_models_in(model.model_fields[part].annotation), model)
+    return list(model.model_fields)
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """The models inside a type such as `dict[str, Channel]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models_in(inner)
+
+
+def expected(entry: Mapping[str, Any]) -> str:
+    """What an entry of `ValidationError.errors()` would have accepted."""
+    kind, context = entry["type"], entry.get("ctx") or {}
+    if kind == "too_short" and context["min_length"] == 1:
+        return "at least one entry"
+    if kind in _EXACT:
+        return _EXACT[kind].format(**context)
+    return next((text for start, text in _BY_START if kind.startswith(start)), "another value")
+
+
+def found(entry: Mapping[str, Any]) -> str:
+    """The value that was refused, short and in one line."""
+    text = printable(_as_in_yaml(entry.get("input")))
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+
+
+def _as_in_yaml(value: Any) -> str:
+    """A value as Python writes it, but true and false, which people write in small letters."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_as_in_yaml(part) for part in value)}]"
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def printable(text: object) -> str:
+    """A text in one line: line breaks and control characters written as escapes."""
+    return "".join(x if x.isprintable() else x.encode("unicode_escape", "backslashreplace").decode() for x in str(text))

@@ -1,0 +1,297 @@
+"""Manoeuvres to choose from: pieces that start and end at rest in one place, so that they join in any order.
+
+A piece is a reference for position (north-east-down, from the middle of the volume) and yaw, as large as the limits
+allow or a stated share of it. Oscillations of several axes at once have harmonics of their own each, so that they are
+orthogonal over the piece.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotorid.plan.limits import Limits
+
+GRAVITY_M_S2 = 9.81
+RAMP_S = 2.0
+BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0))
+"""Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
+makes of them turns the vehicle as hard as doublets do."""
+ROOM = 0.85
+"""Share of the tilt allowed that a reference asks for: drag and the controller take some."""
+PIECE_S = 10.0
+HEAVE_RAD_S = 3.0
+"""Rate of the waves: thrust then changes by a good part while the speed over ground stays."""
+LONGEST_S = 30.0
+"""A turn that the rotors' torque makes more slowly is no candidate."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where to be when: position (n, 3), m, north-east-down from the middle of the volume, and yaw (n,), rad."""
+
+    time_s: np.ndarray
+    position_m: np.ndarray
+    yaw_rad: np.ndarray
+
+    @property
+    def duration_s(self) -> float:
+        """Length, s."""
+        return float(self.time_s[-1])
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A manoeuvre: its name, what to do in words, and the reference at even instants (n,), s, from 0."""
+
+    name: str
+    words: str
+    make: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+    duration_s: float = PIECE_S
+
+    def reference(self, step_s: float) -> Reference:
+        """The reference at steps of `step_s`."""
+        t = step_s * np.arange(int(round(self.duration_s / step_s)) + 1)
+        position, yaw = self.make(t)
+        return Reference(t, position, yaw)
+
+
+def envelope(t: np.ndarray) -> np.ndarray:
+    """From 0 smoothly to 1 and back to 0, twice differentiable; RAMP_S each way."""
+    s = np.clip(np.minimum(t, t[-1] - t) / RAMP_S, 0, 1)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi) -> np.ndarray:
+    """Phase that speeds up from rest and slows down to it, a whole number of units in all, (n,), rad."""
+    speed = envelope(t)
+    raw = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
+    units = max(1.0, np.floor(rate_rad_s * raw[-1] / unit_rad + 0.02))
+    return unit_rad * units * raw / raw[-1]
+
+
+def whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi) -> float:
+    """Duration near `about_s`, s, in which a phase of that rate goes through a whole number of units."""
+    units = max(1, round(rate_rad_s * (about_s - RAMP_S) / unit_rad))
+    return RAMP_S + units * unit_rad / rate_rad_s
+
+
+def multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
+    """Sum of cosines of the piece's harmonics with Schroeder's phases (a low crest), largest 1, (n,)."""
+    k = np.arange(1, len(harmonics) + 1)
+    angles = -np.pi * k * (k - 1) / len(harmonics) + seed
+    wave = np.cos(2 * np.pi * harmonics[:, None] * t / t[-1] + angles[:, None]).sum(axis=0)
+    return wave / np.abs(wave).max()
+
+
+def largest(limits: Limits, room_m: float, share: float) -> tuple[float, float]:
+    """Amplitude (m) and rate (rad/s) of a swing along a line at a share of the speed, within room and tilt."""
+    speed = share * limits.speed_m_s
+    most = ROOM * GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    amplitude = min(room_m, max(0.5, speed**2 / most * 1.2))
+    return amplitude, min(speed / amplitude, np.sqrt(most / amplitude))
+
+
+def smaller(limits: Limits, share: float) -> Limits:
+    """Limits with a share of the room (about its middle), the speeds and the tilt, for motions of that size."""
+    middle, room = limits.middle_m, limits.room_m
+    low, high = ([m + sign * share * r for m, r in zip(middle, room, strict=True)] for sign in (-1, 1))
+    names = ("x_m", "y_m", "height_m")
+    ranges = {n: (a, b) for n, a, b in zip(names, low, high, strict=True)}
+    scaled = {n: share * getattr(limits, n) for n in ("speed_m_s", "climb_m_s", "tilt_deg", "yaw_rate_deg_s")}
+    return limits.model_copy(update=ranges | scaled | {"wall_margin_m": 0.0})
+
+
+def candidates(limits: Limits, yaw_acceleration_rad_s2: float) -> tuple[Piece, ...]:
+    """Every manoeuvre of the families, for these limits and what the rotors' torque can do about the yaw axis."""
+    return (
+        *_still(limits),
+        *_passes(limits),
+        *_turns(limits, yaw_acceleration_rad_s2),
+        *_climbs(limits),
+        *_oscillations(limits, yaw_acceleration_rad_s2),
+    )
+
+
+def _still(limits: Limits) -> list[Piece]:
+    change_s = max(1.5, 2.0 * limits.room_m[2] / limits.climb_m_s)
+
+    def hover(t):
+        return np.zeros((len(t), 3)), np.zeros(len(t))
+
+    def ladder(t):
+        # Down to the lowest height, up to the highest, in held steps.
+        steps = np.array([0, -1, -0.5, 0, 0.5, 1, 0]) * limits.room_m[2]
+        at = np.linspace(0, t[-1], len(steps) + 1)
+        out = np.zeros((len(t), 3))
+        for before, after, when in zip(steps, steps[1:], at[1:], strict=False):
+            s = np.clip((t - when) / change_s + 0.5, 0, 1)
+            out[:, 2] -= (after - before) * s**3 * (10 - 15 * s + 6 * s**2)
+        return out, np.zeros(len(t))
+
+    low, high = limits.height_m[0], limits.height_m[1] - limits.wall_margin_m
+    words = f"hover at held heights from {low:.1f} to {high:.1f} m"
+    return [
+        Piece("hover", "hover on the spot", hover),
+        Piece("ladder", words, ladder, 7 * (change_s + 1.5)),
+    ]
+
+
+def _passes(limits: Limits) -> list[Piece]:
+    out = []
+    for share in (0.4, 0.7, 1.0):
+        for degrees in (0, 45, 90):
+            angle = np.radians(degrees)
+            ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
+            room = min(r / abs(a) for r, a in zip(limits.room_m[:2], ahead[:2], strict=True) if abs(a) > 1e-9)
+            amplitude, rate = largest(limits, room, share)
+
+            def make(t, amplitude=amplitude, rate=rate, ahead=ahead):
+                return amplitude * np.sin(phase(t, rate))[:, None] * ahead, np.zeros(len(t))
+
+            way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
+            words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
+            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 12.0)))
+    for degrees, axis in ((0, 0), (90, 1)):
+        amplitude, rate = largest(limits, limits.room_m[axis], 0.8)
+        heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / HEAVE_RAD_S, 0.3 * GRAVITY_M_S2 / HEAVE_RAD_S**2)
+
+        def make(t, amplitude=amplitude, rate=rate, axis=axis, heave=heave):
+            out = np.zeros((len(t), 3))
+            out[:, axis] = amplitude * np.sin(phase(t, rate))
+            out[:, 2] = heave * np.sin(phase(t, HEAVE_RAD_S))
+            return out, np.zeros(len(t))
+
+        way = "along the nose" if axis == 0 else "sideways"
+        words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
+        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 12.0)))
+    return out
+
+
+def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
+    room = min(limits.room_m[:2])
+    amplitude, rate = largest(limits, room, 0.8)
+    # The ramp of a turn reaches its rate in RAMP_S, at most 1.9 times as fast in its midst.
+    yaw_rate = min(0.8 * np.radians(limits.yaw_rate_deg_s), most_rad_s2 * RAMP_S / 1.9)
+
+    def spin(t):
+        return np.zeros((len(t), 3)), phase(t, yaw_rate, 2 * np.pi)
+
+    def eight(t):
+        angle = phase(t, rate / np.sqrt(2))
+        out = np.zeros((len(t), 3))
+        out[:, 0], out[:, 1] = amplitude * np.sin(angle), amplitude / 2 * np.sin(2 * angle)
+        return out, np.zeros(len(t))
+
+    def drift(t):
+        # To and fro over ground while the nose turns: body axes and world axes part.
+        out = np.zeros((len(t), 3))
+        out[:, 0] = amplitude * np.sin(phase(t, rate))
+        return out, phase(t, 0.6 * yaw_rate, 2 * np.pi)
+
+    pieces = [
+        Piece(
+            "eight", f"a figure of eight, {amplitude:.1f} m each way, nose held", eight, whole(rate / np.sqrt(2), 15.0)
+        )
+    ]
+    # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
+    half_s = max(1.875 * np.pi / (0.8 * np.radians(limits.yaw_rate_deg_s)), np.sqrt(5.77 * np.pi / most_rad_s2), 1.0)
+
+    def face(t):
+        there, back = np.clip((t - 1.0) / half_s, 0, 1), np.clip((t[-1] - 1.0 - t) / half_s, 0, 1)
+        s = np.minimum(there, back)
+        return np.zeros((len(t), 3)), np.pi * s**3 * (10 - 15 * s + 6 * s**2)
+
+    pieces.append(Piece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
+    degrees = np.degrees(yaw_rate)
+    for name, words, make, speed in (
+        ("spin", f"turn on the spot at up to {degrees:.0f} degrees a second", spin, yaw_rate),
+        ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
+    ):
+        duration = whole(speed, 12.0, 2 * np.pi)
+        if duration <= LONGEST_S:
+            pieces.append(Piece(name, words, make, duration))
+    return pieces
+
+
+def _climbs(limits: Limits) -> list[Piece]:
+    out = []
+    for share in (0.5, 1.0):
+        speed, room = share * limits.climb_m_s, limits.room_m[2]
+        amplitude = min(room, max(0.2, speed**2 / 4.0))
+        rate = min(speed / amplitude, np.sqrt(4.0 / amplitude))
+
+        def make(t, amplitude=amplitude, rate=rate):
+            out = np.zeros((len(t), 3))
+            out[:, 2] = -amplitude * np.sin(phase(t, rate))
+            return out, np.zeros(len(t))
+
+        words = f"climb and descend by {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s"
+        out.append(Piece(f"climb at {share:g}", words, make, whole(rate, PIECE_S)))
+    return out
+
+
+def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
+    """Multisines of the acceleration along some axes (and of yaw) with harmonics of their own each."""
+    most = ROOM * GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    families = {
+        "shake all": ("x", "y", "z", "yaw"),
+        "shake sideways": ("x", "y"),
+        "shake height": ("z",),
+        "shake yaw": ("yaw",),
+    }
+    words = {
+        "shake all": "small quick motions along and about all axes at once",
+        "shake sideways": "small quick motions forwards and sideways",
+        "shake height": "small quick climbs and descents",
+        "shake yaw": "small quick turns of the nose",
+    }
+    out = []
+    for name, axes in families.items():
+        for low_hz, high_hz in BANDS_HZ:
+
+            def make(t, axes=axes, low_hz=low_hz, high_hz=high_hz):
+                inner = t[-1]
+                count = np.arange(int(np.ceil(low_hz * inner)), int(high_hz * inner) + 1)
+                position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
+                for i, axis in enumerate(axes):
+                    own = count[i :: len(axes)].astype(float)
+                    wave = multisine(t, own, i) * envelope(t)
+                    if axis == "yaw":
+                        slope = np.gradient(wave, t)
+                        bend = np.abs(np.gradient(slope, t)).max()
+                        most_rate = 0.8 * np.radians(limits.yaw_rate_deg_s)
+                        most_bend = most_rad_s2 / len(axes) ** 0.5
+                        yaw = wave * min(np.radians(40.0), most_rate / np.abs(slope).max(), most_bend / bend)
+                        continue
+                    k = "xyz".index(axis)
+                    # What several axes ask of a rotor at once adds up.
+                    top = (most / np.sqrt(2) if len(axes) > 1 else most) if k < 2 else 4.0 / len(axes) ** 0.5
+                    speed = limits.speed_m_s / np.sqrt(2) if k < 2 else limits.climb_m_s
+                    slope = np.gradient(wave, t)
+                    bend = np.abs(np.gradient(slope, t)).max()
+                    size = min(top / bend, speed / np.abs(slope).max(), limits.room_m[k] / np.abs(wave).max())
+                    position[:, k] = size * wave
+                return position, yaw
+
+            out.append(
+                Piece(f"{name} to {high_hz:g} Hz", f"{words[name]}, {low_hz:g} to {high_hz:g} times a second", make)
+            )
+    return out
+
+
+def joined(pieces: tuple[Piece, ...] | list[Piece], step_s: float, still_s: float = 1.0) -> Reference:
+    """Pieces one after the other, `still_s` at rest before, between and after them; the nose keeps its last yaw."""
+    position, yaw, turned = [np.zeros((1, 3))], [np.zeros(1)], 0.0
+    rest = int(round(still_s / step_s))
+    for piece in pieces:
+        own = piece.reference(step_s)
+        position += [np.zeros((rest, 3)), own.position_m[1:]]
+        yaw += [np.full(rest, turned), turned + own.yaw_rad[1:]]
+        turned = float(yaw[-1][-1])
+    position.append(np.zeros((rest, 3)))
+    yaw.append(np.full(rest, turned))
+    every = np.concatenate(position)
+    return Reference(step_s * np.arange(len(every)), every, np.concatenate(yaw))

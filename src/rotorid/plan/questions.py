@@ -1,0 +1,156 @@
+"""What a set leaves open, with the competing models ready to be compared: fitted once more by the engine itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotorid.errors import InputError
+from rotorid.mismatch.analyse import findings_inside, findings_outside
+from rotorid.mismatch.findings import CLAIMED, Finding
+from rotorid.mismatch.fitted import Fitted, fitted
+from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ
+from rotorid.mismatch.next_flight import CURVES, beyond_flying
+from rotorid.mismatch.prepare import Prepared, parts_of, prepare
+from rotorid.mismatch.regression import Regression
+from rotorid.mismatch.rows import Term
+from rotorid.mismatch.select import COST_PER_PARAMETER
+from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.within_trust import settled
+from rotorid.plan.between import ChainQuestion, chain_question
+from rotorid.recordings import RecordingSet
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One competing model: the terms of its id beside what all of them share, and their coefficients on this set."""
+
+    id: str
+    keys: tuple[str, ...]
+    """Terms of its own, of the regression; empty where nothing stands in the id's place."""
+    beta: np.ndarray
+    """Coefficients of these, (k,)."""
+    covariance: np.ndarray
+    """Theirs, (k, k)."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """Ids of which one is at work, as a model each; `shared` are the keys that all models hold."""
+
+    ids: tuple[str, ...]
+    hypotheses: tuple[Hypothesis, ...]
+    shared: tuple[str, ...]
+    rivals: dict[str, tuple[tuple[str, ...], ...]]
+    """To an id every set of terms that may stand for it when it is the other's rival."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """A set as the engine fitted it, and what it leaves open."""
+
+    recordings: RecordingSet
+    prepared: Prepared
+    fitted: Fitted
+    findings: tuple[Finding, ...]
+    questions: tuple[Question, ...]
+    chains: tuple[ChainQuestion, ...]
+    """The same of what lies between command and rotor speed."""
+    unanswerable: tuple[tuple[tuple[str, ...], str], ...]
+    """Classes that no flight with these columns can tell apart, with what it takes."""
+    whitened: Regression | None = None
+    """The set's normal equations through the filters that the engine would learn from it and a flight together."""
+
+    @property
+    def regression(self) -> Regression:
+        """The engine's normal equations of the set."""
+        return self.fitted.model.search.regression if self.whitened is None else self.whitened
+
+
+def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: float = HIGHEST_CUTOFF_HZ) -> Known:
+    """The set fitted, and its open questions: classes left open, and ids in `suggested` that may as well be nothing.
+
+    Raises
+    ------
+    InputError
+        The set is no flight.
+    """
+    if recordings.vehicle.kind != "flight":
+        raise InputError(f"set {recordings.name}: a plan is made for flights; this is a {recordings.vehicle.kind}")
+    recordings, mistakes, _ = find_mistakes(recordings)
+    split = split_runs(recordings)
+    fit_part, unseen = parts_of(recordings, split)
+    prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
+    found = fitted(prepared)
+    delivered, _ = settled(found.model, found.values, found.model.selection.active)
+    findings = (*mistakes, *findings_outside(found, prepared), *findings_inside(found, prepared, delivered))
+    chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
+    questions, chains, unanswerable, seen = [], [], [], set()
+    for finding in findings:
+        ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
+        if found.commanded and finding.id in CURVES and finding.status in CLAIMED:
+            # Whichever was found: known from commands alone the other would do as well.
+            ids = tuple(sorted({*ids, *CURVES}))
+        if not ids and finding.id in suggested and finding.status == "established":
+            ids = (finding.id,)
+        if not ids or frozenset(ids) in seen:
+            continue
+        seen.add(frozenset(ids))
+        if needed := beyond_flying(found, ids):
+            unanswerable.append((ids, needed))
+        elif finding.id in chain:
+            if (between := chain_question(found, finding, ids)) is not None:
+                chains.append(between)
+            else:
+                what = "between command and rotor speed; record the rotor speeds beside the commands"
+                unanswerable.append((ids, what))
+        elif (question := question_of(found, finding, ids)) is not None:
+            questions.append(question)
+        else:
+            unanswerable.append((ids, "these columns give no model of the others to compare with"))
+    return Known(recordings, prepared, found, findings, tuple(questions), tuple(chains), tuple(unanswerable))
+
+
+def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Question | None:
+    """The competing models of a class of which `finding` is the one in the model; None with fewer than two models."""
+    search, selection = found.model.search, found.model.selection
+    own = next((k for k in selection.active if search.terms[k].effect == finding.id), None)
+    if own is None:
+        return None
+    rest = [k for k in selection.active if k != own]
+    shared = tuple([*search.always, *rest])
+    forms = {i: [t for t in search.terms.values() if t.effect == i and not t.run] for i in ids}
+    forms[finding.id] = sorted(forms[finding.id], key=lambda t: t.key != own)
+    hypotheses, rivals = [], {}
+    for i in ids:
+        choices = [(t.key,) for t in forms[i]]
+        if not choices:
+            continue
+        rivals[i] = tuple(choices)
+        best = (own,) if i == finding.id else best_of(search.regression, shared, choices, search.terms)
+        hypotheses.append(hypothesis(search.regression, shared, i, best))
+    if len(ids) == 1:
+        hypotheses.append(Hypothesis("nothing", (), np.zeros(0), np.zeros((0, 0))))
+        rivals["nothing"] = ((),)
+    if len(hypotheses) < 2:
+        return None
+    return Question(tuple(h.id for h in hypotheses), tuple(hypotheses), shared, rivals)
+
+
+def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[str, Term]) -> tuple[str, ...]:
+    """The terms that explain most for their parameters."""
+
+    def worth(keys: tuple[str, ...]) -> float:
+        return regression.explained([*shared, *keys]) - COST_PER_PARAMETER * sum(terms[k].size for k in keys)
+
+    return max(choices, key=worth)
+
+
+def hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: tuple[str, ...]) -> Hypothesis:
+    """A competing model with its coefficients as this set has them."""
+    fit = regression.fit([*shared, *keys])
+    where = fit.places(regression.columns(keys))
+    return Hypothesis(name, keys, fit.beta[where], fit.covariance[np.ix_(where, where)])

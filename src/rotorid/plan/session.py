@@ -1,0 +1,325 @@
+"""What to load, throttle, tilt and wait next on a stand or a bench, so that what a set left open is settled.
+
+A step is a schedule that starts and ends unloaded: loads of a bench (hung on by hand or pulled by a machine), throttle
+of a stand's rotors, in one mounting. Its load is known as soon as it is asked for, so that nothing is simulated but the
+columns that every competing effect would have in it; separations are predicted and steps chosen as for flights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+import pandas as pd
+
+from rotorid.effects.loading import CHANNELS
+from rotorid.errors import InputError
+from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
+from rotorid.mismatch.instrument.columns import make_terms, rows_of
+from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
+from rotorid.mismatch.instrument.mistakes import find_mistakes
+from rotorid.mismatch.instrument.model import ReadingModel, everything, fitted_model, whole_reading
+from rotorid.mismatch.instrument.setup import set_up, with_unseen
+from rotorid.mismatch.prepare import parts_of
+from rotorid.mismatch.regression import Regression, build
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.split import split_runs
+from rotorid.plan.limits import SessionLimits
+from rotorid.plan.plan import Tried, chosen_pieces
+from rotorid.plan.questions import Question, question_of
+from rotorid.plan.separation import Information, Separation, of_set, separations, smallest_separation
+from rotorid.recordings import RecordingSet, Run
+from rotorid.recordings import columns as c
+
+REST_S = 2.0
+"""Unloaded before and after every step."""
+MOST_STEPS = 40
+STEP_S = 0.3
+"""A change of the load from one level to the next takes this long."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A part of a session: a load (n, 3) of a bench or speeds (n, rotors) of a stand, as shares of the largest."""
+
+    name: str
+    words: str
+    duration_s: float
+    make: Callable[[np.ndarray], np.ndarray]
+    tilt_rad: tuple[float, float] = (0.0, 0.0)
+    """Roll and pitch of a stand's mount."""
+
+
+@dataclass(frozen=True)
+class KnownInstrument:
+    """A stand's or bench's set as the engine fitted it, and what it leaves open."""
+
+    recordings: RecordingSet
+    model: ReadingModel
+    chain: ChainResult | None
+    questions: tuple[Question, ...]
+    unanswerable: tuple[tuple[tuple[str, ...], str], ...]
+    chains: tuple = ()
+
+    @property
+    def regression(self) -> Regression:
+        """The engine's normal equations of the set."""
+        return self.model.regression
+
+    @property
+    def fitted(self) -> KnownInstrument:
+        """Where the questions of flights look for the model."""
+        return self
+
+
+@dataclass(frozen=True)
+class SessionPlan:
+    """What to do next on a stand or bench, and what is expected of it."""
+
+    set: str
+    kind: str
+    limits: SessionLimits
+    steps: tuple[Step, ...]
+    table: pd.DataFrame
+    questions: tuple[tuple[tuple[str, ...], tuple[Separation, ...]], ...]
+    unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
+
+    @property
+    def duration_s(self) -> float:
+        """Of all steps, without the time that mounting takes."""
+        return sum(s.duration_s for s in self.steps)
+
+    @property
+    def sigma(self) -> float | None:
+        """Smallest separation expected over all questions; None where nothing is compared."""
+        return smallest_separation(self.questions)
+
+    @property
+    def settles(self) -> bool:
+        """Whether every question is expected to be settled."""
+        return self.sigma is not None and self.sigma >= self.limits.target_sigma
+
+
+def known_instrument(recordings: RecordingSet) -> KnownInstrument:
+    """The set fitted as `rotorid.mismatch.instrument.analyse` does, and its open questions."""
+    recordings, mistakes, _ = find_mistakes(recordings)
+    part, _ = parts_of(recordings, split_runs(recordings))
+    setup = set_up(part, recordings)
+    terms, _ = make_terms(setup)
+    chain = find_chain(setup)
+    measured = all(x.measured for x in setup.loadings)
+    loadings = None if chain is None or measured else moved(setup, chain)
+    model = fitted_model(setup, terms, loadings=loadings)
+
+    def among(model: ReadingModel, terms: list[Term]) -> ReadingModel:
+        kept = {t.key for t in terms}
+        active = [k for k in model.selection.active if k in kept]
+        return fitted_model(setup, terms, active, loadings, model.search.refused)
+
+    model = with_plainer_forms(model, among)
+    holder = KnownInstrument(recordings, model, chain, (), ())
+    questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
+    for finding in (*reading_findings(model), *(() if chain is None else chain.findings)):
+        ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
+        if not ids or any(set(ids) == set(q.ids) for q in questions):
+            continue
+        question = question_of(holder, finding, ids)
+        if question is None:
+            unanswerable.append((ids, "it lies between command and rotor speed; record the speeds beside the commands"))
+        else:
+            questions.append(question)
+    return replace(holder, questions=tuple(questions), unanswerable=tuple(unanswerable))
+
+
+def through(t: np.ndarray, levels: Sequence[float]) -> np.ndarray:
+    """Levels held for equal times, from nothing and back to it, (n,)."""
+    held = np.array([0.0, *levels, 0.0])
+    cuts = REST_S + (t[-1] - 2 * REST_S) * np.arange(len(held) - 1) / (len(held) - 2)
+    out = np.zeros(len(t))
+    for a, b, cut in zip(held[:-1], held[1:], cuts, strict=True):
+        out += (b - a) * 0.5 * (1 - np.cos(np.pi * np.clip((t - cut) / STEP_S + 0.5, 0, 1)))
+    return out
+
+
+def courses(limits: SessionLimits) -> dict[str, tuple[str, float, Callable[[np.ndarray], np.ndarray]]]:
+    """To a name what it is in words, its duration, s, and the load over time as a share of the largest."""
+    up = np.linspace(0.2, 1.0, 5)
+    ladder = [*up, *up[-2::-1]]
+    loops = [0.2, 0.4, 0.2, 0.4, 0.2, 0.6, 1.0, 0.6, 0.2, 0.6, 1.0, 0.4]
+    draws = np.random.default_rng(3).permutation(np.linspace(0.1, 1.0, 12))
+    wait = limits.wait_s
+    return {
+        "slow steps": ("in five steps up and down, 5 s each", 5.0 * len(ladder), lambda t: through(t, ladder)),
+        "quick steps": ("in twelve steps in no order, 1 s each", 1.0 * len(draws), lambda t: through(t, draws)),
+        "loops": ("up and down, twice by little and twice by much, 2.5 s a step", 30.0, lambda t: through(t, loops)),
+        "held": (f"held for {wait:.0f} s", wait, lambda t: through(t, [1.0])),
+        "rested": (
+            f"nothing for {wait:.0f} s, full for 5 s, nothing for {wait:.0f} s",
+            2 * wait + 5.0,
+            lambda t: np.where(np.abs(t - t[-1] / 2) < 2.5, 1.0, 0.0),
+        ),
+    }
+
+
+def places(known: KnownInstrument) -> list[tuple[str, np.ndarray]]:
+    """To a name the shares (k,) of every axis of a bench or rotor of a stand that is loaded together."""
+    vehicle = known.recordings.vehicle
+    if vehicle.kind == "bench":
+        loaded = [k for k in known.model.setup.instrument.channels if np.abs(largest(known)[k]) > 0]
+        alone = [(f"along {'xyz'[k]}", np.eye(3)[k]) for k in loaded]
+        return [*alone, *([("along all axes", np.eye(3)[loaded].sum(axis=0))] if len(loaded) > 1 else [])]
+    count = vehicle.rotor_count
+    alone = [(f"of rotor {i + 1} alone", np.eye(count)[i]) for i in range(count)] if count > 1 else []
+    return [("of all rotors" if count > 1 else "of the rotor", np.ones(count)), *alone]
+
+
+def largest(known: KnownInstrument) -> np.ndarray:
+    """Largest load along x, y, z of a bench, N with its sign, or speed of a stand's rotors, rad/s, in the set."""
+    loadings = known.model.setup.loadings
+    if known.recordings.vehicle.kind == "bench":
+        load = np.concatenate([x.load[:, :3] for x in loadings])
+        return load[np.abs(load).argmax(axis=0), np.arange(3)]
+    speeds = np.concatenate([x.command if x.command is not None else x.motion.rotor_speed for x in loadings])
+    return np.full(speeds.shape[1], np.nanmax(speeds))
+
+
+def tilts(known: KnownInstrument, limits: SessionLimits) -> list[tuple[float, float]]:
+    """Roll and pitch, rad, that the mount can be set to: level, and a tilt about either axis."""
+    runs = known.recordings.runs
+    if known.recordings.vehicle.kind == "bench" or not all(r.has(*c.MOUNT) for r in runs):
+        return [(0.0, 0.0)]
+    angle = np.radians(limits.tilt_deg)
+    return [(0.0, 0.0), (angle, 0.0), (0.0, angle)] if angle > 0 else [(0.0, 0.0)]
+
+
+def options(known: KnownInstrument, limits: SessionLimits) -> list[Step]:
+    """Every step of the families."""
+    bench = known.recordings.vehicle.kind == "bench"
+    out = []
+    for tilt in tilts(known, limits):
+        leaning = ", ".join(f"{a} {np.degrees(x):.0f}°" for a, x in zip(("roll", "pitch"), tilt, strict=True) if x)
+        mounted = f"mount the vehicle with {leaning}, then " if leaning else ""
+        for where, shares in places(known):
+            for name, (words, seconds, course) in courses(limits).items():
+                if leaning and (name not in ("slow steps", "rested") or where.endswith("alone")):
+                    continue
+                what = f"load {where}, " if bench else f"throttle {where}, "
+                share = shares * limits.load_share
+
+                def make(t, course=course, share=share, bench=bench):
+                    # Thrust is nearly the square of the speed: even steps of the load.
+                    level = course(t) if bench else np.sqrt(np.maximum(course(t), 0.0))
+                    return level[:, None] * share
+
+                step = Step(
+                    f"{name} {where}{' ' + leaning if leaning else ''}", mounted + what + words, 0.0, make, tilt
+                )
+                out.append(replace(step, duration_s=seconds + 2 * REST_S))
+    return out
+
+
+def table_of(known: KnownInstrument, step: Step) -> pd.DataFrame:
+    """What the set's columns would hold of a step: times, load or speeds, mount; readings are nothing."""
+    setup, vehicle = known.model.setup, known.recordings.vehicle
+    t = np.arange(0.0, step.duration_s, 1.0 / setup.instrument.rate_hz)
+    asked = step.make(t) * largest(known)
+    table = {c.TIME: t} | {(c.FORCE + c.MOMENT)[k]: np.zeros(len(t)) for k in setup.instrument.channels}
+    if vehicle.kind == "bench":
+        return pd.DataFrame(table | {n: asked[:, k] for k, n in enumerate(c.REFERENCE_FORCE)})
+    first = known.recordings.runs[0]
+    scale = 1.0 / setup.full_speed if setup.full_speed else 1.0
+    for stem, factor in (("rotor_speed", 1.0), ("rotor_command", 1.0), ("throttle", scale)):
+        names = c.rotor_columns(stem, vehicle.rotor_count)
+        if first.has(*names):
+            table |= {n: factor * asked[:, i] for i, n in enumerate(names)}
+    for name, angle in zip(c.MOUNT, step.tilt_rad, strict=True):
+        if first.has(name):
+            table[name] = np.full(len(t), angle)
+    for name in (c.BATTERY_VOLTAGE, c.TEMPERATURE):
+        if all(r.has(name) for r in known.recordings.runs):
+            table[name] = np.full(len(t), np.nanmedian(first.column(name)))
+    return pd.DataFrame(table)
+
+
+def asked(known: KnownInstrument) -> list[Term]:
+    """Terms that any open question needs, in the order of the regression."""
+    wanted = {*known.model.search.always, *known.model.selection.active}
+    for question in known.questions:
+        wanted |= {*question.shared, *(k for choices in question.rivals.values() for keys in choices for k in keys)}
+    return [t for t in known.regression.terms if t.key in wanted]
+
+
+def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Information:
+    """What a step would hold, in the columns of the set's regression."""
+    model, name = known.model, "planned"
+    session, first = model.setup.session, known.recordings.runs[0].name
+    if session is not None:
+        later = session.start_s | {name: max(session.start_s.values(), default=0.0) + session.length_s}
+        warm = {name: session.first_temperature_c[first]} if first in session.first_temperature_c else {}
+        session = replace(
+            session,
+            first_s={**session.first_s, name: 0.0},
+            start_s=later,
+            first_temperature_c={**session.first_temperature_c, **warm},
+        )
+    run = Run(name, table_of(known, step))
+    unseen = RecordingSet(name, known.recordings.vehicle, (run,), ())
+    setup = with_unseen(replace(model.setup, session=session), unseen)
+    own = setup.loadings[len(model.setup.loadings) :]
+    if known.chain is not None and not all(x.measured for x in setup.loadings):
+        own = moved(replace(setup, loadings=own), known.chain)
+    rows = rows_of(model.setup, list(terms), own, whole_reading(model.terms, model.selection.active))
+    rows = [Rows(r.run, r.time_s, np.nan_to_num(r.y), r.x) for r in rows]
+    rate = model.setup.rate_hz
+    added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate)
+    every = known.regression.columns([t.key for t in terms])
+    gram = np.zeros_like(known.regression.gram[0])
+    gram[np.ix_(every, every)] = added.gram.sum(axis=0)
+    return Information(gram)
+
+
+def plan_session(
+    known: KnownInstrument, limits: SessionLimits, progress: Callable[[str], None] = lambda text: None
+) -> SessionPlan:
+    """The steps that settle most in the time allowed; none where nothing is open or nothing helps."""
+    kind, name = known.recordings.vehicle.kind, known.recordings.name
+    if not known.questions:
+        return SessionPlan(name, kind, limits, (), pd.DataFrame(), (), known.unanswerable)
+    terms, tried = asked(known), []
+    for step in options(known, limits):
+        try:
+            tried.append(Tried(step, of_step(known, step, terms), step.duration_s))
+        except InputError as error:
+            tried.append(Tried(step, None, step.duration_s, str(error)))
+        progress(f"computed: {step.name}")
+    taken, _ = chosen_pieces(known, limits, tried, MOST_STEPS)
+    # What is mounted alike, and what is done alike, follows each other.
+    taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
+    before = of_set(known)
+    after = before
+    for t in taken:
+        after = after + t.information
+    found = [(q.ids, tuple(separations(known, q, before, after))) for q in known.questions]
+    steps = tuple(t.piece for t in taken)
+    parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(steps)]
+    table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+    readings = [n for n in table.columns if n in c.FORCE + c.MOMENT]
+    table = table.drop(columns=readings)
+    return SessionPlan(name, kind, limits, steps, table, tuple(found), known.unanswerable)
+
+
+def words_of_steps(steps: Sequence[Step]) -> list[str]:
+    """The steps in their order, one that is done several times in a row once."""
+    out, at = [], 0
+    for words, same in groupby(steps, key=lambda s: s.words):
+        group = list(same)
+        number = f"{at + 1}" if len(group) == 1 else f"{at + 1} to {at + len(group)}"
+        times = f"{len(group)} × " if len(group) > 1 else ""
+        out.append(f"{number}. {words} ({times}{group[0].duration_s:.0f} s)")
+        at += len(group)
+    return out
+
+
+__all__ = ["CHANNELS", "KnownInstrument", "SessionPlan", "Step", "known_instrument", "plan_session", "words_of_steps"]

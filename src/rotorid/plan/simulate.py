@@ -1,0 +1,249 @@
+"""A candidate flown: what the controller leaves of the reference, and what the set's sensors would record of it.
+
+The vehicle follows the reference as a cascade does: a position loop with the reference's velocity and acceleration fed
+forward, around an attitude loop of the stated bandwidth, around rotors and filters five times as fast. The attitude
+loop's lag leaves the position loop a resonance, so that motions near its bandwidth come out larger than asked and fast
+ones smaller. For that motion the forces and moments are known, and the rotor
+speeds that make them, with the effects of the competing model at work, follow by solving its equations for them: the
+controller finds them by feedback in the same way. Commands are what the chain between command and speed needs for these
+speeds. Sensors read the truth here: their noise enters where the comparison is predicted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pandas as pd
+from scipy.signal import bilinear_zpk, sosfilt, zpk2sos
+from scipy.spatial.transform import Rotation
+
+from rotorid.effects.contract import Form, Motion, SpeedPath
+from rotorid.errors import InputError
+from rotorid.plan.candidates import Reference
+from rotorid.recordings import Run, Vehicle
+from rotorid.recordings import columns as c
+from rotorid.vehicle.mixer import allocation_matrix
+
+DAMPING = 0.8
+FASTER = 5.0
+"""Rotors and filters beside the attitude loop."""
+SLOWER = 0.2
+"""The position loop beside the attitude loop, where its bandwidth is not stated."""
+EDGE = 8
+"""Samples by which a flight is longer on both sides while its derivatives are taken."""
+ROUNDS = 6
+"""Times that rotor speeds and attitude are solved for with the effects at their last values."""
+STEPS_BACK = 8
+"""Rounds of the inversion of what lies between command and speed."""
+
+
+@dataclass(frozen=True)
+class World:
+    """A competing model: the vehicle, effects with their values, and what lies between command and rotor speed."""
+
+    vehicle: Vehicle
+    effects: tuple[tuple[Form, np.ndarray], ...] = ()
+    chain: tuple = ()
+    """Speed forms with their values, in the order of their stages."""
+    full_speed_rad_s: float = 1.0
+    voltage_v: float | None = None
+    full_voltage_v: float | None = None
+    wind_m_s: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A flight as it would be: the motion, the commands (n, k), rad/s, and the reference it came from."""
+
+    motion: Motion
+    command_rad_s: np.ndarray
+    world_velocity: np.ndarray
+
+    @property
+    def tilt_rad(self) -> float:
+        """Largest tilt."""
+        return float(np.arccos(np.clip(self.motion.rotation[:, 2, 2], -1, 1)).max())
+
+    @property
+    def speed_m_s(self) -> float:
+        """Largest speed over ground along the level."""
+        return float(np.linalg.norm(self.world_velocity[:, :2], axis=1).max())
+
+
+def low_pass(natural_rad_s: float) -> np.ndarray:
+    """Denominator of a second-order low-pass of unit gain, highest power first."""
+    return np.array([1.0 / natural_rad_s**2, 2 * DAMPING / natural_rad_s, 1.0])
+
+
+def filtered(signal: np.ndarray, over: np.ndarray, under: np.ndarray, step_s: float) -> np.ndarray:
+    """A signal (n, …) through a transfer function `over` / `under` in s, at rest before; second-order sections, as
+    poles thousands of times slower than the step lose all digits in one polynomial."""
+    zeros, poles = np.roots(over), np.roots(under)
+    first = np.trim_zeros(over, "f")[0] / np.trim_zeros(under, "f")[0]
+    return sosfilt(zpk2sos(*bilinear_zpk(zeros, poles, first, 1.0 / step_s)), signal, axis=0)
+
+
+def followed(signal: np.ndarray, natural_rad_s: float, lag: np.ndarray, step_s: float) -> np.ndarray:
+    """What a loop leaves of a reference (n, …) whose derivatives are fed forward, starting at rest at its first value.
+
+    The loop asks for the acceleration a_r + 2 ζ ω (v_r - v) + ω² (p_r - p); the vehicle has it a lag later, whose
+    denominator is `lag`.
+    """
+    loop = np.array([2 * DAMPING * natural_rad_s, natural_rad_s**2])
+    asked = np.concatenate([[1.0], loop])
+    held = np.polyadd(np.polymul([1.0, 0.0, 0.0], lag), loop)
+    return filtered(signal - signal[:1], asked, held, step_s) + signal[:1]
+
+
+def turned(yaw_rad: np.ndarray, natural_rad_s: float, step_s: float) -> np.ndarray:
+    """What a yaw loop leaves of a yaw reference (n,), rad, whose rate is fed forward."""
+    own, lag = low_pass(natural_rad_s), low_pass(FASTER * natural_rad_s)
+    return filtered(yaw_rad - yaw_rad[:1], own[1:], np.polymul(own, lag), step_s) + yaw_rad[:1]
+
+
+def attitude(thrust_direction: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Rotations of body vectors into the world (n, 3, 3) with body z along a direction (n, 3) and the nose at a yaw."""
+    down = thrust_direction / np.linalg.norm(thrust_direction, axis=1, keepdims=True)
+    nose = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
+    right = np.cross(down, nose)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    return np.stack([np.cross(right, down), right, down], axis=2)
+
+
+def body_rates(rotation: np.ndarray, step_s: float) -> np.ndarray:
+    """Body rates (n, 3), rad/s, of rotations (n, 3, 3) at even instants."""
+    turning = np.einsum("nji,njk->nik", rotation, np.gradient(rotation, step_s, axis=0))
+    return np.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
+
+
+def fly(
+    world: World,
+    reference: Reference,
+    bandwidth_rad_s: float,
+    place_m: Sequence[float],
+    position_rad_s: float | None = None,
+) -> Flown:
+    """The flight of a reference whose zero lies at `place_m` (north, east, height above ground).
+
+    `bandwidth_rad_s` is of the attitude loop, `position_rad_s` of the position loop (a share of it where not stated).
+
+    Raises
+    ------
+    InputError
+        The rotors cannot do it: one would have to turn backwards.
+    """
+    vehicle, step = world.vehicle, float(reference.time_s[1] - reference.time_s[0])
+    gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), held_longer(reference, step)
+    t = reference.time_s
+    ground = vehicle.ground_z_m or 0.0
+    start = np.array([place_m[0], place_m[1], ground - place_m[2]])
+    outer = SLOWER * bandwidth_rad_s if position_rad_s is None else position_rad_s
+    rotors = low_pass(FASTER * bandwidth_rad_s)
+    level = followed(reference.position_m[:, :2], outer, np.polymul(low_pass(bandwidth_rad_s), rotors), step)
+    # The height needs no tilt.
+    height = followed(reference.position_m[:, 2:], outer, rotors, step)
+    position = np.concatenate([level, height], axis=1) + start
+    yaw = turned(reference.yaw_rad, bandwidth_rad_s / 2, step)
+    velocity = np.gradient(position, step, axis=0)
+    wanted = vehicle.mass_kg * (np.gradient(velocity, step, axis=0) - gravity)
+    inertia, allocation = vehicle.inertia_kg_m2.matrix(), allocation_matrix(vehicle)
+    force = moment = np.zeros((len(t), 3))
+    hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum())
+    speed = np.full((len(t), vehicle.rotor_count), hover)
+    inner = slice(EDGE, -EDGE)
+    rotation = attitude(-wanted, yaw)
+    for _ in range(ROUNDS if world.effects else 1):
+        left = wanted - np.einsum("nij,nj->ni", rotation, force)
+        rotation = attitude(-left, yaw)
+        rates = body_rates(rotation, step)
+        turning = np.gradient(rates, step, axis=0)
+        asked = turning @ inertia + np.cross(rates, rates @ inertia) - moment
+        thrust = np.linalg.norm(left, axis=1)
+        square = np.column_stack([thrust, asked]) @ allocation.T
+        if not np.isfinite(square).all() or (square[inner] < 0).any():
+            raise InputError("the rotors cannot fly this: one would have to turn backwards")
+        speed = np.sqrt(np.maximum(square, 0.0))
+        motion = Motion(
+            time_s=t,
+            rotor_speed=speed,
+            rotor_acceleration=np.gradient(speed, step, axis=0),
+            angular_velocity=rates,
+            angular_acceleration=turning,
+            specific_force=np.einsum("nji,nj->ni", rotation, wanted) / vehicle.mass_kg,
+            rotation=rotation,
+            velocity=np.einsum("nji,nj->ni", rotation, velocity),
+            wind=world.wind_m_s,
+            position=position,
+            height=ground - position[:, 2],
+            voltage=None if world.voltage_v is None else np.full(len(t), world.voltage_v),
+        )
+        motion = replace(motion, accelerometer=motion.specific_force, gyroscope=rates)
+        force, moment = _wrench(world, motion)
+    cut = {f.name: getattr(motion, f.name) for f in fields(motion)}
+    cut = {name: v[inner] for name, v in cut.items() if isinstance(v, np.ndarray) and len(v) == len(t)}
+    motion = replace(motion, **cut)
+    return Flown(motion, commands(world, motion), velocity[inner])
+
+
+def held_longer(reference: Reference, step_s: float) -> Reference:
+    """A reference held EDGE samples longer at both ends: derivatives at an end would be taken from one side."""
+    t = np.arange(-EDGE, len(reference.time_s) + EDGE) * step_s + reference.time_s[0]
+    ends = ((EDGE, EDGE), (0, 0))
+    return Reference(t, np.pad(reference.position_m, ends, "edge"), np.pad(reference.yaw_rad, EDGE, "edge"))
+
+
+def _wrench(world: World, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    force, moment = np.zeros((motion.size, 3)), np.zeros((motion.size, 3))
+    for form, values in world.effects:
+        part = form.contribution(motion, world.vehicle, values)
+        force = force if part.force is None else force + part.force
+        moment = moment if part.moment is None else moment + part.moment
+    return force, moment
+
+
+def commands(world: World, motion: Motion) -> np.ndarray:
+    """Commands (n, k), rad/s, that make the rotor speeds of a motion through the model's chain."""
+    wanted = command = motion.rotor_speed
+    if not world.chain:
+        return command
+    start = SpeedPath(command, motion.time_s, world.full_speed_rad_s, motion.voltage, world.full_voltage_v)
+    for _ in range(STEPS_BACK):
+        path = replace(start, speed=command)
+        for form, values in sorted(world.chain, key=lambda pair: pair[0].stage):
+            path = replace(path, speed=form.apply(path, values))
+        command = command + (wanted - path.speed)
+    return command
+
+
+def recorded(flown: Flown, world: World, columns: Sequence[str], rate_hz: float, name: str) -> Run:
+    """What the set's columns would hold of a flight, without noise; a column that a flight cannot give is left out."""
+    motion, k = flown.motion, world.vehicle.rotor_count
+    every = max(1, int(round(1.0 / (rate_hz * (motion.time_s[1] - motion.time_s[0])))))
+    specific_force, rates = motion.specific_force.copy(), motion.angular_velocity.copy()
+    for form, values in world.effects:
+        part = form.contribution(motion, world.vehicle, values)
+        specific_force += 0.0 if part.specific_force is None else part.specific_force
+        rates += 0.0 if part.angular_velocity is None else part.angular_velocity
+    arm = np.array(world.vehicle.accelerometer_position_m)
+    if arm.any():
+        w = motion.angular_velocity
+        specific_force += np.cross(motion.angular_acceleration, arm) + np.cross(w, np.cross(w, arm))
+    quaternion = Rotation.from_matrix(motion.rotation).as_quat(scalar_first=True)
+    given = {
+        (c.TIME,): motion.time_s[:, None],
+        c.rotor_columns("rotor_speed", k): motion.rotor_speed,
+        c.rotor_columns("rotor_command", k): flown.command_rad_s,
+        c.rotor_columns("throttle", k): flown.command_rad_s / world.full_speed_rad_s,
+        c.POSITION: motion.position,
+        c.VELOCITY: flown.world_velocity,
+        c.QUATERNION: quaternion,
+        c.ANGULAR_VELOCITY: rates,
+        c.SPECIFIC_FORCE: specific_force,
+        (c.HEIGHT,): motion.height[:, None],
+    }
+    if motion.voltage is not None:
+        given[(c.BATTERY_VOLTAGE,)] = motion.voltage[:, None]
+    table = {n: v[::every, i] for names, v in given.items() for i, n in enumerate(names) if n in (*columns, c.TIME)}
+    return Run(name, pd.DataFrame(table))

@@ -1,0 +1,256 @@
+"""A plan as files: trajectories for the vehicle's software, a picture, and what each outcome would mean.
+
+`trajectory.csv` is in the project's axes (north-east-down from the place of the start, heights as −z).
+`px4_offboard.csv` holds the fields of PX4's TrajectorySetpoint, which has the same axes. `crazyflie.csv` is a
+polynomial trajectory of seventh order as the Crazyflie's high-level commander takes it: x forward, y left, z up, yaw
+against the clock.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.io.text.writing import all_or_none, rounded
+from rotorid.plan import mission
+from rotorid.plan.by_hand import by_hand
+from rotorid.plan.plan import Plan
+from rotorid.plan.separation import Questions, Separation
+
+FILE_HZ = 100.0
+PIECES_AT_ONCE = 31
+"""Pieces that the trajectory memory of a Crazyflie (4096 bytes, 132 a piece) holds."""
+COARSEST_S, FINEST_S = 2.0, 0.1
+WORST_FIT_M, WORST_FIT_M_S2 = 0.01, 0.4
+"""Quick motions are millimetres large: that the path is met does not say that the acceleration is."""
+FLIP = np.array([1.0, -1.0, -1.0])
+"""North-east-down to forward-left-up."""
+
+
+def sampled(plan: Plan, rate_hz: float = FILE_HZ) -> pd.DataFrame:
+    """The reference in the project's axes: position, velocity, acceleration, yaw and its rate."""
+    reference, middle = plan.reference, plan.limits.middle_m
+    t = np.arange(0.0, reference.duration_s + 1e-9, 1.0 / rate_hz)
+    place = reference.position_m + np.array([middle[0], middle[1], -middle[2]])
+    velocity = np.gradient(place, reference.time_s, axis=0)
+    acceleration = np.gradient(velocity, reference.time_s, axis=0)
+    turning = np.gradient(reference.yaw_rad, reference.time_s)
+    table = {"time_s": t}
+    series = {"position": ("m", place), "velocity": ("m_s", velocity), "acceleration": ("m_s2", acceleration)}
+    for stem, (unit, values) in series.items():
+        for i, axis in enumerate("xyz"):
+            table[f"{stem}_{axis}_{unit}"] = np.interp(t, reference.time_s, values[:, i])
+    table["yaw_rad"] = np.interp(t, reference.time_s, reference.yaw_rad)
+    table["yaw_rate_rad_s"] = np.interp(t, reference.time_s, turning)
+    return pd.DataFrame(table)
+
+
+def px4_offboard(plan: Plan) -> pd.DataFrame:
+    """Setpoints in the fields of PX4's TrajectorySetpoint (local north-east-down frame, yaw from −π to π)."""
+    table = sampled(plan)
+    names = {"time_s": "timestamp_s", "yaw_rate_rad_s": "yawspeed"}
+    for stem in ("position", "velocity", "acceleration"):
+        unit = {"position": "m", "velocity": "m_s", "acceleration": "m_s2"}[stem]
+        names |= {f"{stem}_{axis}_{unit}": f"{stem}[{i}]" for i, axis in enumerate("xyz")}
+    out = table.rename(columns=names | {"yaw_rad": "yaw"})
+    out["yaw"] = (out["yaw"] + np.pi) % (2 * np.pi) - np.pi
+    return out
+
+
+def polynomial(start: np.ndarray, stop: np.ndarray, seconds: float) -> np.ndarray:
+    """Coefficients (8, k), lowest order first, that take value and three derivatives (4, k) from start to stop."""
+    powers = np.arange(8)
+
+    def row(order: int, t: float) -> np.ndarray:
+        factor = np.array([np.prod(np.arange(p, p - order, -1.0)) if p >= order else 0.0 for p in powers])
+        return factor * np.power(t, np.maximum(powers - order, 0))
+
+    matrix = np.array([row(o, 0.0) for o in range(4)] + [row(o, 1.0) for o in range(4)])
+    # In units of the piece's length the matrix is well conditioned.
+    scale = seconds ** np.arange(4)[:, None]
+    unit = np.linalg.solve(matrix, np.concatenate([start * scale, stop * scale]))
+    return unit / seconds ** powers[:, None]
+
+
+def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
+    """Polynomial pieces (`duration`, `x^0` … `yaw^7`) and the largest distance to the reference, m.
+
+    Pieces are as long as the fit allows (WORST_FIT_M, WORST_FIT_M_S2), between FINEST_S and COARSEST_S.
+    """
+    reference, middle = plan.reference, plan.limits.middle_m
+    t, step = reference.time_s, reference.time_s[1] - reference.time_s[0]
+    place = (reference.position_m + np.array([middle[0], middle[1], -middle[2]])) * FLIP
+    every = np.column_stack([place, -reference.yaw_rad])
+    derivatives = [every]
+    for _ in range(3):
+        derivatives.append(np.gradient(derivatives[-1], step, axis=0))
+    states = np.stack(derivatives, axis=1)
+    rows, worst, at = [], 0.0, 0
+    while at < len(t) - 1:
+        length = int(round(COARSEST_S / step))
+        while True:
+            end = min(at + length, len(t) - 1)
+            seconds = t[end] - t[at]
+            fitted = polynomial(states[at], states[end], seconds)
+            powers = np.power(t[at : end + 1, None] - t[at], np.arange(8))
+            off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
+            bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])
+            pushed = float(np.linalg.norm((bend - states[at : end + 1, 2])[:, :3], axis=1).max())
+            if (off <= WORST_FIT_M and pushed <= WORST_FIT_M_S2) or length <= FINEST_S / step:
+                break
+            length //= 2
+        worst, at = max(worst, off), end
+        rows.append([seconds, *fitted.T.ravel()])
+    names = ["duration", *(f"{axis}^{p}" for axis in ("x", "y", "z", "yaw") for p in range(8))]
+    return pd.DataFrame(rows, columns=names), worst
+
+
+def words_of(effect: str) -> str:
+    """An id in words."""
+    return catalogue()[effect].name if effect in catalogue() else {"nothing": "no further effect"}.get(effect, effect)
+
+
+def outcome(separation: Separation, target: float) -> str:
+    """What it would mean if one of the models came out."""
+    low, high = separation.interval_95
+    sure = "would be distinguished from" if separation.sigma >= target else "would probably not be distinguished from"
+    return (
+        f"If {words_of(separation.true)} is at work it {sure} its nearest rival, {words_of(separation.rival)}: "
+        f"{separation.sigma:.1f} standard errors ({low:.1f} to {high:.1f}); the recordings so far give "
+        f"{separation.so_far:.1f}."
+    )
+
+
+def questions_as_data(questions: Questions, target: float) -> list[dict]:
+    """Open questions with what each outcome would mean, for JSON; `target` is the separation that settles one."""
+    return [
+        {
+            "ids": list(ids),
+            "outcomes": [
+                {
+                    "true": s.true,
+                    "rival": s.rival,
+                    "sigma": s.sigma,
+                    "interval_95": list(s.interval_95),
+                    "so_far_sigma": s.so_far,
+                    "meaning": outcome(s, target),
+                }
+                for s in found
+            ],
+        }
+        for ids, found in questions
+    ]
+
+
+def summary(plan: Plan) -> dict:
+    """The plan as data, for `plan.json` and for pages."""
+    return rounded(
+        {
+            "set": plan.set,
+            "settles": plan.settles,
+            "duration_s": plan.duration_s,
+            "predicted_separation_sigma": plan.sigma,
+            "manoeuvres": [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in plan.pieces],
+            "questions": questions_as_data(plan.questions, plan.limits.target_sigma),
+            "intervals": [
+                {"name": w.name, "unit": w.unit, "half_width_before": w.before, "half_width_after": w.after}
+                | ({"wished": w.wished} if w.wished else {})
+                for w in plan.widths
+            ],
+            "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
+            "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
+            "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
+            "limits": plan.limits.model_dump(mode="json"),
+        }
+    )
+
+
+def text(plan: Plan) -> list[str]:
+    """The plan in sentences, for the screen and for a page."""
+    out = []
+    if plan.pieces:
+        out.append(f"Fly for {plan.duration_s:.0f} s (without take-off and landing):")
+        out += [f"  {line}" for line in steps(plan)]
+    elif plan.questions:
+        out.append("No manoeuvre within the limits separates what is open any further.")
+    for _, found in plan.questions:
+        out += [outcome(s, plan.limits.target_sigma) for s in found]
+    if plan.sigma is not None and not plan.settles:
+        out.append(
+            f"Not all would be settled: the smallest separation is {plan.sigma:.1f} standard errors of "
+            f"{plan.limits.target_sigma:g}. More time, speed, tilt or room in the limits may do it."
+        )
+    out += [
+        f"{w.name}: ± {share(w.before, w.unit)} now, ± {share(w.after, w.unit)} with this flight"
+        + (f" (wished: {share(w.wished, w.unit)})" if w.wished else "")
+        for w in plan.widths
+    ]
+    for ids, what in plan.unanswerable:
+        out.append(f"No flight with these columns tells {' or '.join(words_of(i) for i in ids)}: {what}.")
+    if not out:
+        out.append("Nothing is open: no flight is needed to tell effects apart.")
+    return out + in_words(plan)
+
+
+def open_ids(plan: Plan) -> list[tuple[str, ...]]:
+    """Ids of every class that is open, whether a flight can settle it or not."""
+    return [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
+
+
+def in_words(plan: Plan) -> list[str]:
+    """Manual steps, as sentences."""
+    steps = dict.fromkeys(step for ids in open_ids(plan) for step in by_hand(ids))
+    return [f"By hand: {step}." for step in steps]
+
+
+def steps(plan: Plan) -> list[str]:
+    """The manoeuvres in their order, one that is flown several times in a row once."""
+    out, at = [], 0
+    while at < len(plan.pieces):
+        piece = plan.pieces[at]
+        times = 1
+        while at + times < len(plan.pieces) and plan.pieces[at + times] is piece:
+            times += 1
+        number = str(at + 1) if times == 1 else f"{at + 1} to {at + times}"
+        out.append(f"{number}. {piece.words} ({f'{times} × ' if times > 1 else ''}{piece.duration_s:.0f} s)")
+        at += times
+    return out
+
+
+def share(value: float, unit: str) -> str:
+    """A half width with its unit; relative ones in percent."""
+    return f"{100 * value:.2g} %" if unit == "relative" else f"{value:.2g} {unit if unit != '1' else ''}".rstrip()
+
+
+def write(plan: Plan, folder: Path) -> list[Path]:
+    """Write everything; returns the files. Nothing is left half written."""
+    names = ["plan.json"]
+    if plan.pieces:
+        names += ["trajectory.csv", "px4_offboard.csv", "crazyflie.csv", "plan.png"]
+    why = mission.not_a_mission(plan)
+    if plan.pieces and not why:
+        names.append("px4_mission.plan")
+    paths = [folder / name for name in names]
+    with all_or_none(*paths) as parts:
+        content = summary(plan)
+        if plan.pieces:
+            sampled(plan).to_csv(parts[1], index=False, float_format="%.6g", lineterminator="\n")
+            px4_offboard(plan).to_csv(parts[2], index=False, float_format="%.6g", lineterminator="\n")
+            table, worst = crazyflie(plan)
+            table.to_csv(parts[3], index=False, float_format="%.9g", lineterminator="\n")
+            content["crazyflie"] = rounded(
+                {"pieces": len(table), "uploads": -(-len(table) // PIECES_AT_ONCE), "worst_fit_m": worst}
+            )
+            from rotorid.plan.picture import draw
+
+            draw(plan, parts[4])
+            content["px4_mission"] = why or "px4_mission.plan"
+            if not why:
+                parts[5].write_text(json.dumps(mission.mission(plan), indent=1) + "\n", encoding="utf-8")
+        parts[0].write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return paths

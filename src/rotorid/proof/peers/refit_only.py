@@ -1,8 +1,0 @@
-"""Refit only: believed values re-estimated, nothing new in the model. What most identification tools do."""
-
-from rotorid.proof.peers.problem import Answer, Problem, answer_of
-
-
-def ask(problem: Problem) -> Answer:
-    """Values beyond three sigma; no physics, ever."""
-    return answer_of(problem, {}, [])

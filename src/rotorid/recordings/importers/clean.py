@@ -1,0 +1,79 @@
+"""Repairs that every importer needs: repeated clock values, held samples, the part of a log in the air."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from rotorid.recordings.columns import TIME
+from rotorid.recordings.importers.report import Fault
+
+
+def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
+    """Rows whose time is not later than every row before are left out and reported."""
+    time = table[TIME].to_numpy(float)
+    latest = np.maximum.accumulate(np.where(np.isnan(time), -np.inf, time))
+    keep = ~np.isnan(time) & (np.concatenate([[-np.inf], latest[:-1]]) < time)
+    lost = int((~keep).sum())
+    if not lost:
+        return table, []
+    first = float(time[np.flatnonzero(~keep)[0]])
+    fault = Fault(
+        "repeated_time",
+        TIME,
+        f"{lost} rows do not move the clock on (first at {first:.6g} s)",
+        "left out",
+        lost,
+    )
+    return table[keep].reset_index(drop=True), [fault]
+
+
+def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[Fault]:
+    """A fault where the clock steps by more than `factor` times its median step; nothing is filled in."""
+    steps = np.diff(table[TIME].to_numpy(float))
+    long = steps > factor * np.median(steps)
+    if not long.any():
+        return []
+    found = f"{int(long.sum())} gaps longer than {factor:g} samples, the longest {steps.max():.3g} s"
+    return [Fault("gap", TIME, found, "left as a gap", int(long.sum()))]
+
+
+def blank_held(
+    table: pd.DataFrame, groups: dict[str, list[str]], share: float = 0.1
+) -> tuple[pd.DataFrame, list[Fault]]:
+    """Empty the repeats of sample-and-hold groups of columns.
+
+    A logger that runs faster than a sensor writes the last reading again and again. Where more than `share`
+    of the rows repeat every column of a group, those repeats are not measurements: they become empty cells,
+    which the contract calls missing samples. Rows that hold nothing but the time then go.
+    """
+    table, faults = table.copy(), []
+    for name, columns in groups.items():
+        columns = [c for c in columns if c in table.columns]
+        if not columns:
+            continue
+        values = table[columns].to_numpy(float)
+        same = np.zeros(len(table), bool)
+        same[1:] = (values[1:] == values[:-1]).all(axis=1)
+        if same.mean() <= share:
+            continue
+        table.loc[same, columns] = np.nan
+        rate = (~same).sum() / (table[TIME].iloc[-1] - table[TIME].iloc[0])
+        found = f"{name} repeats its last value in {same.mean():.0%} of the rows (new values at {rate:.3g} Hz)"
+        faults.append(Fault("held", ", ".join(columns), found, "repeats made empty cells", int(same.sum())))
+    empty = table.drop(columns=TIME).isna().all(axis=1)
+    return table[~empty].reset_index(drop=True), faults
+
+
+def true_stretches(mask: np.ndarray, time_s: np.ndarray, shortest_s: float) -> list[tuple[float, float]]:
+    """Start and stop times of every stretch of True that lasts at least `shortest_s`."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, int), [0]])))
+    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
+    return [(float(time_s[a]), float(time_s[b])) for a, b in pairs if time_s[b] - time_s[a] >= shortest_s]
+
+
+def cut(table: pd.DataFrame, start_s: float, stop_s: float) -> pd.DataFrame:
+    """Rows from start to stop, the clock set to zero at the first of them."""
+    time = table[TIME]
+    part = table[(time >= start_s) & (time <= stop_s)].reset_index(drop=True)
+    return part.assign(**{TIME: part[TIME] - part[TIME].min()})

@@ -1,0 +1,193 @@
+"""Crazyflie flights from decoded uSD logs (`crazyflie_usd`): columns, frames and the part in the air.
+
+The firmware's frames: body forward-left-up, world z up (north-west-up), quaternion body to world. Rotors:
+1 front right (ccw), 2 rear right (cw), 3 rear left (ccw), 4 front left (cw); the joint regression of the
+recorded moments on the squared speeds confirms this order. Gyroscopes log degrees per second, accelerometers
+multiples of 9.81 m/s², motors fractions of 65,536.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from rotorid.errors import InputError
+from rotorid.recordings import columns as c
+from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.crazyflie_usd import read_usd_log
+from rotorid.recordings.importers.frames import continuous, half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.in_the_air import airborne, stretches_of
+from rotorid.recordings.importers.report import Fault
+
+STANDARD_GRAVITY_M_S2 = 9.81
+"""The firmware's g: accelerometer logs are in multiples of this."""
+FULL_SCALE = 65536.0
+RPM = 2 * np.pi / 60
+ROTORS = range(1, 5)
+SPEEDS = list(c.rotor_columns("rotor_speed", 4))
+THROTTLES = list(c.rotor_columns("throttle", 4))
+
+
+def _axes(table: pd.DataFrame, prefix: str, axes: str = "xyz") -> np.ndarray | None:
+    names = [prefix + a for a in axes]
+    return table[names].to_numpy(float) if set(names) <= set(table.columns) else None
+
+
+def attitude_without_pitch(
+    specific_force_world_g: np.ndarray, roll_rad: np.ndarray, yaw_rad: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Attitude and specific force of a log that holds roll and yaw but no pitch (FLU, z up).
+
+    Takes the pitch that leaves no specific force along body x, which is right as far as the thrust is along
+    body z and air drag is small. Returns quaternions (n, 4), scalar first, and body specific force (n, 3) in
+    g; its x component is zero by construction and so no measurement.
+    """
+    level = Rotation.from_euler("Z", yaw_rad[:, None]).inv().apply(specific_force_world_g)
+    pitch = np.arctan2(level[:, 0], level[:, 2])
+    attitude = Rotation.from_euler("ZYX", np.column_stack([yaw_rad, pitch, roll_rad]))
+    return attitude.as_quat()[:, [3, 0, 1, 2]], attitude.inv().apply(specific_force_world_g)
+
+
+def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
+    """Contract columns of the table `fixedFrequency` of a uSD log, the whole log with its own clock."""
+    columns: dict[str, np.ndarray] = {c.TIME: log["time_s"].to_numpy(float)}
+    faults: list[Fault] = []
+
+    def put(names, values):
+        columns.update(zip(names, values.T, strict=True))
+
+    position, velocity = _axes(log, "stateEstimate."), _axes(log, "stateEstimate.v")
+    if position is not None:
+        put(c.POSITION, half_turn_about_x(position))
+    if velocity is not None:
+        put(c.VELOCITY, half_turn_about_x(velocity))
+    quaternion = _axes(log, "stateEstimate.q", "wxyz")
+    estimate = _axes(log, "stateEstimate.a")
+    if quaternion is not None:
+        put(c.QUATERNION, quaternion_to_frd_ned(quaternion))
+    elif estimate is not None and {"stateEstimate.roll", "stateEstimate.yaw"} <= set(log.columns):
+        roll, yaw = np.radians(log[["stateEstimate.roll", "stateEstimate.yaw"]].to_numpy(float)).T
+        quaternion, force_g = attitude_without_pitch(estimate + [0, 0, 1], roll, yaw)
+        put(c.QUATERNION, continuous(quaternion_to_frd_ned(quaternion)))
+        force = half_turn_about_x(force_g) * STANDARD_GRAVITY_M_S2
+        put(c.SPECIFIC_FORCE[1:], force[:, 1:])
+        faults.append(
+            Fault(
+                "no_pitch",
+                ", ".join(c.QUATERNION),
+                "pitch is not recorded",
+                "taken from the direction of the estimated acceleration; specific force along x left out",
+                len(log),
+            )
+        )
+    gyro, acceleration = _axes(log, "gyro."), _axes(log, "acc.")
+    if gyro is not None:
+        put(c.ANGULAR_VELOCITY, half_turn_about_x(np.radians(gyro)))
+    if acceleration is not None:
+        put(c.SPECIFIC_FORCE, half_turn_about_x(acceleration) * STANDARD_GRAVITY_M_S2)
+    output = [f"pwm.m{i}_pwm" for i in ROTORS]
+    request = [f"motor.m{i}" for i in ROTORS]
+    drive = output if set(output) <= set(log.columns) else request
+    if set(drive) <= set(log.columns):
+        put(THROTTLES, log[drive].to_numpy(float) / FULL_SCALE)
+        if drive is output and set(request) <= set(log.columns):
+            put([f"thrust_request_{i}" for i in ROTORS], log[request].to_numpy(float) / FULL_SCALE)
+    speeds = [f"rpm.m{i}" for i in ROTORS]
+    if set(speeds) <= set(log.columns):
+        put(SPEEDS, log[speeds].to_numpy(float) * RPM)
+    if "pm.vbatMV" in log:
+        columns[c.BATTERY_VOLTAGE] = log["pm.vbatMV"].to_numpy(float) / 1000
+    table, repeated = drop_repeated_times(pd.DataFrame(columns))
+    return table, faults + repeated
+
+
+def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0) -> list[tuple[float, float]]:
+    """Start and stop of every flight in a log: motors above 30 % and, where known, 0.1 m off the ground.
+
+    The public recordings are cut so, with a second at each end, wherever a log begins or ends.
+    """
+    flying = table[THROTTLES].mean(axis=1).to_numpy() > 0.3
+    if "position_z_m" in table:
+        flying &= -table["position_z_m"].to_numpy() > 0.1
+    time = table[c.TIME].to_numpy()
+    return [(a + margin_s, b - margin_s) for a, b in true_stretches(flying, time, shortest_s)]
+
+
+def flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
+    """Start and stop of every flight of a log by the detector of all importers, take-off and landing left out."""
+    height = {} if "position_z_m" not in table else {c.HEIGHT: -table["position_z_m"]}
+    flying, _ = airborne(table.assign(**height))
+    return stretches_of(table[c.TIME].to_numpy(float), flying)
+
+
+def sensor_faults(table: pd.DataFrame) -> list[Fault]:
+    """Faults of rotor-speed sensors and a battery reading that never moves; values stay as recorded."""
+    faults = []
+    for name, throttle in zip(SPEEDS, THROTTLES, strict=True):
+        if name not in table:
+            continue
+        lost = (table[name] == 0) & (table[throttle] > 0.1)
+        if lost.mean() > 0.001:
+            found = f"speed reads 0 in {lost.mean():.1%} of the samples while the motor is driven"
+            faults.append(Fault("speed_dropout", name, found, "kept as recorded", int(lost.sum())))
+    if c.BATTERY_VOLTAGE in table and table[c.BATTERY_VOLTAGE].nunique() == 1:
+        found = f"reads {table[c.BATTERY_VOLTAGE].iloc[0]:g} V throughout: not measured"
+        faults.append(Fault("stuck", c.BATTERY_VOLTAGE, found, "column left out", len(table)))
+    return faults
+
+
+def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.DataFrame, list[Fault]]:
+    """One flight of a converted log: cut, held samples emptied, sensor faults flagged."""
+    run = cut(table, start_s, stop_s)
+    if len(run) < 2:
+        raise InputError(f"no samples from {start_s:g} to {stop_s:g} s")
+    faults = sensor_faults(run)
+    if any(f.kind == "stuck" for f in faults):
+        run = run.drop(columns=c.BATTERY_VOLTAGE)
+    gaps = report_gaps(run)
+    groups = {
+        "state estimate": [*c.POSITION, *c.VELOCITY, *c.QUATERNION],
+        "battery voltage": [c.BATTERY_VOLTAGE],
+    }
+    if c.ANGULAR_VELOCITY[0] not in run:  # roll and yaw then come with every sample
+        groups["state estimate"] = [*c.POSITION, *c.VELOCITY]
+    run, held = blank_held(run, groups)
+    return run, faults + gaps + held
+
+
+def flights(
+    path: Path,
+    prefix: str | None = None,
+    stretches: list[tuple[float, float]] | None = None,
+    detect: Callable[[pd.DataFrame], list[tuple[float, float]]] = flown_stretches,
+) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    """Every flight of a uSD log by name (`prefix`, default the file's), and the faults of log and flights.
+
+    `stretches` (start and stop, s) in place of what `detect` finds to be in the air. InputError where the log holds no
+    event `fixedFrequency` or the vehicle never flies.
+    """
+    path = Path(path)
+    prefix = prefix or path.name.split(".")[0]
+    tables, faults = read_usd_log(path)
+    if "fixedFrequency" not in tables:
+        raise InputError(f"{path}: no event fixedFrequency in this log, found {', '.join(tables) or 'none'}")
+    table, more = convert(tables["fixedFrequency"])
+    missing = [name for name in THROTTLES if name not in table]
+    if missing and not stretches:
+        raise InputError(f"{path}: motor.m1 to motor.m4 are not logged, so that nothing tells when the vehicle flies")
+    stretches = stretches or detect(table)
+    if not stretches:
+        raise InputError(f"{path}: the vehicle never flies for 4 s in this log")
+    runs: dict[str, pd.DataFrame] = {}
+    faults = [*faults, *more]
+    for number, (start, stop) in enumerate(stretches):
+        run, found = flight_run(table, start, stop)
+        label = prefix if len(stretches) == 1 else f"{prefix}_{number + 1}"
+        flown = Fault("cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0)
+        runs[label] = run
+        faults += [f.in_run(label) for f in (flown, *found)]
+    return runs, faults

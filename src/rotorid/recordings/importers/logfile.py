@@ -1,0 +1,177 @@
+"""Any log that rotorid knows, recognised by its first bytes, as flights in contract columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from rotorid.errors import InputError
+from rotorid.io.text.bounds import LARGEST_FILE
+from rotorid.io.text.files import check_file
+from rotorid.io.text.wording import printable
+from rotorid.recordings import columns as c
+from rotorid.recordings.importers import (
+    ardupilot,
+    betaflight,
+    crazyflie,
+    in_the_air,
+    neurobem,
+    px4_ulog,
+    rcbenchmark,
+    ros,
+)
+from rotorid.recordings.importers.known import Known, px4_vehicle
+from rotorid.recordings.importers.mapping import Mapping, read_by_mapping
+from rotorid.recordings.importers.readers import limited, silent
+from rotorid.recordings.importers.report import Fault
+
+GZIP = b"\x1f\x8b"
+BY_FIRST_BYTES = (
+    (b"H Product:Blackbox", "betaflight"),
+    (b"\xa3\x95", "ardupilot"),
+    (b"#ROSBAG V2.0", "ros"),
+    (b"\x89MCAP0", "ros"),
+    (b"SQLite format 3", "ros"),
+)
+TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
+"""Template vehicle that supplies what a log of an autopilot or format does not say."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Flights of one log by name, in contract columns, with what was found on the way."""
+
+    format: str
+    runs: dict[str, pd.DataFrame]
+    faults: tuple[Fault, ...]
+    axes: str
+    known: Known = Known("")
+    kind: str = "flight"
+    speed_unit: str = "rad/s"
+    """Unit in which the log states rotor speeds."""
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is the folder of a ROS 2 bag (`metadata.yaml` next to its .db3 or .mcap), and no recording set."""
+    return (path / "metadata.yaml").is_file() and not (path / "vehicle.yaml").is_file()
+
+
+def files_of(path: Path) -> dict[str, Path]:
+    """The files of a log by name: itself, or all that lie in the folder of a bag."""
+    if not path.is_dir():
+        return {path.name: path}
+    return {f"{path.resolve().name}/{p.name}": p for p in sorted(path.iterdir()) if p.is_file()}
+
+
+def format_of(path: Path) -> str:
+    """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
+
+    InputError for what is none of them.
+    """
+    if path.is_dir():
+        if is_bag(path):
+            return "ros"
+        raise InputError(f"{path}: expected a log, found a folder (that of a ROS 2 bag has a metadata.yaml)")
+    check_file(path)
+    with open(path, "rb") as file:
+        head = file.read(4096)
+    if not head:
+        raise InputError(f"{path}: the file is empty")
+    if head.startswith(b"ULog\x01\x12\x35"):
+        return "px4"
+    if head[0] == 0xBC:
+        return "crazyflie"
+    if head.startswith(GZIP):
+        return "csv"
+    if head.startswith(b"PAR1"):
+        return "parquet"
+    for start, name in BY_FIRST_BYTES:
+        if head.startswith(start):
+            return name
+    if path.suffix.lower() == ".mat":
+        return "neurobem"
+    text = head.decode("utf-8", errors="replace")
+    if "\0" in text:
+        raise InputError(
+            f"{path}: not a log that rotorid knows (PX4 ULog, Betaflight, ArduPilot, ROS bag, MCAP, Crazyflie uSD, "
+            "NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
+        )
+    return "rcbenchmark" if "ESC signal" in text and "Thrust" in text else "csv"
+
+
+def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
+    """Every flight in a log; InputError in one sentence where the file holds none."""
+    path = Path(path)
+    kind = format_of(path)
+    if kind != "ros" and (size := path.stat().st_size) > LARGEST_FILE:  # a bag's pictures are not read
+        raise InputError(f"{path}: has {size / 1e6:.0f} MB, expected at most {LARGEST_FILE / 1e6:.0f} MB")
+    try:
+        with limited(path), silent():
+            return _read(path, kind, mapping)
+    except InputError as error:
+        said = printable(error)  # it may quote what stands in the file
+        raise InputError(said if said.startswith(str(path)) else f"{path}: {said}") from None
+
+
+def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
+    if kind == "px4":
+        return _px4(path)
+    if kind == "crazyflie":
+        return _crazyflie(path)
+    if kind == "betaflight":
+        runs, faults = betaflight.read_betaflight(path)
+        axes = "body forward-left-up, turned by half a turn about x into FRD"
+        return Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm")
+    if kind == "ardupilot":
+        runs, faults, order = ardupilot.read_ardupilot(path)
+        axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
+        return Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm")
+    if kind == "ros":
+        runs, faults, unit = ros.read_ros(path)
+        axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
+        return Imported(kind, runs, tuple(faults), axes, speed_unit=unit)
+    if kind == "neurobem":
+        table, faults = neurobem.read_neurobem(path)
+        return Imported(kind, {path.stem: table}, tuple(faults), "NeuroBEM's, turned into FRD and NED")
+    if kind == "rcbenchmark":
+        table, faults = rcbenchmark.read_rcbenchmark(path)
+        axes = "thrust along -z of the body"
+        return Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
+    table, faults, axes = read_by_mapping(path, mapping)
+    runs, cuts = _in_the_air(table, _stem(path), path)
+    speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
+    unit = (speeds.unit if speeds else "") or "rad/s"
+    return Imported(kind, runs, (*faults, *cuts), axes, speed_unit=unit)
+
+
+def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    """The flights of a table in contract columns; the table as it is where all of it is in the air, or of a stand."""
+    if set(table) & {*c.FORCE, *c.MOMENT}:
+        return {name: table}, []
+    flying, _ = in_the_air.airborne(table)
+    return ({name: table}, []) if flying.all() else in_the_air.flights(table, flying, name, path)
+
+
+def _stem(path: Path) -> str:
+    return path.name.removesuffix(".gz").rsplit(".", 1)[0]
+
+
+def _px4(path: Path) -> Imported:
+    log = px4_ulog.open_log(path)
+    try:
+        rotors = px4_ulog.rotor_count(log)
+        converted = px4_ulog.convert(log, rotors)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    known, faults = px4_vehicle(log.parameters, rotors)
+    runs, cuts = in_the_air.flights(converted.table, converted.flying, path.stem, path)
+    axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
+    return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known, speed_unit="rpm")
+
+
+def _crazyflie(path: Path) -> Imported:
+    runs, faults = crazyflie.flights(path)
+    axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
+    return Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")

@@ -1,0 +1,262 @@
+"""Any table (CSV or Parquet) as a run, by a mapping file that says what its columns are.
+
+A mapping names columns, units and frames::
+
+    body: flu              # frd | flu            axes of accelerometer, gyroscope and attitude
+    world: enu             # ned | enu | nwu      axes of position and velocity, and what the attitude refers to
+    channels:
+      time: {columns: [t], unit: us}
+      specific_force: {columns: [ax, ay, az], unit: g}
+      attitude: {columns: [qx, qy, qz, qw], form: xyzw}       # wxyz | xyzw | euler (roll, pitch, yaw)
+      velocity: {columns: [vx, vy, vz], unit: m/s, axes: body}  # world (default) | body
+      throttle: {columns: [m1, m2, m3, m4], unit: us, range: [1000, 2000]}
+    keep: [wind_sensor]    # other columns, kept under their own names
+
+A value that is `?` is a question left open: nothing is imported until it is answered.
+`rotorid.recordings.importers.guessing` proposes such a mapping from the names of the columns and from what stands in
+them.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, ValidationError
+from scipy.spatial.transform import Rotation
+
+from rotorid.errors import InputError
+from rotorid.io.text.files import read_yaml
+from rotorid.io.text.wording import explain
+from rotorid.recordings import columns as c
+from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
+from rotorid.recordings.importers.frames import continuous
+from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
+
+G = 9.80665
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048},
+    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+    "rate": {"rad/s": 1.0, "deg/s": np.pi / 180},
+    "angle": {"rad": 1.0, "deg": np.pi / 180},
+    "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000},
+    "rotor": {"rad/s": 1.0, "rpm": np.pi / 30, "hz": 2 * np.pi},
+    "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
+    "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
+    "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2},
+    "temperature": {"degC": 1.0},
+}
+CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "time": ("time", (c.TIME,)),
+    "position": ("length", c.POSITION),
+    "velocity": ("velocity", c.VELOCITY),
+    "attitude": ("angle", c.QUATERNION),
+    "angular_velocity": ("rate", c.ANGULAR_VELOCITY),
+    "specific_force": ("acceleration", c.SPECIFIC_FORCE),
+    "rotor_speed": ("rotor", ()),
+    "rotor_command": ("rotor", ()),
+    "throttle": ("share", ()),
+    "height": ("length", (c.HEIGHT,)),
+    "battery_voltage": ("voltage", (c.BATTERY_VOLTAGE,)),
+    "battery_current": ("current", (c.BATTERY_CURRENT,)),
+    "temperature": ("temperature", (c.TEMPERATURE,)),
+}
+"""Channels of a mapping: kind of unit and columns of the contract (none: one a rotor)."""
+BODY = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0])}
+"""Body axes as columns in forward-right-down."""
+WORLD = {
+    "ned": np.eye(3),
+    "nwu": np.diag([1.0, -1.0, -1.0]),
+    "enu": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+}
+"""World axes as columns in north-east-down."""
+
+
+class Channel(BaseModel):
+    """Columns that make one channel."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    columns: tuple[str, ...]
+    unit: str = ""
+    form: Literal["wxyz", "xyzw", "euler", "?"] = "wxyz"
+    """Attitude only."""
+    axes: Literal["world", "body", "?"] = "world"
+    """Velocity only."""
+    range: tuple[float, float] | None = None
+    """Throttle only: readings of no and of full throttle."""
+
+
+class Mapping(BaseModel):
+    """What the columns of a table are."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    body: Literal["frd", "flu", "?"] = "frd"
+    world: Literal["ned", "enu", "nwu", "?"] = "ned"
+    channels: dict[str, Channel]
+    keep: tuple[str, ...] = ()
+
+
+OPEN = "?"
+"""What stands for an answer that only a person can give."""
+
+
+def open_questions(mapping: Mapping) -> list[str]:
+    """What of a mapping is still `?`, each with what is expected there."""
+    found = [f"{key} ({' or '.join(known)})" for key, known in (("body", BODY), ("world", WORLD))
+             if getattr(mapping, key) == OPEN]  # fmt: skip
+    for name, channel in mapping.channels.items():
+        if OPEN in channel.columns:
+            found.append(f"channels.{name}.columns (a column's name)")
+        if channel.unit == OPEN:
+            known = UNITS[CHANNELS[name][0]] if name in CHANNELS else ()
+            found.append(f"channels.{name}.unit ({' or '.join(known)})")
+        if channel.form == OPEN:
+            found.append(f"channels.{name}.form (wxyz, xyzw or euler)")
+        if channel.axes == OPEN:
+            found.append(f"channels.{name}.axes (world or body)")
+    return found
+
+
+def check_answered(mapping: Mapping, where: object) -> None:
+    """InputError where a mapping still holds a question."""
+    if found := open_questions(mapping):
+        raise InputError(
+            f"{where}: still open ({OPEN}): {'; '.join(found)}; write the answer in its place, or remove the channel"
+        )
+
+
+def read_mapping(path: Path) -> Mapping:
+    """A mapping file; InputError names what does not fit, and what is still open."""
+    try:
+        mapping = Mapping.model_validate(read_yaml(Path(path)))
+    except ValidationError as error:
+        raise InputError(f"{path}: {explain(error, Mapping)}") from None
+    check_answered(mapping, path)
+    for name, channel in mapping.channels.items():
+        if name not in CHANNELS:
+            raise InputError(f"{path}: channels: {name}: no such channel{_near(name, CHANNELS)}")
+        known = UNITS[CHANNELS[name][0]]
+        if channel.unit and channel.unit not in known:
+            raise InputError(f"{path}: {name}: unit {channel.unit!r}, expected one of {', '.join(known)}")
+        wanted = len(CHANNELS[name][1])
+        if name == "attitude":
+            wanted = 3 if channel.form == "euler" else 4
+        if wanted and len(channel.columns) != wanted:
+            raise InputError(f"{path}: {name}: {len(channel.columns)} columns, expected {wanted}")
+    if "time" not in mapping.channels:
+        raise InputError(f"{path}: channels: time is missing")
+    return mapping
+
+
+def _near(name: str, names) -> str:
+    near = get_close_matches(name, list(names), 1, 0.5)
+    return f"; did you mean {near[0]}?" if near else f"; there are: {', '.join(names)}"
+
+
+def read_columns(path: Path) -> pd.DataFrame:
+    """The cells of a CSV or Parquet file, numbers or text; InputError where it is no table."""
+    path = Path(path)
+    table = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path, foreign=True)
+    if len(table.columns) < 2 or len(table) < 2:
+        raise InputError(
+            f"{path}: expected a table of numbers with a heading, found {len(table.columns)} columns and "
+            f"{len(table)} rows"
+        )
+    return table
+
+
+def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, list[Fault], str]:
+    """A table in contract columns, its faults and its axes in words.
+
+    Without a mapping the columns must have the contract's names; InputError says how to get a mapping.
+    """
+    raw = read_columns(path)
+    if mapping is None:
+        if c.TIME in raw.columns and sum(c.is_known(n) for n in raw.columns) > 1:
+            return *_clocked(numbers(raw, path), path), "the contract's: the columns have its names"
+        raise InputError(
+            f"{path}: the columns ({', '.join(raw.columns[:6])}, …) are not named as the recording contract has them; "
+            f"`rotorid import {path.name} --write-mapping mapping.yaml` proposes what each one is"
+        )
+    table, faults = convert(raw, mapping, str(path))
+    return table, faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
+
+
+def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[Fault]]:
+    """Contract columns of a table by a mapping; InputError names a column that is not there or no numbers."""
+    check_answered(mapping, f"the mapping of {where}")
+    body, world = BODY[mapping.body], WORLD[mapping.world]
+    out: dict[str, np.ndarray] = {}
+    rotation = None
+    order = sorted(mapping.channels, key=lambda n: n != "attitude")
+    for name in order:
+        channel = mapping.channels[name]
+        values = _numbers(raw, channel.columns, name, where)
+        kind, columns = CHANNELS[name]
+        if name == "throttle" and channel.range is not None:
+            low, high = channel.range
+            values = np.clip((values - low) / (high - low), 0, 1)
+        elif not (name == "attitude" and channel.form != "euler"):
+            values = values * UNITS[kind].get(channel.unit, 1.0)
+        if name == "attitude":
+            rotation, values = _attitude(values, channel.form, body, world)
+        elif name in ("angular_velocity", "specific_force"):
+            values = values @ body.T
+        elif name == "position":
+            values = values @ world.T
+        elif name == "velocity" and channel.axes == "world":
+            values = values @ world.T
+        elif name == "velocity":
+            if rotation is None:
+                raise InputError(f"{where}: velocity in body axes needs an attitude to be turned into the world")
+            known = np.isfinite(values).all(axis=1) & np.isfinite(rotation).all(axis=1)
+            turned = np.full_like(values, np.nan)
+            turn = Rotation.from_quat(rotation[known][:, [1, 2, 3, 0]])
+            turned[known] = turn.apply(values[known] @ body.T)
+            values = turned
+        if not columns:
+            columns = c.rotor_columns(name, len(channel.columns))
+        out.update(zip(columns, values.T, strict=True))
+    for name in mapping.keep:
+        out[name] = _numbers(raw, (name,), "keep", where)[:, 0]
+    out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
+    return _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
+
+
+def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[Fault]]:
+    """The rows that move the clock on, and what is wrong with the others; InputError where the clock was set."""
+    known = table[c.TIME].notna().to_numpy()
+    if known.all() and (jumped := clock_jump(table[c.TIME].to_numpy(float), str(where))):
+        raise InputError(jumped)
+    table, faults = drop_repeated_times(table)
+    if len(table) < 2:
+        raise InputError(f"{where}: {c.TIME} moves on in {len(table)} of {len(known)} rows, expected at least two")
+    return table, faults + report_gaps(table)
+
+
+def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> np.ndarray:
+    for name in columns:
+        if name not in raw.columns:
+            raise InputError(f"{where}: {channel} wants column {name!r}, which is not there{_near(name, raw.columns)}")
+    return numbers(raw[list(dict.fromkeys(columns))], where)[list(columns)].to_numpy(float)
+
+
+def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing. Twice, as `convert` takes it."""
+    out = np.full((len(values), 4), np.nan)
+    known = np.isfinite(values).all(axis=1)
+    if form == "euler":
+        turn = Rotation.from_euler("ZYX", values[known][:, [2, 1, 0]])
+    else:
+        known &= np.linalg.norm(np.nan_to_num(values), axis=1) > 0
+        turn = Rotation.from_quat(values[known] if form == "xyzw" else values[known][:, [1, 2, 3, 0]])
+    turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
+    out[known] = continuous(turn.as_quat()[:, [3, 0, 1, 2]])
+    return out, out

@@ -1,0 +1,396 @@
+"""PX4 flight logs (ULog) through pyulog.
+
+PX4's frames are the contract's: body forward-right-down, world north-east-down, quaternion scalar first.
+Each topic has its own clock; a run is laid out on the times of the fastest inertial topic and each other
+value stands in the row nearest in time, so nothing is interpolated.
+
+What PX4 marks as invalid is a missing sample: positions and velocities by `xy_valid`, `z_valid`, `v_xy_valid`,
+`v_z_valid`, the height by `dist_bottom_valid`, a speed controller by `esc_online_flags`, a battery by `connected`,
+a current of -1. Position, velocity and attitude are the flight controller's estimates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from pyulog import ULog
+
+from rotorid.errors import InputError
+from rotorid.io.text.wording import printable
+from rotorid.recordings import columns as c
+from rotorid.recordings.importers import in_the_air
+from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
+from rotorid.recordings.importers.frames import continuous
+from rotorid.recordings.importers.report import Fault
+
+RPM = 2 * np.pi / 60
+FIRST_MOTOR = 101
+"""Number of motor 1 among PX4's output functions."""
+ROTORS_OF_TYPE = {2: 4, 13: 6, 14: 8, 15: 3, 29: 12}
+"""Rotors by MAV_TYPE; only multirotors are known here."""
+OTHER_TYPES = {1: "a fixed wing", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
+OTHER_TYPES |= {n: "a VTOL" for n in range(19, 26)}
+PULSE_US = (1000.0, 2000.0)
+"""Pulse widths of no and full throttle where no parameter states them."""
+PLAUSIBLE_PULSE_US = (500.0, 2500.0)
+AROUND_RESET_S = 0.2
+ARMED = 2
+
+Topics = Mapping[str, Sequence[Mapping[str, np.ndarray]]]
+
+
+@dataclass(frozen=True)
+class Px4Log:
+    """What is read of a log: instances of each topic in order, parameters at the start, seconds lost, damage."""
+
+    topics: Topics
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    lost_s: tuple[float, ...] = ()
+    damaged: bool = False
+
+
+@dataclass(frozen=True)
+class Converted:
+    """A whole log in contract columns.
+
+    `flying` (n,) says in which rows the vehicle is in the air, as far as the log tells.
+    """
+
+    table: pd.DataFrame
+    faults: list[Fault]
+    flying: np.ndarray
+
+
+def open_log(path: Path) -> Px4Log:
+    """Read a ULog file; InputError where it is none."""
+    if not Path(path).is_file():
+        raise InputError(f"{path}: file is missing")
+    try:
+        log = ULog(str(path))
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise InputError(f"{path}: not a ULog file that can be read ({printable(error)[:150]})") from None
+    topics: dict[str, list[Mapping[str, np.ndarray]]] = {}
+    for dataset in sorted(log.data_list, key=lambda d: d.multi_id):
+        if "timestamp" in dataset.data:  # a damaged format may have lost it
+            topics.setdefault(dataset.name, []).append(dataset.data)
+    return Px4Log(
+        topics, dict(log.initial_parameters), tuple(d.duration / 1000 for d in log.dropouts), log.file_corruption
+    )
+
+
+def rotor_count(log: Px4Log) -> int:
+    """Number of rotors by the log's parameters (4 where they say nothing); InputError if it is no multirotor."""
+    kind = int(log.parameters.get("MAV_TYPE", 2))
+    if kind in OTHER_TYPES:
+        raise InputError(f"the log is of {OTHER_TYPES[kind]} (MAV_TYPE {kind}); only multirotors can be imported")
+    return int(log.parameters.get("CA_ROTOR_COUNT", 0)) or ROTORS_OF_TYPE.get(kind, 4)
+
+
+# Clocks -------------------------------------------------------------------------------------------
+
+
+def _time(data: Mapping[str, np.ndarray], sampled: bool = True) -> np.ndarray:
+    """Times of a topic, µs: of the sampling where the topic states them, else of the publication."""
+    stamp = np.asarray(data["timestamp"]).astype(np.int64)
+    taken = np.asarray(data.get("timestamp_sample", np.zeros(len(stamp)))).astype(np.int64)
+    near = (taken > 0) & (np.abs(stamp - taken) < 1_000_000)
+    return np.where(near, taken, stamp) if sampled else stamp
+
+
+def _on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row)."""
+    edges = (grid[1:] + grid[:-1]) / 2
+    inside = (time >= grid[0]) & (time <= grid[-1])
+    result = np.full((len(grid), values.shape[1]), np.nan)
+    result[np.searchsorted(edges, time[inside])] = values[inside]
+    return result
+
+
+def _held(grid: np.ndarray, time: np.ndarray, values: np.ndarray, before: float) -> np.ndarray:
+    """Values held until the next one; `before` in rows before the first."""
+    index = np.searchsorted(time, grid, side="right") - 1
+    return np.where(index >= 0, np.asarray(values, float)[np.maximum(index, 0)], before)
+
+
+def _indexed(name: str, count: int) -> list[str]:
+    return [f"{name}[{i}]" for i in range(count)]
+
+
+def _stack(data: Mapping[str, np.ndarray], fields: Sequence[str]) -> np.ndarray | None:
+    """Fields as columns (n, k), None where one is missing."""
+    return np.column_stack([data[f] for f in fields]).astype(float) if set(fields) <= set(data) else None
+
+
+def _first(topics: Topics, name: str) -> Mapping[str, np.ndarray]:
+    return topics.get(name, [{}])[0]
+
+
+# Rotors -------------------------------------------------------------------------------------------
+
+
+def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[Fault]]:
+    """Throttles (n, rotors) with their times, µs, from either generation of actuator topics."""
+    names = ", ".join(c.rotor_columns("throttle", rotors))
+    motors = _first(log.topics, "actuator_motors")
+    values = _stack(motors, _indexed("control", rotors))
+    if values is not None:
+        values, faults = np.clip(values, 0, None), []
+        curve = float(log.parameters.get("THR_MDL_FAC", 0.0))
+        if 0 < curve <= 1:  # PX4 turns the thrust asked for into the signal of the motor by this curve
+            half = (1 - curve) / (2 * curve)
+            values = np.sqrt(half**2 + values / curve) - half
+            seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
+            faults.append(Fault("unit", names, seen, "turned into signals by PX4's own curve", len(values)))
+        return values, _time(motors, sampled=False), faults
+    instances = log.topics.get("actuator_outputs", [])
+    if not instances:
+        found = "neither actuator_motors nor actuator_outputs is logged"
+        return None, np.zeros(0), [Fault("no_command", "", found, "no throttle columns", 0)]
+    return _from_pulses(log, instances, rotors, names)
+
+
+def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
+    """Throttles of `actuator_outputs`, pulse widths in µs."""
+    outputs = _outputs_of_motors(log.parameters, rotors)
+    if outputs is None:
+        found = "no output of PWM_MAIN_FUNC* is a motor, and actuator_motors is not logged"
+        return None, np.zeros(0), [Fault("no_command", "", found, "no throttle columns", 0)]
+    faults = []
+    stacks = [_stack(data, [f"output[{k}]" for k in outputs]) for data in instances]
+    usable = [i for i, s in enumerate(stacks) if s is not None]
+    if not usable:
+        found = f"actuator_outputs holds fewer than {rotors} outputs"
+        return None, np.zeros(0), [Fault("no_command", "", found, "no throttle columns", 0)]
+    chosen = max(usable, key=lambda i: float(np.nanstd(stacks[i], axis=0).min()))
+    if len(instances) > 1:
+        found = f"{len(instances)} instances of actuator_outputs"
+        faults.append(Fault("instances", names, found, f"instance {chosen}, whose outputs move, taken", 0))
+    pulses = stacks[chosen]
+    turning = pulses[pulses > 0]
+    if len(turning) and not (turning.min() >= PLAUSIBLE_PULSE_US[0] and turning.max() <= PLAUSIBLE_PULSE_US[1]):
+        found = f"outputs from {turning.min():g} to {turning.max():g} are no pulse widths in µs"
+        return None, np.zeros(0), [*faults, Fault("unit", names, found, "no throttle columns", len(pulses))]
+    low, high, stated = _pulse_range(log.parameters, outputs)
+    if not stated:
+        found = "no parameter states the pulse widths of no and full throttle"
+        faults.append(Fault("unit", names, found, f"taken as {low[0]:g} and {high[0]:g} µs", len(pulses)))
+    throttle = (pulses - low) / (high - low)
+    outside = (throttle < -0.01) | (throttle > 1.01)
+    if outside.any():
+        found = f"{outside.any(axis=1).mean():.0%} of the rows lie outside the range (disarmed motors get less)"
+        faults.append(Fault("range", names, found, "cut off at 0 and 1", int(outside.any(axis=1).sum())))
+    return np.clip(throttle, 0, 1), _time(instances[chosen], sampled=False), faults
+
+
+def _outputs_of_motors(parameters: Mapping[str, float], rotors: int) -> list[int] | None:
+    """Indices of the outputs that drive motors 1 to `rotors`; the first ones where no function is stated."""
+    functions = {int(v): int(k.removeprefix("PWM_MAIN_FUNC")) for k, v in parameters.items() if "PWM_MAIN_FUNC" in k}
+    if not functions:
+        return list(range(rotors))
+    wanted = [FIRST_MOTOR + i for i in range(rotors)]
+    return [functions[w] - 1 for w in wanted] if set(wanted) <= set(functions) else None
+
+
+def _pulse_range(parameters: Mapping[str, float], outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Pulse widths of no and full throttle by output, µs, and whether a parameter states them."""
+    ends, stated = [], True
+    for word, default in zip(("MIN", "MAX"), PULSE_US, strict=True):
+        common = next((parameters[k] for k in (f"PWM_MAIN_{word}", f"PWM_{word}") if parameters.get(k, 0) > 0), None)
+        own = [parameters.get(f"PWM_MAIN_{word}{k + 1}", -1) for k in outputs]
+        stated &= common is not None or all(v > 0 for v in own)
+        ends.append(np.array([v if v > 0 else (common or default) for v in own], float))
+    return ends[0], ends[1], stated
+
+
+def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[Fault]]:
+    """Rotor speeds (n, rotors), rad/s, of `esc_status`, NaN where a controller is not heard."""
+    data = _first(log.topics, "esc_status")
+    if not data:
+        return None, np.zeros(0), []
+    slots = [i for i in range(8) if f"esc[{i}].esc_rpm" in data]
+    function = {i: int(np.median(data.get(f"esc[{i}].actuator_function", [0]))) for i in slots}
+    by_function = {f - FIRST_MOTOR: i for i, f in function.items() if f >= FIRST_MOTOR}
+    place = {r: by_function.get(r, r) if by_function else r for r in range(rotors)}
+    if not set(place.values()) <= set(slots):
+        found = f"esc_status holds {len(slots)} controllers for {rotors} rotors"
+        return None, np.zeros(0), [Fault("speed_missing", "rotor_speed", found, "no rotor speeds", 0)]
+    online = np.asarray(data.get("esc_online_flags", np.full(len(data["timestamp"]), -1))).astype(np.int64)
+    values = np.column_stack([np.abs(np.asarray(data[f"esc[{place[r]}].esc_rpm"], float)) for r in range(rotors)]) * RPM
+    heard = np.column_stack([(online >> place[r]) & 1 for r in range(rotors)]).astype(bool)
+    faults = []
+    if not values.any():
+        found = "every speed in esc_status is 0"
+        return None, np.zeros(0), [Fault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
+    if not heard.all():
+        lost = int((~heard).any(axis=1).sum())
+        found = f"a speed controller is offline in {lost} messages"
+        faults.append(Fault("speed_missing", "rotor_speed", found, "made empty cells", lost))
+    return np.where(heard, values, np.nan), _time(data, sampled=False), faults
+
+
+# The rest -----------------------------------------------------------------------------------------
+
+
+def _inertial(topics: Topics) -> dict[str, tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
+    """Accelerometer and gyroscope: topic to (columns, time in µs, values), each from the topic with most samples."""
+    combined = _first(topics, "sensor_combined")
+    choices = {
+        c.SPECIFIC_FORCE: [
+            ("sensor_combined", _stack(combined, _indexed("accelerometer_m_s2", 3)), combined),
+            ("vehicle_acceleration", _stack(_first(topics, "vehicle_acceleration"), _indexed("xyz", 3)), None),
+        ],
+        c.ANGULAR_VELOCITY: [
+            ("sensor_combined", _stack(combined, _indexed("gyro_rad", 3)), combined),
+            ("vehicle_angular_velocity", _stack(_first(topics, "vehicle_angular_velocity"), _indexed("xyz", 3)), None),
+        ],
+    }
+    found = {}
+    for columns, offered in choices.items():
+        offered = [(name, values) for name, values, _ in offered if values is not None]
+        if not offered:
+            continue
+        name, values = max(offered, key=lambda o: len(o[1]))
+        time = _time(_first(topics, name))
+        if name == "sensor_combined" and columns == c.SPECIFIC_FORCE:
+            late = np.asarray(combined.get("accelerometer_timestamp_relative", np.zeros(len(time)))).astype(np.int64)
+            time = time + np.where(np.abs(late) < 1_000_000, late, 0)
+            values = np.where((np.abs(late) < 1_000_000)[:, None], values, np.nan)
+        found[name, columns] = (columns, time, values)
+    return found
+
+
+def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...], np.ndarray], list[Fault]]:
+    """Position, velocity and height of `vehicle_local_position`, NaN where PX4 calls them invalid."""
+    count = len(data["timestamp"])
+    values: dict[tuple[str, ...], np.ndarray] = {}
+    faults = []
+    for names, fields, flags in (
+        (c.POSITION, ("x", "y", "z"), ("xy_valid", "xy_valid", "z_valid")),
+        (c.VELOCITY, ("vx", "vy", "vz"), ("v_xy_valid", "v_xy_valid", "v_z_valid")),
+        ((c.HEIGHT,), ("dist_bottom",), ("dist_bottom_valid",)),
+    ):
+        raw = _stack(data, fields)
+        if raw is None:
+            continue
+        known = np.column_stack([np.asarray(data.get(f, np.ones(count))).astype(bool) for f in flags])
+        if names == (c.HEIGHT,) and "dist_bottom_sensor_bitfield" in data:
+            # Without a range finder or optical flow PX4 states a height over a ground that it only assumes.
+            known &= np.asarray(data["dist_bottom_sensor_bitfield"]).astype(bool)[:, None]
+        lost = ~known
+        if lost.any():
+            bad = [n for n, column in zip(names, lost.T, strict=True) if column.any()]
+            found = f"PX4 calls it invalid in {lost.any(axis=1).mean():.0%} of the messages"
+            faults.append(Fault("invalid", ", ".join(bad), found, "made empty cells", int(lost.any(axis=1).sum())))
+        values[names] = np.where(known, raw, np.nan)
+    return values, faults
+
+
+def _batteries(topics: Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, np.ndarray]], list[Fault]]:
+    """Voltage and current of every battery; those after the first under names of their own."""
+    out, faults, number = [], [], 0
+    for data in topics.get("battery_status", []):
+        if "voltage_v" not in data or ("connected" in data and not np.any(data["connected"])):
+            continue
+        number += 1
+        voltage = np.asarray(data["voltage_v"], float)
+        voltage = np.where(voltage > 0, voltage, np.nan)
+        current = np.asarray(data.get("current_a", np.full(len(voltage), -1.0)), float)
+        unknown = current < 0
+        names = (c.BATTERY_VOLTAGE, c.BATTERY_CURRENT)
+        if number > 1:
+            names = (f"battery_{number}_voltage_v", f"battery_{number}_current_a")
+            found = f"battery {number} is logged, too, at {np.nanmedian(voltage):.4g} V"
+            faults.append(Fault("instances", names[0], found, "kept under a name of its own", len(voltage)))
+        time = _time(data)
+        out.append(((names[0],), time, voltage[:, None]))
+        if unknown.all():
+            faults.append(Fault("not_measured", names[1], "-1 A throughout: not measured", "column left out", 0))
+        else:
+            out.append(((names[1],), time, np.where(unknown, np.nan, current)[:, None]))
+    return out, faults
+
+
+def _resets(data: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Times, µs, at which the estimator of PX4 jumped in position or velocity."""
+    counters = [data[k] for k in ("xy_reset_counter", "z_reset_counter", "vxy_reset_counter", "vz_reset_counter")
+                if k in data]  # fmt: skip
+    if not counters:
+        return np.zeros(0, np.int64)
+    jumps = np.any([np.diff(np.asarray(counter).astype(int)) != 0 for counter in counters], axis=0)
+    return _time(data)[1:][jumps]
+
+
+def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
+    """Rows in which the vehicle is in the air by PX4's land detector, and armed; None where the log says neither."""
+    land, status = _first(log.topics, "vehicle_land_detected"), _first(log.topics, "vehicle_status")
+    if "landed" not in land and "arming_state" not in status:
+        return None
+    up = np.ones(len(grid), bool)
+    if "landed" in land:
+        time = _time(land)
+        for name in ("landed", "maybe_landed", "ground_contact"):
+            if name in land:
+                up &= _held(grid, time, land[name], 1.0) < 0.5
+    if "arming_state" in status:
+        up &= _held(grid, _time(status), status["arming_state"], 0.0) == ARMED
+    return in_the_air.without_pauses(up, (grid - grid[0]) * 1e-6)
+
+
+def convert(log: Px4Log, rotors: int) -> Converted:
+    """Contract columns of a whole log, its faults, and where it flies; InputError where there is no clock."""
+    inertial = _inertial(log.topics)
+    attitude = _first(log.topics, "vehicle_attitude")
+    clocks = [time for _, time, _ in inertial.values()] + ([_time(attitude)] if attitude else [])
+    if not clocks:
+        raise InputError(
+            "no topic vehicle_angular_velocity, sensor_combined or vehicle_attitude to take the clock from"
+        )
+    base = max(clocks, key=len)
+    frame, faults = drop_repeated_times(pd.DataFrame({c.TIME: (base - base[0]) * 1e-6}))
+    grid = (frame[c.TIME].to_numpy() * 1e6).round().astype(np.int64) + base[0]
+    columns: dict[str, np.ndarray] = {c.TIME: (grid - grid[0]) * 1e-6}
+
+    def put(names: Sequence[str], time: np.ndarray, values: np.ndarray) -> None:
+        columns.update(zip(names, _on_grid(grid, time, values).T, strict=True))
+
+    for names, time, values in inertial.values():
+        put(names, time, values)
+    quaternion = _stack(attitude, _indexed("q", 4)) if attitude else None
+    if quaternion is not None:
+        put(c.QUATERNION, _time(attitude), continuous(quaternion))
+    place = _first(log.topics, "vehicle_local_position")
+    if place:
+        values, found = _local_position(place)
+        faults += found
+        for names, block in values.items():
+            put(names, _time(place), block)
+    batteries, found = _batteries(log.topics)
+    faults += found
+    for names, time, values in batteries:
+        put(names, time, values)
+    for kind, reader in (("throttle", _throttles), ("rotor_speed", _speeds)):
+        values, time, found = reader(log, rotors)
+        faults += found
+        if values is not None:
+            put(c.rotor_columns(kind, rotors), time, values)
+    table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
+    flying, ground = in_the_air.airborne(table, _flying(log, grid))
+    faults += ground
+    jumps = _resets(place) if place else []
+    for jump in jumps:
+        flying &= np.abs(grid - jump) * 1e-6 > AROUND_RESET_S
+    if len(jumps):
+        found = f"PX4's estimator jumped {len(jumps)} times"
+        faults.append(Fault("estimator_reset", "", found, "a run ends at each jump in the air", len(jumps)))
+    if log.damaged:
+        faults.append(Fault("damaged", "", "the file is damaged", "what could be read is kept", 0))
+    if log.lost_s:
+        found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
+        faults.append(Fault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
+    return Converted(table, faults + report_gaps(table), flying)

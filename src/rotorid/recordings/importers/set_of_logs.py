@@ -1,0 +1,196 @@
+"""Logs of one vehicle as a recording set: runs in contract columns and the text of a `vehicle.yaml`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Names
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid.errors import InputError
+from rotorid.io.text.bounds import MOST_RUNS
+from rotorid.io.text.writing import staging, take_name
+from rotorid.recordings import Run, read_vehicle, templates
+from rotorid.recordings.files import VEHICLE, usable_runs
+from rotorid.recordings.importers.adding import add_to_set
+from rotorid.recordings.importers.logfile import TEMPLATES, files_of, read_log
+from rotorid.recordings.importers.mapping import Mapping
+from rotorid.recordings.importers.propose import propose
+from rotorid.recordings.importers.report import Fault, ImportReport
+from rotorid.recordings.importers.speed_unit import in_unit_of_weight
+from rotorid.recordings.manifest import sha256, write_manifest
+from rotorid.recordings.tables import check_table, parquet_is_here, write_table
+
+
+@dataclass(frozen=True)
+class SetOfLogs:
+    """What logs of one vehicle hold, before it is written anywhere."""
+
+    name: str
+    runs: Names[str, pd.DataFrame]
+    """To the name of a run its table in contract columns."""
+    vehicle_text: str
+    """The `vehicle.yaml`, comments and all."""
+    remarks: tuple[str, ...] = ()
+    """One sentence for each value that is proposed, not known."""
+    faults: tuple[Fault, ...] = ()
+    """What was found in the logs."""
+    axes: str = ""
+    files: Names[str, str] = field(default_factory=dict)
+    """To the name of a log its SHA-256."""
+    kept_vehicle: bool = False
+    """Whether the vehicle's text is that of a file which stays as it is."""
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The faults in words, each once."""
+        return tuple(fault.sentence for fault in self.faults)
+
+    def write(self, folder: Path, as_csv: bool = False) -> None:
+        """Write `vehicle.yaml` (unless it was there and is kept), a file a run, a report and the list of the runs.
+
+        All of it or nothing: it is written aside and takes its name in one step. A set that is there already gets the
+        new runs beside its own; until all are there its list says that it is not whole. Runs are Parquet files; plain
+        CSV where wished, and .csv.gz where pyarrow is not installed.
+
+        Raises
+        ------
+        InputError
+            Something that is there already would change.
+        OSError
+            The disk is full or cannot be written.
+        """
+        report = self._report(folder.name)
+        if folder.is_dir():
+            with staging(folder / "import") as part:
+                add_to_set(self._write_files(part, as_csv), report, folder)
+        else:
+            with staging(folder) as part:
+                files = self._write_files(part, as_csv)
+                write_manifest(part, [path for path in files if path.name != VEHICLE])
+                report.write(part)
+                take_name(part, folder)
+
+    def _write_files(self, folder: Path, as_csv: bool) -> list[Path]:
+        """Write the vehicle, unless it is kept, and the runs; returns their files."""
+        suffix = ".csv" if as_csv else ".parquet" if parquet_is_here() else ".csv.gz"
+        paths = []
+        if not self.kept_vehicle:
+            paths.append(folder / VEHICLE)
+            paths[-1].write_text(self.vehicle_text, encoding="utf-8")
+        for name, table in self.runs.items():
+            paths.append(folder / f"{name}{suffix}")
+            write_table(table, paths[-1])
+        return paths
+
+    def _report(self, name: str) -> ImportReport:
+        return ImportReport(
+            name,
+            True,
+            source=", ".join(self.files),
+            licence="",
+            citation="",
+            files=dict(self.files),
+            axes=self.axes,
+            faults=self.faults,
+            notes=self.remarks,
+        )
+
+
+def set_of_logs(
+    logs: Sequence[Path],
+    name: str,
+    mass_kg: float | None = None,
+    like: str | None = None,
+    vehicle_file: Path | None = None,
+    mapping: Mapping | None = None,
+    there: Path | None = None,
+) -> SetOfLogs:
+    """The flights in `logs`, all of one vehicle, and what is known or proposed of it.
+
+    Parameters
+    ----------
+    logs
+        Files, and folders of ROS 2 bags, that `rotorid.recordings.importers.logfile` knows, all of one kind (flights,
+        or runs of a stand).
+    name
+        What the set is called.
+    mass_kg, like
+        Mass as flown and the template vehicle for what the logs do not say.
+    vehicle_file
+        A `vehicle.yaml` to take as it is, in place of a proposal.
+    mapping
+        What the columns of a CSV or Parquet file are.
+    there
+        A `vehicle.yaml` that may be there already: it is taken where neither `mass_kg` nor `like` is given.
+
+    Raises
+    ------
+    InputError
+        A log cannot be read or holds no flight; the logs do not belong together; nothing tells what vehicle it is;
+        `there` exists and would change.
+    """
+    if len(logs) > MOST_RUNS:
+        raise InputError(f"{len(logs)} logs were given, expected at most {MOST_RUNS}; make several sets of them")
+    found = [read_log(path, mapping) for path in logs]
+    kinds = {f.kind for f in found}
+    if len(kinds) > 1:
+        raise InputError(f"the logs are of different kinds ({', '.join(sorted(kinds))}); import each kind by itself")
+    runs: dict[str, pd.DataFrame] = {}
+    for path, imported in zip(logs, found, strict=True):
+        for run, table in imported.runs.items():
+            if run in runs:
+                raise InputError(f"{path}: another log has a run called {run}, too; rename one of the files")
+            runs[run] = table
+    usable, left_out = usable_runs((partial(_checked, run, table) for run, table in runs.items()), logs[0].name)
+    runs = {run.name: run.table for run in usable}
+    faults = [fault for imported in found for fault in imported.faults]
+    units = {run: imported.speed_unit for imported in found for run in imported.runs}
+    remarks: tuple[str, ...] = ()
+    kept = False
+    if vehicle_file is not None:
+        vehicle = read_vehicle(vehicle_file)
+        text = vehicle_file.read_text(encoding="utf-8")
+    elif there is not None and there.is_file() and mass_kg is None and like is None:
+        vehicle = read_vehicle(there)
+        text, kept = there.read_text(encoding="utf-8"), True
+    else:
+        if kinds != {"flight"}:
+            raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
+        template = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
+        if template is None:
+            raise InputError(
+                f"{logs[0]}: nothing tells what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
+                f"{', '.join(templates.names())} and --mass-kg"
+            )
+        vehicle = templates.read(template)
+        mass = mass_kg or vehicle.mass_kg
+        rotors = len(found[0].known.rotors or found[0].known.directions or vehicle.rotors)
+        runs, changed = in_unit_of_weight(runs, units, mass, rotors)
+        faults += changed
+        proposal = propose(name, list(runs.values()), found[0].known, vehicle, template, mass_kg)
+        text, remarks = proposal.text, proposal.remarks
+        if there is not None and there.is_file() and there.read_text(encoding="utf-8") != text:
+            raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
+    if kinds == {"flight"} and (vehicle_file is not None or kept):
+        known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
+        runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
+        faults += changed
+    return SetOfLogs(
+        name,
+        runs,
+        text,
+        (*remarks, *left_out),
+        tuple(dict.fromkeys(faults)),
+        found[0].axes,
+        {name: sha256(file) for path in logs for name, file in files_of(path).items()},
+        kept,
+    )
+
+
+def _checked(name: str, table: pd.DataFrame) -> Run:
+    return Run(name, check_table(table, f"run {name}"))

@@ -1,0 +1,147 @@
+"""Header-less CSV of a Vicon room with a PX4 vehicle (A. Appius, ground-effect flights).
+
+25 columns: time, position (m, Vicon, z up), velocity, roll, pitch, yaw (deg), body rates (rad/s), four rotor
+speeds (rpm), four voltages, four currents. The axes follow from the data: the lateral accelerations are
+−g·pitch along x and +g·roll along y, so attitude and rates are forward-right-down over x north, y east, and
+only the height is turned over. Rotors in PX4's order. Each group of columns is held at its own slower rate.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rotorid.errors import InputError
+from rotorid.recordings import columns as c
+from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.frames import quaternion_from_euler_frd
+from rotorid.recordings.importers.report import Fault
+
+COUNT = 25
+RPM = 2 * np.pi / 60
+GROUND_MARGIN_M = 0.015
+"""Height above the resting height from which the vehicle counts as in the air."""
+
+
+def read_matrix(path: Path) -> tuple[np.ndarray, list[Fault]]:
+    """The numbers of a header-less CSV, shape (n, 25); the last row may be cut off."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError:
+        raise InputError(f"{path}: file is missing") from None
+    rows, faults = [], []
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        cells = line.rstrip(",").split(",")
+        last = number == len(lines)
+        try:
+            values = [float(cell) for cell in cells]
+        except ValueError:
+            if not last:
+                bad = next(i for i, cell in enumerate(cells) if not _is_number(cell))
+                raise InputError(
+                    f"{path}, line {number}, column {bad + 1}: expected a number, found {cells[bad]!r}"
+                ) from None
+            values = []
+        if len(values) != COUNT:
+            if not last:
+                raise InputError(f"{path}, line {number}: expected {COUNT} columns, found {len(values)}")
+            faults.append(Fault("cut_off", "", f"last line has {len(cells)} of {COUNT} columns", "left out", 1))
+            continue
+        rows.append(values)
+    if len(rows) < 2:
+        raise InputError(f"{path}: expected at least two rows of {COUNT} numbers")
+    return np.array(rows), faults
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
+    """Contract columns of the flown part of a log, clock from zero at its start."""
+    time, position, velocity = matrix[:, 0], matrix[:, 1:4], matrix[:, 4:7]
+    roll, pitch, yaw = np.radians(matrix[:, 7:10]).T
+    columns = {c.TIME: time}
+    columns |= dict(zip(c.POSITION, (position * [1, 1, -1]).T, strict=True))
+    columns |= dict(zip(c.VELOCITY, (velocity * [1, 1, -1]).T, strict=True))
+    columns[c.HEIGHT] = position[:, 2]
+    quaternion = quaternion_from_euler_frd(roll, pitch, yaw)
+    columns |= dict(zip(c.QUATERNION, quaternion.T, strict=True))
+    columns |= dict(zip(c.ANGULAR_VELOCITY, matrix[:, 10:13].T, strict=True))
+    columns |= dict(zip(c.rotor_columns("rotor_speed", 4), (matrix[:, 13:17] * RPM).T, strict=True))
+    columns[c.BATTERY_VOLTAGE] = matrix[:, 17:21].mean(axis=1)
+    columns[c.BATTERY_CURRENT] = matrix[:, 21:25].sum(axis=1)
+    table = pd.DataFrame(columns)
+    faults = []
+    unlocked = table[list(c.POSITION)].isna().any(axis=1)
+    if unlocked.any():
+        table.loc[unlocked, [*c.POSITION, *c.VELOCITY, c.HEIGHT]] = np.nan
+        faults.append(
+            Fault(
+                "no_lock",
+                ", ".join(c.POSITION),
+                "motion capture not locked (nan)",
+                "made empty",
+                int(unlocked.sum()),
+            )
+        )
+    rotors = list(c.rotor_columns("rotor_speed", 4))
+    unpowered = (table[c.BATTERY_VOLTAGE] == 0) & (table[rotors].abs().sum(axis=1) == 0)
+    if unpowered.any():
+        faults.append(
+            Fault(
+                "no_telemetry",
+                c.BATTERY_VOLTAGE,
+                "speed controllers report 0 V",
+                "made empty",
+                int(unpowered.sum()),
+            )
+        )
+        table.loc[unpowered, [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]] = np.nan
+    table, repeated = drop_repeated_times(table)
+    height = table[c.HEIGHT].to_numpy()
+    resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * RPM)))])
+    flying = (table[rotors].mean(axis=1) > 4000 * RPM).to_numpy() & (height > resting + GROUND_MARGIN_M)
+    stretches = true_stretches(flying, table[c.TIME].to_numpy(), 5.0)
+    if not stretches:
+        raise InputError("no stretch of 5 s in the air found (rotors above 4000 rpm and off the ground)")
+    start, stop = max(stretches, key=lambda s: s[1] - s[0])
+    before = len(table)
+    table = cut(table, start + 1.0, stop)
+    faults += repeated
+    faults.append(
+        Fault(
+            "on_ground",
+            "",
+            f"in the air from {start:.1f} to {stop:.1f} s",
+            "rest, take-off and landing left out",
+            before - len(table),
+        )
+    )
+    faults += report_gaps(table)
+    groups = {
+        "pose": [*c.POSITION, *c.VELOCITY, c.HEIGHT],
+        "attitude": [*c.QUATERNION, *c.ANGULAR_VELOCITY],
+        "rotor speed": rotors,
+        "battery": [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT],
+    }
+    table, held = blank_held(table, groups)
+    return table, faults + held
+
+
+def read_vicon_csv(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
+    """One flight in contract columns, and its faults."""
+    matrix, faults = read_matrix(path)
+    try:
+        table, more = convert(matrix)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return table, faults + more

@@ -1,0 +1,21 @@
+"""What is written for a reader: a verdict's files and page, figures, the report's chapters, where it came from."""
+
+OPEN = (
+    "codehash",
+    "deliver",
+    "fleet.history",
+    "fleet.judge",
+    "fleet.page",
+    "fleet.summary",
+    "log",
+    "next_to_log",
+    "page.changes",
+    "plots.*",
+    "prose",
+    "provenance",
+    "result",
+    "series_files",
+    "thesis",
+    "typeset",
+)
+"""Modules that other rooms may import; all else is this room's own."""

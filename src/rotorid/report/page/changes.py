@@ -1,0 +1,80 @@
+"""The page of a comparison: one HTML file that needs no other."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from jinja2 import Environment
+from markupsafe import Markup
+
+from rotorid.mismatch.changes import Changes, words
+from rotorid.mismatch.words import capital, channel_words
+from rotorid.report.page.make import policy_for
+from rotorid.report.plots.changes import draw_residuals, draw_values
+
+TEMPLATE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>{{ new }} compared with {{ base }}</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{{ policy }}">
+<style>
+body { font: 15px/1.45 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
+h1 { font-size: 1.4rem; } .changes { font-size: 1.15rem; }
+table { border-collapse: collapse; width: 100%; margin: .5rem 0 2rem; }
+th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #ddd; vertical-align: top; }
+td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }
+svg { width: 100%; max-width: 50rem; height: auto; background: #fff; }
+.wide { overflow-x: auto; }
+</style></head><body>
+<h1>{{ new }} compared with {{ base }}</h1>
+<ul class="changes">{% for sentence in changes %}<li>{{ sentence }}</li>{% endfor %}</ul>
+{% if notes %}<h2>To bear in mind</h2><ul>{% for note in notes %}<li>{{ note }}</li>{% endfor %}</ul>{% endif %}
+<h2>Believed values</h2>
+{{ values }}
+<h2>Not changed by more than</h2>
+<p>With 95 % probability. Each set is compared with its own vehicle.yaml.</p>
+<div class="wide"><table><tr><th>what</th><th class="number">at most</th><th class="number">of the weight</th></tr>
+{% for row in limits %}<tr><td>{{ row.name }}</td><td class="number">{{ row.at_most }}</td>
+<td class="number">{{ row.share }}</td></tr>{% endfor %}</table></div>
+<h2>What each believed vehicle leaves</h2>
+<p>Measured less simulated force and moment, one stretch of each set. What both sets have alike is no change.</p>
+{{ residuals }}
+</body></html>
+"""
+
+
+def make_changes_page(found: Changes) -> str:
+    """The page of a comparison."""
+    sentences = words.sentences(found)
+    return (
+        Environment(autoescape=True, trim_blocks=True)
+        .from_string(TEMPLATE)
+        .render(
+            policy=policy_for(),
+            base=found.base,
+            new=found.new,
+            changes=sentences[: max(1, len(found.changes))],
+            notes=found.notes,
+            values=drawn(draw_values, found, {p.symbol: words.name_words(p.symbol) for p in found.values}),
+            limits=[limit_row(limit) for limit in found.limits],
+            residuals=drawn(draw_residuals, found, {c: channel_words(c) for c in found.residuals[0]}),
+        )
+    )
+
+
+def limit_row(limit) -> dict[str, str]:
+    """A limit's name, size and share of the weight, in words."""
+    share = words.percent_words(limit.share) if limit.share else ""
+    if limit.id in words.VALUES:
+        return {"name": capital(words.name_words(limit.id)), "at_most": words.percent_words(limit.at_most), "share": ""}
+    size = "" if limit.at_most is None else f"{limit.symbol} {words.number(limit.at_most)} {limit.unit}"
+    return {"name": capital(words.name_words(limit.id)), "at_most": size, "share": share}
+
+
+def drawn(draw, found: Changes, names: dict[str, str]) -> Markup:
+    """A figure as SVG within the page."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "figure.svg"
+        draw(found, names, path)
+        text = path.read_text(encoding="utf-8")
+    return Markup(text[text.index("<svg") :])

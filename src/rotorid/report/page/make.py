@@ -1,0 +1,651 @@
+"""The verdict as a page for a person: one HTML file that needs no other."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+from jinja2 import Environment
+from markupsafe import Markup
+
+from rotorid.effects.advice import advice
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.delivery.parts import form_of
+from rotorid.mismatch.findings import Analysis, Finding
+from rotorid.mismatch.tiles import errors_of, tiles
+from rotorid.mismatch.verdict import (
+    Absent,
+    BelievedValue,
+    Channel,
+    EffectVerdict,
+    Location,
+    Verdict,
+    main_channel,
+    spoken,
+)
+from rotorid.mismatch.words import (
+    FORWARD_WORDS,
+    capital,
+    channel_words,
+    effect_words,
+    listed,
+    number,
+    parameter_words,
+    percent_words,
+    plus_minus,
+    regime_words,
+    sure,
+)
+from rotorid.recordings import RecordingSet
+from rotorid.report.page.data import page_data
+
+WORDS = {
+    "no_mismatch": "no mismatch",
+    "explained": "mismatch, explained",
+    "partly_explained": "mismatch, partly explained",
+    "unexplained": "mismatch, unexplained",
+    "not_judged": "not judged",
+}
+MOST_LOCATIONS = 12
+MOST_RUNS_IN_STRIP = 8
+STRIP_CELLS = 400
+NARROWEST = 0.03
+"""Interval over plausible range below which the range is zoomed in."""
+LIMIT_DECADES = 5.0
+"""Decades below the weight that the bars of the limits show."""
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@cache
+def page_file(name: str) -> str:
+    """A file of the page: template, style, script, library."""
+    return files("rotorid.report.page").joinpath("files", name).read_text(encoding="utf-8")
+
+
+def make_page(
+    analysis: Analysis,
+    verdict: Verdict,
+    forward_notes: Sequence[str] = (),
+    ledger: Sequence[Mapping] = (),
+) -> str:
+    """The page's HTML. `ledger` holds the rules that decided something, each with a `sentence`."""
+    main = main_channel(analysis, verdict.locations, verdict.channels)
+    environment = Environment(autoescape=True, trim_blocks=False)
+    environment.globals.update(figure=figure_html, ranges=ranges_html)
+    shown, more = shown_locations(verdict.locations)
+    known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
+    known |= {i for e in verdict.effects for i in e.alternatives}
+    flown = verdict.kind == "flight"
+    silent = [effect_words(i) for i, e in catalogue().items() if i not in known and not (flown and e.of_the_rig)]
+    data = page_data(analysis, verdict, main)
+    data["regimes"]["first"] = first_variable(verdict, main, data["regimes"]["variables"])
+    claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
+    scripts = page_file("uPlot.iife.min.js"), page_file("page.js")
+    page = environment.from_string(page_file("page.html")).render(
+        css=Markup(page_file("uPlot.min.css") + page_file("page.css")),
+        policy=policy_for(*scripts),
+        library=Markup(scripts[0]),
+        script=Markup(scripts[1]),
+        data=embedded(data),
+        has_figure=bool(data["traces"]),
+        has_regimes=bool(data["regimes"]["channels"]),
+        has_replay=data["replay"] is not None,
+        set=verdict.set,
+        runs=runs_text(verdict),
+        word=WORDS[verdict.verdict],
+        word_class=verdict.verdict,
+        headline=pretty(verdict.sentence),
+        basis=verdict.basis.sentence,
+        doubts=[{"sentence": pretty(d.sentence), "stops": d.stops} for d in verdict.doubts],
+        warnings=[pretty(text) for text in verdict.warnings],
+        tiles=[
+            {"heading": t.heading, "large": pretty(t.large), "small": pretty(t.small)} for t in tiles(verdict, main)
+        ],
+        details=[pretty(text) for text in verdict.details],
+        where_text=where_text(verdict),
+        strip=strip(analysis, verdict),
+        locations=[location_row(loc) for loc in shown],
+        more_locations=more,
+        what_text=what_text(verdict),
+        effects=[effect_block(e, finding_of(e, analysis)) for e in claimed],
+        suggested=[effect_block(e, finding_of(e, analysis)) for e in verdict.effects if e.status == "suggested"],
+        values=[value_range(name, *v) for name, v in analysis.values.items()],
+        all_values=[value_row(name, row) for name, row in verdict.believed_values.items()],
+        correlated=correlated_text(verdict),
+        better_text=better_text(verdict),
+        forward_text=forward_text(verdict),
+        table=error_table(verdict.channels, data["fit_percent"]),
+        rest=rest_text(verdict),
+        ruled_out=[ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
+        silent=listed(silent),
+        limits=[limit_row(a) for a in verdict.absent],
+        not_testable=[{"name": capital(effect_words(n.id)), "reason": n.reason} for n in verdict.not_testable],
+        next=next_text(verdict, analysis.recordings),
+        ledger=[ledger_row(row) for row in ledger],
+        notes=notes(analysis, forward_notes),
+    )
+    return spoken(page, analysis)
+
+
+def policy_for(*scripts: str) -> str:
+    """Content security policy under which these scripts alone run, nothing is fetched and nothing sent.
+
+    Without scripts none runs.
+    """
+    hashes = (base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
+    allowed = " ".join(f"'sha256-{h}'" for h in hashes) or "'none'"
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        "form-action 'none'"
+    )
+
+
+def embedded(data: Mapping) -> Markup:
+    """Data as JSON that cannot end the script element that holds it, whatever names are in it."""
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+def by_share(effects: Sequence[EffectVerdict]) -> list[EffectVerdict]:
+    """The effects with the largest share of the gain first; in their order where no share is stated."""
+    return sorted(effects, key=lambda e: -(getattr(e, "share", None) or 0.0))
+
+
+def limit_row(limit: Absent) -> dict[str, str]:
+    """A row of the table of what was not found; `bar` is a share of the scale from 0.001 % to 100 % of the weight."""
+    share = limit.share_of_weight
+    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / LIMIT_DECADES, 0.0, 1.0))
+    size = Markup("")
+    if limit.at_most is not None:
+        size = Markup("|{}| ≤ {}").format(
+            subscripts(limit.symbol), pretty(f"{number(limit.at_most)} {limit.unit}".removesuffix(" 1").strip())
+        )
+    return {
+        "name": capital(effect_words(limit.id)),
+        "size": size,
+        "share": "" if not share else pretty(percent_words(share)),
+        "bar": f"{100 * decades:.0f}",
+    }
+
+
+def finding_of(effect: EffectVerdict, analysis: Analysis) -> Finding:
+    """The finding behind an effect of the verdict."""
+    same = [f for f in analysis.findings if f.id == effect.id]
+    return next((f for f in same if f.status == effect.status), same[0])
+
+
+def first_variable(verdict: Verdict, main: str, known: Mapping[str, str]) -> str:
+    """The variable that the regime figure opens with: the one that separates the mismatch best."""
+    regimes = [(loc.channel, loc.regime.variable) for loc in verdict.locations if loc.regime is not None]
+    ordered = [v for c, v in regimes if c == main] + [v for _, v in regimes]
+    return next((v for v in ordered if v in known), next(iter(known), ""))
+
+
+def ledger_row(row: Mapping) -> Markup:
+    """A rule of the ledger: its name, what it decided on and its sentence, with its numbers."""
+    head = " ".join(str(row[k]) for k in ("rule", "on", "subject", "id") if row.get(k))
+    numbers = row.get("numbers") or {}
+    said = ", ".join(f"{k} {number(v, 3) if isinstance(v, float) else v}" for k, v in dict(numbers).items())
+    tail = f" ({said})" if said else ""
+    return Markup("<strong>{}</strong> {}{}").format(head, pretty(str(row.get("sentence", ""))), tail)
+
+
+def pretty(text: str) -> Markup:
+    """Text as HTML with powers of ten and units set as they are printed: 5.1e-5 ± 0.2e-5 → (5.1 ± 0.2) × 10⁻⁵."""
+    text = re.sub(
+        r"(-?[\d.]+)e(-?\d+) ± ([\d.]+)e\2\b",
+        lambda m: f"({m[1]} ± {m[3]}) × 10{m[2].translate(SUPERSCRIPTS)}",
+        text,
+    )
+    text = re.sub(r"(\d)e([+-]?\d+)\b", lambda m: f"{m[1]} × 10{str(int(m[2])).translate(SUPERSCRIPTS)}", text)
+    text = re.sub(r"(?<![\w])-(?=\d)", "−", text)
+    return Markup(html.escape(unit_text(text), quote=False))
+
+
+def subscripts(text: str) -> Markup:
+    """`k_d,x` with what follows the underscore set low."""
+    return Markup(re.sub(r"_([A-Za-z0-9⊥∥,]+)(?<!,)", r"<sub>\1</sub>", html.escape(text, quote=False)))
+
+
+def unit_text(text: str) -> str:
+    """Units with raised exponents: `N s2/(rad m)` → `N s²/(rad m)`."""
+    return re.sub(r"\b(rad|kg|m|s|A|V|K)(-?\d)\b", lambda m: m[1] + m[2].translate(SUPERSCRIPTS), text)
+
+
+def figure_html(shown: tuple[str, str, str] | None) -> Markup:
+    """A figure from (svg, alternative text, caption); nothing for None."""
+    if shown is None:
+        return Markup("")
+    picture, alternative, caption = shown
+    data = base64.b64encode(picture.encode()).decode()
+    return Markup(
+        '<figure><img alt="{}" src="data:image/svg+xml;base64,{}"><figcaption>{}</figcaption></figure>'
+    ).format(alternative, Markup(data), caption)
+
+
+def ranges_html(rows: Sequence[Mapping]) -> Markup:
+    """Table of parameters, each with its interval drawn on the range that is physically plausible."""
+    if not rows:
+        return Markup("")
+    out = [Markup('<table class="ranges">')]
+    for row in rows:
+        marks = Markup("")
+        if row["scale"] is not None:
+            low, high = row["scale"]
+
+            def at(x, low=low, high=high):
+                return f"{100 * min(max((x - low) / (high - low), 0.0), 1.0):.2f}%"
+
+            first, last = row["interval"]
+            wide = f"{100 * (min(max(last, low), high) - min(max(first, low), high)) / (high - low):.2f}%"
+            belief = (
+                Markup('<i class="belief" style="left:{}" title="believed"></i>').format(at(row["believed"]))
+                if row["believed"] is not None
+                else ""
+            )
+            marks = Markup(
+                '<div class="range"><i class="track"></i><i class="band" style="left:{};width:{}"></i>{}'
+                '<i class="dot" style="left:{}"></i></div><div class="ends"><span>{}</span><span>{}</span></div>'
+            ).format(at(first), wide, belief, at(row["value"]), pretty(number(low)), pretty(number(high)))
+        out.append(
+            Markup('<tr><td><em>{}</em></td><td class="text">{}</td><td class="text">{}</td><td>{}</td></tr>').format(
+                subscripts(row["symbol"]), pretty(row["meaning"]), pretty(row["text"]), marks
+            )
+        )
+    return Markup("").join([*out, Markup("</table>")])
+
+
+def runs_text(verdict: Verdict) -> str:
+    held, training = verdict.runs.held_out, verdict.runs.training
+    if set(held) == set(training):
+        return f"one run, {training[0]}; its last third held out"
+    fitted = "1 run" if len(training) == 1 else f"{len(training)} runs"
+    return f"{fitted} to fit, {len(held)} held out ({', '.join(held)})"
+
+
+def where_text(verdict: Verdict) -> list[str]:
+    if not verdict.locations:
+        return ["Nowhere does the error rise above what the sensors' noise explains."]
+    regimes = {}
+    for loc in verdict.locations:
+        if loc.regime is not None:
+            regimes.setdefault(loc.channel, loc.regime)
+    texts = []
+    for channel, regime in regimes.items():
+        name, unit = regime_words(regime.variable)
+        span = f"{number(regime.low)} to {number(regime.high)} {unit}".strip()
+        texts.append(f"{channel_words(channel)}: {name} {span}")
+    first = f"The mismatch shows in {listed([channel_words(c) for c in dict.fromkeys(_channels(verdict))])}."
+    return [first] + ([pretty(f"What separates it best: {'; '.join(texts)}.")] if texts else [])
+
+
+def _channels(verdict: Verdict) -> list[str]:
+    return [loc.channel for loc in verdict.locations]
+
+
+def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
+    """Heat strip of every channel over every run."""
+    from rotorid.report.plots import mismatch as plots
+
+    channels = [c for c in verdict.channels if c not in FORWARD_WORDS and verdict.channels[c].noise_floor]
+    runs = list(dict.fromkeys(t.run for t in analysis.traces))
+    located_runs = dict.fromkeys(loc.run for loc in verdict.locations)
+    shown = list(dict.fromkeys([*[r for r in runs if r in verdict.runs.held_out], *located_runs, *runs]))
+    shown = [r for r in runs if r in shown[:MOST_RUNS_IN_STRIP]]
+    if not channels or not shown:
+        return None
+    sizes = {}
+    for trace in analysis.traces:
+        if trace.run in shown and trace.channel in channels:
+            noise = verdict.channels[trace.channel].noise_floor
+            period = float(np.median(np.diff(trace.time_s)))
+            per = max(int(plots.STRIP_CELL_S / period), len(trace.time_s) // STRIP_CELLS, 1)
+            per = min(per, len(trace.time_s))  # A stretch that is shorter than a cell is one cell.
+            count = len(trace.time_s) // per
+            for stage in ("before", "after"):
+                size = np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)) / noise
+                key = (stage, trace.run, trace.channel)
+                time_s = blocks(trace.time_s, per, count)
+                if key in sizes:
+                    time_s, size = np.append(sizes[key][0], time_s), np.append(sizes[key][1], size)
+                sizes[key] = (time_s, size)
+    located: dict[tuple[str, str], list] = {}
+    for loc in verdict.locations:
+        located.setdefault((loc.run, loc.channel), []).append((loc.start_s, loc.stop_s))
+    labels = [channel_words(c) for c in channels]
+    held = verdict.runs.held_out if verdict.runs.held_out != verdict.runs.training else ()
+    picture = plots.svg(plots.heat_strip(channels, labels, shown, held, sizes, located))
+    caption = "Error of each channel over the runs' time, in units of its noise. Black lines: where it was located."
+    if len(shown) < len(runs):
+        caption += f" {len(shown)} of {len(runs)} runs are shown."
+    return picture, "error over noise by channel and time, before and after", caption
+
+
+def blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
+    """Means of `count` blocks of `per` samples."""
+    return values[: count * per].reshape(count, per).mean(axis=1)
+
+
+def shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str]:
+    """The locations with most of the energy, in their order, and a word on the others."""
+    if len(locations) <= MOST_LOCATIONS:
+        return list(locations), ""
+    kept = sorted(locations, key=lambda loc: -loc.energy_share)[:MOST_LOCATIONS]
+    rest = len(locations) - MOST_LOCATIONS
+    return [loc for loc in locations if loc in kept], f"{rest} more are in verdict.json."
+
+
+def location_row(loc: Location) -> dict:
+    regime = ""
+    if loc.regime is not None:
+        name, unit = regime_words(loc.regime.variable)
+        regime = pretty(f"{name} {number(loc.regime.low)}–{number(loc.regime.high)} {unit}".strip())
+    return {
+        "channel": channel_words(loc.channel),
+        "run": loc.run,
+        "start": f"{loc.start_s:.1f}",
+        "stop": f"{loc.stop_s:.1f}",
+        "share": f"{100 * loc.energy_share:.0f} %",
+        "regime": regime,
+        "p": chance(loc.p_value),
+    }
+
+
+def chance(p_value: float | None) -> str:
+    if p_value is None:
+        return "–"
+    return "< 0.001" if p_value < 1e-3 else f"{p_value:.3f}"
+
+
+def what_text(verdict: Verdict) -> list[str]:
+    at_work = [e for e in verdict.effects if e.status in ("established", "ambiguous")]
+    if at_work or verdict.parameters:
+        return []
+    if verdict.verdict == "no_mismatch":
+        return ["Nothing: the believed vehicle describes these recordings to within their noise."]
+    return ["None of the known effects explains what was located."]
+
+
+def effect_block(e: EffectVerdict, finding: Finding) -> dict:
+    """One effect at work: name, equation, parameters on their plausible ranges, how sure, what else it could be."""
+    effect = catalogue().get(e.id)
+    share = getattr(e, "share", None)
+    form = form_of(finding)
+    bounds = {p.symbol: p for p in form.parameters} if form else {}
+    notes = [capital(sure(e.p_value)) + "." if e.p_value is not None else ""]
+    if e.held_out_gain is not None and e.held_out_gain.rmse_ratio is not None:
+        gain, (low, high) = e.held_out_gain.rmse_ratio, e.held_out_gain.interval_95
+        between = f" (95 % interval {number(low)} to {number(high)})" if low is not None and high is not None else ""
+        notes[0] += (
+            f" On held-out flight the error of the {channel_words(e.channels[0]) if e.channels else 'main channel'} "
+            f"is {number(gain)} times what it is without this effect{between}."
+        )
+    others = [effect_words(i) for i in e.alternatives if i != e.id]
+    if others:
+        notes.append(
+            f"It could as well be {listed(others, 'or')}: these recordings cannot tell them apart; the model holds "
+            f"{effect_words(e.id)} in the place of the class."
+        )
+    if e.size is not None and e.size.share is not None:
+        off = e.size.metres_after_half_a_second
+        metres = "" if off is None else f", {number(off)} m after half a second of simulation"
+        notes.append(
+            f"Where it does most it moves the {channel_words(e.size.channel)} by {number(e.size.rms)} {e.size.unit}"
+            + f", {number(100 * e.size.share)} % of {e.size.of}{metres} (root mean square on held-out flight)."
+        )
+    if e.withheld:
+        notes.append(f"Not delivered: {e.withheld}.")
+    elif effect is not None and effect.confusers:
+        notes.append(
+            f"What is easily mistaken for it ({listed([effect_words(i) for i in effect.confusers])}) was tested "
+            "jointly with it and does not explain these data as well."
+        )
+    if effect is not None and effect.source:
+        notes.append(f"Source: {effect.source}.")
+    return {
+        "id": e.id,
+        "name": capital(effect_words(e.id)),
+        "status": e.status,
+        "sentence": capital(e.sentence).rstrip(".") + "." if e.sentence else "",
+        "equation": subscripts(e.equation),
+        "parameters": [
+            parameter_range(
+                p.symbol,
+                p.value,
+                p.unit,
+                *p.interval_95,
+                plausible=(bounds[p.symbol].low, bounds[p.symbol].high) if p.symbol in bounds else None,
+                meaning=bounds[p.symbol].meaning if p.symbol in bounds else "",
+            )
+            for p in e.parameters
+        ],
+        "notes": [n for n in notes if n],
+        "share": None if share is None else f"{100 * share:.0f} %",
+        "share_width": "" if share is None else f"{60 * min(max(share, 0.0), 1.0):.1f}%",
+    }
+
+
+def parameter_range(symbol, value, unit, low, high, plausible=None, meaning="", believed=None) -> dict:
+    """A parameter with its interval and the range to draw it on: the physical bounds where they are finite."""
+    text = plus_minus(value, low, high) if value is not None else "not determined"
+    unit = unit if unit not in ("-", "1") else ""
+    known = all(x is not None and math.isfinite(x) for x in (value, low, high))
+    scale = None
+    if known and text != "not determined":
+        reach = max(high - low, 1e-12 * abs(value), 1e-300)
+        points = [value - 2 * reach, value + 2 * reach, low, high]
+        points += [believed] if believed is not None else [0.0]
+        first, last = min(points), max(points)
+        if plausible is not None and any(map(math.isfinite, plausible)):
+            ends = [b if math.isfinite(b) else e for b, e in zip(plausible, (first, last), strict=True)]
+            bounds = f"plausible: {_bounds(*plausible)}"
+            meaning = f"{meaning} ({bounds})" if meaning else bounds
+            # Bounds so wide that the interval would be a hairline are stated, not drawn.
+            if high - low > NARROWEST * (ends[1] - ends[0]):
+                first, last = ends
+        scale = (first, last) if last > first else None
+    return {
+        "symbol": symbol,
+        "meaning": meaning,
+        "text": f"{text} {unit}".strip(),
+        "value": value,
+        "interval": (low, high),
+        "scale": scale,
+        "believed": believed,
+    }
+
+
+def _bounds(low: float, high: float) -> str:
+    if not math.isfinite(high):
+        return f"from {number(low)}"
+    return f"to {number(high)}" if not math.isfinite(low) else f"{number(low)} to {number(high)}"
+
+
+def value_range(name: str, believed: float, refitted: float, low: float, high: float) -> dict:
+    words, unit = parameter_words(name)
+    row = parameter_range(words.rstrip(","), refitted, unit, low, high, believed=believed)
+    return row | {"meaning": pretty(f"believed {number(believed, 4)} {unit}".strip())}
+
+
+def value_row(name: str, row: BelievedValue) -> dict:
+    """A line of the table of all believed values: before, estimate with interval, delivered."""
+    words, unit = parameter_words(name)
+    low, high = row.interval_95
+    change = ""
+    if row.believed and row.delivered is not None and row.delivered != row.believed:
+        change = f"{100 * (row.delivered / row.believed - 1):+.2g} %"
+    return {
+        "name": words,
+        "unit": unit_text(unit),
+        "believed": cell(row.believed),
+        "estimate": pretty(plus_minus(row.estimate, low, high)) if row.estimate is not None else "–",
+        "delivered": cell(row.delivered),
+        "change": pretty(change),
+        "note": pretty(f"not delivered: {row.withheld}" if row.withheld else "wrong" if row.wrong else ""),
+    }
+
+
+def correlated_text(verdict: Verdict) -> list[str]:
+    """Sentences on the values of which little more than a ratio is known."""
+    pairs: list[tuple[str, str, float]] = []
+    for pair in verdict.correlations:
+        first, second = (parameter_words(n)[0] for n in pair.values)
+        pairs.append((first, second, pair.correlation))
+    return [
+        pretty(f"Of {first} and {second} these recordings know little more than a ratio (correlation {r:.3f}).")
+        for first, second, r in pairs
+    ]
+
+
+def better_text(verdict: Verdict) -> str:
+    if verdict.verdict == "no_mismatch":
+        return "There is nothing to gain that these recordings could show."
+    if verdict.kind != "flight":
+        return (
+            "“Refitted” has the same physics with its values re-estimated; “improved” adds the effects found. All "
+            "compare the reading with what load, rotor speeds and weight predict."
+        )
+    return (
+        "“Refitted” has the same physics with its values re-estimated; “improved” adds the effects found. Forces, "
+        "moments and rotor speeds compare inverse dynamics; the others compare simulation run forward for half a "
+        "second from the recorded state."
+    )
+
+
+def error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float, float]]) -> list[dict]:
+    """Rows of errors, inverse dynamics and simulation run forward apart; `fits` in per cent, before and after."""
+    groups = []
+    for name, chosen in (
+        ("inverse dynamics", [c for c in channels if c not in FORWARD_WORDS]),
+        ("simulation run forward", [c for c in channels if c in FORWARD_WORDS]),
+    ):
+        rows = [
+            {
+                "name": channel_words(c).removesuffix(" after half a second"),
+                "unit": unit_text(channels[c].unit),
+                "noise": cell(channels[c].noise_floor),
+                "bars": bars(channels[c]),
+                "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
+                "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in ("before", "refitted", "after")],
+                "training": [cell(getattr(channels[c].rmse.training, s)) for s in ("before", "refitted", "after")],
+            }
+            for c in chosen
+        ]
+        if rows:
+            groups.append({"name": name, "rows": rows})
+    return groups
+
+
+FARTHEST = 100.0
+"""Error over noise at which the bar of the table of errors ends."""
+
+
+def bars(channel: Channel) -> Markup:
+    """Errors as believed (open) and improved (full) next to the noise (line), on a logarithmic scale."""
+    errors, _ = errors_of(channel)
+    if not channel.noise_floor or errors.before is None or errors.after is None:
+        return Markup("")
+
+    def at(value: float) -> float:
+        ratio = min(max(value / channel.noise_floor, 0.5), FARTHEST)
+        return 6 + 100 * math.log(ratio / 0.5) / math.log(FARTHEST / 0.5)
+
+    return Markup(
+        '<svg viewBox="0 0 112 14" role="img" aria-label="{}">'
+        '<line x1="{n:.1f}" x2="{n:.1f}" y1="1" y2="13" stroke="currentColor" stroke-dasharray="2 2" opacity=".6"/>'
+        '<line x1="{a:.1f}" x2="{b:.1f}" y1="7" y2="7" stroke="currentColor" opacity=".3"/>'
+        '<circle cx="{b:.1f}" cy="7" r="4" fill="none" stroke="var(--before)" stroke-width="2"/>'
+        '<circle cx="{a:.1f}" cy="7" r="4" fill="var(--after)"/></svg>'
+    ).format(
+        f"{number(errors.before / channel.noise_floor)} times the noise before, "
+        f"{number(errors.after / channel.noise_floor)} after",
+        n=at(channel.noise_floor),
+        a=at(errors.after),
+        b=at(errors.before),
+    )
+
+
+def forward_text(verdict: Verdict) -> list[str]:
+    """The simulation run forward in words: how far it drifts off within half a second."""
+    parts = []
+    for name, words in (("position", "the position"), ("velocity", "the velocity"), ("attitude", "the attitude"),
+                        ("angular_velocity", "the body rates")):  # fmt: skip
+        if name not in verdict.channels:
+            continue
+        channel = verdict.channels[name]
+        errors, _ = errors_of(channel)
+        if errors.before is not None and errors.after is not None:
+            parts.append(f"{words} {number(errors.after)} {channel.unit} (believed: {number(errors.before)})")
+    if not parts:
+        return []
+    return [
+        pretty(f"Started from a recorded state and run for half a second, the improved vehicle misses {listed(parts)}.")
+    ]
+
+
+def cell(value: float | None) -> str | Markup:
+    return "–" if value is None else pretty(number(value, 3))
+
+
+def rest_text(verdict: Verdict) -> list[str]:
+    rest = verdict.unexplained
+    if verdict.verdict == "no_mismatch" or (rest.share <= 0 and not rest.description):
+        return ["Nothing that stands out from the noise."]
+    texts = [f"{100 * rest.share:.0f} % of the mismatch's energy is left by what was found."]
+    if rest.channels:
+        texts[0] += f" It is in {listed([channel_words(c) for c in rest.channels])}."
+    if rest.depends_on:
+        texts.append(f"It depends on {listed([regime_words(v)[0] for v in rest.depends_on])}.")
+    return texts + ([pretty(rest.description)] if rest.description else [])
+
+
+def ruled_out(e: EffectVerdict) -> Markup:
+    name = effect_words(e.id)
+    sentence = e.sentence or {"absorbed": "explained by the refitted values"}.get(e.status, "did not hold")
+    if sentence.lower().startswith(name.lower()):
+        return Markup("<strong>{}</strong>{}").format(capital(name), pretty(sentence[len(name) :]))
+    return Markup("<strong>{}</strong>: {}").format(capital(name), pretty(sentence))
+
+
+def next_text(verdict: Verdict, recordings: RecordingSet) -> str:
+    """What to do next, in words; it asks for no column that is recorded, and states no number that nobody computed."""
+    plan = verdict.next_experiment
+    if not plan.manoeuvre:
+        open_questions = [e for e in verdict.effects if e.status in ("ambiguous", "suggested")]
+        wanted = [catalogue()[i] for e in open_questions for i in (e.id, *e.alternatives) if i in catalogue()]
+        flown = next((advice(w, recordings) for w in wanted if w.separating_manoeuvre), "")
+        if flown:
+            return f"{capital(flown).rstrip('.')}. It bears on {listed([effect_words(e.id) for e in open_questions])}."
+        if verdict.unexplained.share > 0.15:
+            depends = [regime_words(v)[0] for v in verdict.unexplained.depends_on]
+            over = f" over {listed(depends)}" if depends else " over the range in which the error is large"
+            return f"What is left has no name yet: repeat the flight with slow sweeps{over}, one at a time."
+        if verdict.verdict == "no_mismatch":
+            return "Nothing is open. Faster, higher or rougher flight would show whether the model holds there too."
+        return "Nothing is left to tell apart."
+    text = capital(plan.manoeuvre).rstrip(".") + "."
+    if plan.separates:
+        what = "flight" if verdict.kind == "flight" else "session"
+        text += f" It is meant to tell {listed([effect_words(i) for i in plan.separates])} apart. "
+        return Markup("{}<code>rotorid plan</code> says which {} within your limits does, if any, and how far.").format(
+            text, what
+        )
+    return text
+
+
+def notes(analysis: Analysis, forward_notes: Sequence[str]) -> list[str]:
+    source = {
+        "accelerometer": "Forces come from the accelerometer.",
+        "velocity": "No accelerometer is recorded: forces come from velocity and attitude, with the noise that costs.",
+        "position": "Neither accelerometer nor velocity is recorded: forces come from position and attitude, with the "
+        "noise that costs.",
+    }.get(analysis.force_source)
+    return [n for n in (source, *analysis.notes, *forward_notes) if n]

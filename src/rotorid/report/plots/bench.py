@@ -1,0 +1,203 @@
+"""Figures of the load-cell bench: calibration, static, dynamic and tensile tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from rotorid.report.plots import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PLATFORM = {"al": "aluminium", "pla": "PLA", "jr3": "reference sensor"}
+PLATFORM_COLOUR = {"al": style.BLUE, "pla": style.ORANGE, "jr3": style.GREY}
+AXES = "xyz"
+
+
+def reading(recording: pd.DataFrame, load_time_s: float, mean_from_s: float, mean_10uv: float) -> Figure:
+    """One calibration recording: samples, both filters, and the mean that is kept (fig. 2.34).
+
+    `recording` has `time_s`, `cell_v`, `cell_v_low_pass`, `cell_v_zero_phase`, V, tared.
+    """
+    fig, (whole, close) = style.figure(2.6, columns=2, gridspec_kw={"width_ratios": [1.5, 1]})
+    time_s = recording["time_s"].to_numpy()
+    for axis in (whole, close):
+        axis.plot(time_s, 1e5 * recording["cell_v"], color=style.GREY, linewidth=0.7, label="samples")
+        axis.plot(time_s, 1e5 * recording["cell_v_low_pass"], color=style.RED, label="first-order low-pass")
+        axis.plot(time_s, 1e5 * recording["cell_v_zero_phase"], color=style.BLUE, label="zero-phase low-pass")
+        axis.plot([mean_from_s, time_s[-1]], [mean_10uv] * 2, color=style.BLACK, linestyle="--", label="mean kept")
+        axis.set_xlabel("time (s)")
+    whole.set_ylabel(r"tared reading ($10^{-5}$ V)")
+    close.set_xlim(load_time_s - 0.2, mean_from_s + 0.6)
+    whole.legend(loc="lower right")
+    return fig
+
+
+def calibration(campaign: Sequence[Mapping], thesis: Sequence[Mapping]) -> Figure:
+    """Coefficients of both calibrations with intervals, as differences from the thesis's table 2.8.
+
+    Entries have `cell`, `a0_gf`, `a0_interval_95`, `a1_gf_per_10uv`, `a1_interval_95`; those of `thesis` also the
+    printed `a0_printed_gf` and `a1_printed_gf_per_10uv`.
+    """
+    fig, axes = style.figure(2.7, columns=2, sharey=True)
+    names = (
+        ("a0_gf", "a0_interval_95", "a0_printed_gf", r"$a_0$ minus table 2.8 (gf)"),
+        ("a1_gf_per_10uv", "a1_interval_95", "a1_printed_gf_per_10uv", r"$a_1$ minus table 2.8 (gf per $10^{-5}$ V)"),
+    )
+    for axis, (value, interval, printed, label) in zip(axes, names, strict=True):
+        axis.axvline(0, color=style.COLOUR["reference"], linewidth=1.2)
+        for entries, colour, shift, who in (
+            (thesis, style.BLACK, -0.14, "thesis's tables (real)"),
+            (campaign, style.BLUE, 0.14, "campaign (emulated)"),
+        ):
+            base = np.array([entry[printed] for entry in thesis])
+            places = np.array([entry["cell"] for entry in entries]) + shift
+            ends = np.array([entry[interval] for entry in entries]) - base[:, None]
+            axis.hlines(places, ends[:, 0], ends[:, 1], color=colour)
+            axis.plot(np.array([entry[value] for entry in entries]) - base, places, "o", color=colour, label=who)
+        axis.set_xlabel(label)
+        axis.locator_params(axis="x", nbins=5)
+    axes[0].set_yticks(range(1, 7), [f"cell {i}" for i in range(1, 7)])
+    axes[0].invert_yaxis()
+    handles, labels = axes[0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=2)
+    return fig
+
+
+def calibration_residuals(readings: pd.DataFrame, cells: Sequence[Mapping]) -> Figure:
+    """What each cell's line leaves of every campaign recording, against the weight; crosses where `flag` has a text."""
+    fig, axes = style.figure(3.2, 2, 3, sharex=True, sharey=True)
+    for axis, cell in zip(axes.flat, cells, strict=True):
+        part = readings[readings["cell"] == cell["cell"]]
+        left = part["weight_gf"] - (cell["a0_gf"] + cell["a1_gf_per_10uv"] * part["reading_10uv"])
+        axis.plot(part["weight_gf"], left, "o", color=style.BLUE, markersize=3)
+        wrong = part["flag"].notna()
+        axis.plot(part["weight_gf"][wrong], left[wrong], "x", color=style.RED, markersize=8)
+        axis.axhline(0, color=style.BLACK, linewidth=0.7)
+        axis.set_title(f"cell {cell['cell']}")
+    for axis in axes[-1]:
+        axis.set_xlabel("weight (gf)")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("residual (gf)")
+    return fig
+
+
+def static_z(loads: pd.DataFrame) -> Figure:
+    """Three platforms along z: output against target, error against load (fig. 2.42)."""
+    fig, (output, error) = style.figure(2.9, columns=2)
+    own = loads[(loads["axis"] == "z") & loads["method"].isin(["equations", "sensor"])]
+    largest = own["load_n"].max()
+    output.plot([0, largest], [0, largest], color=style.BLACK, linewidth=0.7, label="target")
+    for platform, label in PLATFORM.items():
+        part = own[own["platform"] == platform].sort_values("load_n")
+        colour = PLATFORM_COLOUR[platform]
+        output.plot(part["load_n"], part["load_n"] + part["error_n"], "o-", color=colour, label=label, linewidth=0.7)
+        low, high = part["error_n"] - part["low_95_n"], part["high_95_n"] - part["error_n"]
+        error.errorbar(part["load_n"], part["error_n"], (low, high), fmt="o-", color=colour, linewidth=0.7, capsize=2)
+    error.axhline(0, color=style.BLACK, linewidth=0.7)
+    output.set(xlabel="applied force (N)", ylabel="output (N)")
+    error.set(xlabel="applied force (N)", ylabel="error (N)")
+    output.legend()
+    return fig
+
+
+def static_axes(points: pd.DataFrame, series: pd.DataFrame) -> Figure:
+    """Aluminium along x, y and z: every measurement against the target with r (fig. 2.45), and below its error."""
+    fig, axes = style.figure(4.1, 2, 3, sharex=True, height_ratios=(1.5, 1))
+    for column, name in enumerate(AXES):
+        part = points[(points["platform"] == "al") & (points["axis"] == name) & (points["method"] == "equations")]
+        found = series[(series["platform"] == "al") & (series["axis"] == name) & (series["method"] == "equations")]
+        top, low = axes[0, column], axes[1, column]
+        largest = part["load_n"].max()
+        top.plot([0, largest], [0, largest], color=style.BLACK, linewidth=0.7)
+        top.plot(part["load_n"], part["force_n"], "o", color=style.COLOUR[name], markersize=3)
+        top.set_title(f"{name}: $r$ = {found['r'].iloc[0]:.6f}")
+        low.plot(part["load_n"], 1e3 * part["error_n"], "o", color=style.COLOUR[name], markersize=2.5)
+        low.errorbar(
+            part.groupby("load_n")["load_n"].first(),
+            1e3 * part.groupby("load_n")["error_n"].mean(),
+            2e3 * part.groupby("load_n")["uncertainty_n"].mean(),
+            fmt="none",
+            color=style.BLACK,
+            capsize=2,
+            linewidth=0.8,
+        )
+        low.axhline(0, color=style.BLACK, linewidth=0.7)
+        low.set_xlabel("applied force (N)")
+    axes[0, 0].set_ylabel("output (N)")
+    axes[1, 0].set_ylabel("error (mN)")
+    return fig
+
+
+def methods(points: pd.DataFrame) -> Figure:
+    """Loads along several axes at once: reconstructed against applied component, by equations and by matrix."""
+    fig, axes = style.figure(2.9, columns=3)
+    several = points[points["axis"].str.len() > 1]
+    unit = {axis: _units(axis) for axis in several["axis"].unique()}
+    for k, (axis, name) in enumerate(zip(axes, AXES, strict=True)):
+        applied = several["load_n"] * several["axis"].map({label: part[k] for label, part in unit.items()})
+        for method, colour, marker, label in (
+            ("equations", style.RED, "o", "thesis's equations"),
+            ("matrix", style.BLUE, "^", "calibration matrix"),
+        ):
+            mine = (several["method"] == method).to_numpy()
+            there = applied[mine] + several.loc[mine, f"error_{name}_n"]
+            axis.plot(applied[mine], there, marker, color=colour, markersize=3, label=label, mfc="none")
+        ends = np.array([applied.min(), applied.max()])
+        axis.plot(ends, ends, color=style.BLACK, linewidth=0.7, zorder=0)
+        axis.set(xlabel=f"applied $F_{name}$ (N)", ylabel=f"reconstructed $F_{name}$ (N)")
+    handles, labels = axes[0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=2)
+    return fig
+
+
+def _units(axis: str) -> np.ndarray:
+    """Direction of a load of that name, loads along z pull up."""
+    together = np.array([1.0 if "x" in axis else 0.0, 1.0 if "y" in axis else 0.0, -1.0 if "z" in axis else 0.0])
+    return together / np.linalg.norm(together)
+
+
+def dynamic(flights: pd.DataFrame) -> Figure:
+    """Thrust over time of each set on the three platforms (fig. 2.47)."""
+    numbers = sorted(flights["set"].unique())
+    fig, axes = style.figure(1.6 * len(numbers), len(numbers), 1, sharex=True, squeeze=False)
+    axes = axes[:, 0]
+    for number, axis in zip(numbers, axes, strict=True):
+        for platform in ("jr3", "pla", "al"):
+            flight = flights[(flights["set"] == number) & (flights["platform"] == platform)]
+            values = flight["zero_phase_n"].to_numpy()
+            kept = style.thin(values, 700)
+            axis.plot(
+                flight["time_s"].to_numpy()[kept],
+                values[kept],
+                color=PLATFORM_COLOUR[platform],
+                linewidth=0.6 if platform == "jr3" else 1.0,
+                label=PLATFORM[platform],
+            )
+        axis.set_ylabel(f"set {number}: thrust (N)")
+    axes[-1].set_xlabel("time (s)")
+    named = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    fig.legend(named.values(), named.keys(), loc="outside lower center", ncols=3)
+    return fig
+
+
+def tensile(curves: pd.DataFrame, specimens: pd.DataFrame) -> Figure:
+    """Stress against strain of all specimens (fig. 2.29), and close by the 0.2 % yield points."""
+    fig, (whole, close) = style.figure(3.0, columns=2, gridspec_kw={"width_ratios": [1.3, 1]})
+    for colour, (infill, part) in zip(style.CYCLE, curves.groupby("infill_percent"), strict=False):
+        for number, (_, curve) in enumerate(part.groupby("specimen")):
+            label = f"{infill} %" if number == 0 else None
+            for axis in (whole, close):
+                axis.plot(100 * curve["strain"], curve["stress_pa"] / 1e6, color=colour, linewidth=0.8, label=label)
+        found = specimens[specimens["infill_percent"] == infill]
+        close.plot(100 * found["yield_strain"], found["yield_mpa"], "o", color=colour, markersize=4)
+    for axis in (whole, close):
+        axis.set_xlabel("strain (%)")
+    whole.set(xlim=(0, None), ylim=(0, None), ylabel="stress (MPa)")
+    whole.legend(title="infill")
+    close.set(xlim=(0, 1.6), ylim=(0, 24), title="0.2 % yield")
+    return fig

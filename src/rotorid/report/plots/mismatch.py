@@ -1,0 +1,260 @@
+"""Figures of a mismatch verdict: before and after, where, in which regime, how much better."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from rotorid.report.plots import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN_SAMPLES = 1600
+SMOOTH_S = 0.5
+STRIP_CELL_S = 0.5
+LOUDEST = 10.0
+"""Size beside the noise at which the heat strip's colour ends."""
+SHADE = "#f3e6d8"
+
+
+def svg(fig: Figure) -> str:
+    """The figure as SVG text, the same for the same data; closes it."""
+    import matplotlib.pyplot as plt
+
+    names_are_names(fig)
+    text = io.StringIO()
+    fig.savefig(text, format="svg", metadata={"Date": None})
+    plt.close(fig)
+    return text.getvalue()
+
+
+def names_are_names(fig: Figure) -> None:
+    """Let no text of the figure be read as mathematics: a run or a column may be called `$x$`.
+
+    The numbers at a logarithmic axis, which matplotlib writes as powers of ten, stay what they are.
+    """
+    from matplotlib.text import Text
+
+    powers = {
+        label
+        for ax in fig.axes
+        for axis in (ax.xaxis, ax.yaxis)
+        if axis.get_scale() == "log"
+        for label in axis.get_ticklabels(which="both")
+    }
+    for text in fig.findobj(Text):
+        if text not in powers:
+            text.set_parse_math(False)
+
+
+def smoothed(values: np.ndarray, width: int) -> np.ndarray:
+    """Centred moving mean over `width` samples, the ends over what there is."""
+    half = max(width // 2, 0)
+    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(values))])
+    index = np.arange(len(values))
+    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    return (total[last] - total[first]) / (last - first)
+
+
+def before_and_after(
+    time_s: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    noise: float | None,
+    label: str,
+    unit: str,
+    where: Sequence[tuple[float, float]] = (),
+) -> Figure:
+    """Error of one channel of one run with the believed vehicle above, with the improved one below.
+
+    Faint: every sample; strong: half-second mean; grey band: two sigma of the sensors' noise; tinted: where the
+    mismatch was located.
+    """
+    fig, axes = style.figure(3.5, rows=2, sharex=True, sharey=True)
+    period = float(np.median(np.diff(time_s)))
+    reach = 1.05 * float(np.nanquantile(np.abs(before), 0.998))
+    for ax, values, name, colour in (
+        (axes[0], before, "as believed", style.COLOUR["before"]),
+        (axes[1], after, "improved", style.COLOUR["after"]),
+    ):
+        for start, stop in where:
+            ax.axvspan(start, stop, color=SHADE, lw=0, zorder=0)
+        if noise:
+            ax.axhspan(-2 * noise, 2 * noise, color="#d9d9d9", lw=0, zorder=0.5)
+        kept = style.thin(values, SHOWN_SAMPLES)
+        ax.plot(time_s[kept], values[kept], color=colour, lw=0.5, alpha=0.35)
+        ax.plot(time_s, smoothed(values, int(SMOOTH_S / period)), color=colour, lw=1.4)
+        ax.axhline(0, color="black", lw=0.5)
+        ax.set_title(name, loc="left", color=colour, fontweight="bold", pad=3)
+        ax.set_ylabel(f"error ({unit})")
+    axes[0].set_title(label, loc="right", color=style.GREY, pad=3)
+    axes[0].set_ylim(-reach, reach)
+    axes[1].set_xlim(time_s[0], time_s[-1])
+    axes[1].set_xlabel("time (s)")
+    return fig
+
+
+def heat_strip(
+    channels: Sequence[str],
+    labels: Sequence[str],
+    runs: Sequence[str],
+    held_out: Sequence[str],
+    sizes: Mapping[tuple[str, str, str], tuple[np.ndarray, np.ndarray]],
+    located: Mapping[tuple[str, str], Sequence[tuple[float, float]]],
+) -> Figure:
+    """Size of the error beside the noise, channels down, the runs' time across, before above after.
+
+    `sizes` maps (stage, run, channel) to instants and sizes in units of the noise; `located` maps (run, channel)
+    to intervals, which are underlined.
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib.colors import LogNorm
+
+    height = 0.9 + 2 * 0.19 * len(channels)
+    span = {r: _span(sizes, r) for r in runs}
+    widths = [max(span[r][1] - span[r][0], 1e-3) for r in runs]
+    style.use()
+    fig, axes = plt.subplots(
+        2,
+        len(runs),
+        figsize=(style.TEXT_WIDTH_IN, height),
+        squeeze=False,
+        sharey=True,
+        gridspec_kw={"width_ratios": widths},
+    )
+    norm = LogNorm(0.7, LOUDEST)
+    for row, stage in enumerate(("before", "after")):
+        for column, run in enumerate(runs):
+            ax = axes[row, column]
+            for line, channel in enumerate(channels):
+                if (stage, run, channel) not in sizes:
+                    continue
+                time_s, size = sizes[stage, run, channel]
+                step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else STRIP_CELL_S
+                edges = np.append(time_s - step / 2, time_s[-1] + step / 2)
+                image = np.clip(size, 0.7, LOUDEST)[None, :]
+                ax.pcolormesh(edges, [line - 0.44, line + 0.36], image, norm=norm, cmap="YlOrRd", rasterized=True, lw=0)
+                if row == 0:
+                    for start, stop in located.get((run, channel), ()):
+                        ax.plot([start, stop], [line + 0.43] * 2, color="black", lw=1.2, solid_capstyle="butt")
+            ax.set_xlim(*span[run])
+            ax.grid(False)
+            ax.tick_params(length=2)
+            for side in ("left", "bottom"):
+                ax.spines[side].set_visible(False)
+            if row == 0:
+                ax.set_xticklabels([])
+                name = run if len(run) <= 14 else f"{run[:12]}…"
+                ax.set_title(f"{name}\nheld out" if run in held_out else f"{name}\n", fontsize=7.5, pad=3)
+            else:
+                ax.locator_params(axis="x", nbins=3)
+        axes[row, 0].set_yticks(range(len(channels)), labels)
+        axes[row, 0].set_ylabel("as believed" if row == 0 else "improved")
+    axes[0, 0].set_ylim(len(channels) - 0.4, -0.6)
+    fig.supxlabel("time (s)", fontsize=9.5)
+    fig.get_layout_engine().set(w_pad=0.01, wspace=0.01)
+    scale = fig.colorbar(
+        plt.cm.ScalarMappable(norm=norm, cmap="YlOrRd"), ax=axes, fraction=0.02, pad=0.01, ticks=[1, 2, 5, 10]
+    )
+    scale.ax.set_yticklabels(["1", "2", "5", "10"])
+    scale.ax.minorticks_off()
+    scale.set_label("error / noise")
+    return fig
+
+
+def _span(sizes, run: str) -> tuple[float, float]:
+    times = [t for (_, r, _), (t, _) in sizes.items() if r == run and len(t)]
+    if not times:
+        return 0.0, 1.0
+    start, stop = min(t[0] for t in times), max(t[-1] for t in times)
+    # A run of a single cell is as wide as that.
+    return (start, stop) if stop > start else (start - STRIP_CELL_S / 2, stop + STRIP_CELL_S / 2)
+
+
+def gains(labels: Sequence[str], before, refitted, after) -> Figure:
+    """Error over noise of every channel: as believed, refitted, improved (each (n,), NaN where unknown)."""
+    fig, ax = style.figure(0.75 + 0.2 * len(labels))
+    rows = np.arange(len(labels))
+    before, refitted, after = (np.asarray(v, float) for v in (before, refitted, after))
+    ax.hlines(rows, np.minimum(before, after), np.maximum(before, after), color="#cccccc", lw=1.5, zorder=1)
+    ax.plot(before, rows, "o", color=style.COLOUR["before"], label="as believed")
+    ax.plot(refitted, rows, "o", color=style.COLOUR["refitted"], ms=3.5, label="values refitted")
+    ax.plot(after, rows, "o", color=style.COLOUR["after"], label="improved")
+    ax.axvline(1, color=style.GREY, ls="--", lw=1)
+    ax.set_xscale("log")
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    shown = np.concatenate([before, refitted, after, [1.0]])
+    shown = shown[np.isfinite(shown) & (shown > 0)]
+    low, high = 0.8 * shown.min(), 1.25 * shown.max()
+    ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if low <= t <= high]
+    ax.xaxis.set_major_locator(FixedLocator(ticks))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xlim(low, high)
+    ax.set_yticks(rows, labels)
+    ax.set_ylim(len(labels) - 0.5, -0.5)
+    ax.grid(axis="y", visible=False)
+    ax.set_xlabel("error / sensors' noise (1: nothing left to gain)")
+    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.1)
+    return fig
+
+
+CHANNELS = {
+    **{f"force_{axis}": (f"$F_{axis}$", "N") for axis in "xyz"},
+    **{f"moment_{axis}": (f"$M_{axis}$", "N m") for axis in "xyz"},
+}
+
+
+def errors_over_time(traces: pd.DataFrame, channels: Sequence[str], located: pd.DataFrame) -> Figure:
+    """Measured minus simulated over time, believed and improved vehicle, one channel a row; tinted: located.
+
+    `traces` has `time_s channel run before after` of one run, `located` `run channel start_s stop_s`.
+    """
+    fig, axes = style.figure(0.4 + 1.15 * len(channels), len(channels), 1, sharex=True, squeeze=False)
+    for axis, channel in zip(axes[:, 0], channels, strict=True):
+        part = traces[traces["channel"] == channel]
+        here = located[(located["channel"] == channel) & located["run"].isin(part["run"])]
+        for row in here.itertuples():
+            axis.axvspan(row.start_s, row.stop_s, color=SHADE, lw=0, zorder=0)
+        axis.plot(part["time_s"], part["before"], color=style.COLOUR["before"], lw=0.8, label="as believed")
+        axis.plot(part["time_s"], part["after"], color=style.COLOUR["after"], lw=0.8, label="improved")
+        label, unit = CHANNELS[channel]
+        axis.set_ylabel(f"{label} ({unit})")
+    axes[-1, 0].set_xlabel("time (s)")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    return fig
+
+
+def errors_by_channel(channels: pd.DataFrame) -> Figure:
+    """Held-out error of each channel over the sensors' noise: as believed, values refitted, with the effects.
+
+    `channels` has `channel before refitted after noise_floor`.
+    """
+    fig, axis = style.figure(2.6)
+    places = np.arange(len(channels))
+    for shift, stage, name in (
+        (-0.2, "before", "as believed"),
+        (0.0, "refitted", "values refitted"),
+        (0.2, "after", "improved"),
+    ):
+        axis.plot(
+            places + shift,
+            channels[stage] / channels["noise_floor"],
+            "o",
+            color=style.COLOUR[stage],
+            label=name,
+            markersize=5,
+        )
+    axis.axhline(1, color=style.COLOUR["noise"], lw=1, ls="--")
+    axis.text(len(channels) - 0.45, 1.0, "noise", color=style.COLOUR["noise"], va="bottom", ha="right", fontsize=8.5)
+    axis.set_yscale("log")
+    axis.set_xticks(places, [CHANNELS[name][0] for name in channels["channel"]])
+    axis.set_ylabel("error / sensors' noise")
+    fig.legend(loc="outside upper right", ncols=3)
+    return fig

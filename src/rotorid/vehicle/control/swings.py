@@ -1,0 +1,125 @@
+"""Flights for a first look at a vehicle: swings in roll, pitch and yaw about hover under an attitude controller.
+
+The pilot knows the believed vehicle alone. As a pilot does, he finds the throttle that carries what he flies, and turns
+his gains down where the rotors answer more strongly or later than believed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.effects.contract import DELAY, LAG
+from rotorid.errors import InputError
+from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import columns as c
+from rotorid.vehicle.control.pid import AttitudePid, Gains
+from rotorid.vehicle.control.references import AttitudeReference
+from rotorid.vehicle.flyable import flyable
+from rotorid.vehicle.hover import hover
+from rotorid.vehicle.improved import active_speed_forms, command_path, record_as_stated, simulate_as_stated
+from rotorid.vehicle.mixer import allocation_matrix
+from rotorid.vehicle.simulator import Noise, Start
+
+STIFFNESS_RAD_S, DAMPING = 10.0, 0.8
+"""Natural frequency and damping of the attitude loop that flies the vehicle."""
+DERIVATIVE_S = 0.02
+"""Time over which the pilot's rate of turn is smoothed."""
+LATE_RAD = 0.4
+"""Natural frequency times all that comes late, at most: at the crossover of such a loop, twice the natural frequency,
+this leaves half of its phase margin of about 70 degrees."""
+MEAN_TILT_COSINE = 0.96
+"""Of the swings, roughly."""
+SECONDS, FLIGHTS, SEED = 20.0, 2, 1
+"""The flights that `rotorid simulate` makes by default, and that a vehicle must stand to be delivered."""
+YAW_SHARE = 0.6
+"""Of what each rotor may turn faster or slower than in hover, by its square: what the yaw may ask for.
+
+A yaw that asks for all that the rotors can do leaves nothing to hold roll and pitch: such a pilot turns a sound vehicle
+over.
+"""
+LEAST_ROOM = 0.05
+"""Of the square of the hover's speed: below it a vehicle that is at its limit could not be steered at all."""
+START_HEIGHT_M = 100.0
+"""Above the ground at the start: out of its effect, and in the air until the end though nobody holds the height."""
+
+
+def remarks(vehicle: Vehicle) -> tuple[str, ...]:
+    """What `swings` flies otherwise than the file says, a sentence each; InputError for what does not fly."""
+    flown, said = flyable(vehicle)
+    found = hover(flown, command_path(flown), START_HEIGHT_M)
+    if found.carried < 1:
+        share = 100 * max(found.carried, 0.0)
+        said += (f"The vehicle sinks: all that its rotors can do carries {share:.0f} % of what hover needs.",)
+    return said
+
+
+def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int, every: int = 2) -> RecordingSet:
+    """`flights` simulated flights of a vehicle with the effects that it states, as noisy sensors record them.
+
+    Every how many steps of 2 ms a sample is kept is `every`. The set's vehicle is the one without the effects.
+    InputError for what does not fly, or where a number makes no flight.
+    """
+    if not seconds > 0 or flights < 1:
+        raise InputError("seconds must be more than 0 and flights at least 1")
+    vehicle, _ = flyable(vehicle)
+    steady = hover(vehicle, command_path(vehicle), START_HEIGHT_M)
+    stiffness = min(STIFFNESS_RAD_S, LATE_RAD / (DERIVATIVE_S + lateness_s(vehicle)))
+    # Tilted by the swings a vehicle needs a little more than level.
+    tilted = (1 / MEAN_TILT_COSINE - 1) * vehicle.mass_kg * vehicle.gravity_m_s2
+    thrust_n = steady.thrust_n + tilted / steady.gain
+    j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
+    gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * DAMPING * stiffness * j))
+    most = (np.inf, np.inf, most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
+    noise = Noise(
+        angular_velocity_rad_s=0.01,
+        specific_force_m_s2=0.1,
+        velocity_m_s=0.02,
+        position_m=0.01,
+        rotor_speed_relative=0.003,
+    )
+    start = Start()
+    if vehicle.ground_z_m is not None:
+        start = Start(position_m=np.array([[0.0, 0.0, vehicle.ground_z_m - START_HEIGHT_M]]))
+    runs: list[Run] = []
+    believed = vehicle
+    for number in range(flights):
+        rng = np.random.default_rng([seed, number])
+        phase = rng.uniform(0, 2 * np.pi, 3)
+
+        def wanted(t: float, phase=phase) -> np.ndarray:
+            swing = np.sin(np.array([0.9, 0.7, 0.5]) * t + phase) + 0.5 * np.sin(np.array([3.1, 3.7, 1.3]) * t)
+            return np.array([0.25, 0.25, 0.4]) * (swing + 0.3 * np.sin(np.array([9.1, 11.3, 7.1]) * t + phase[::-1]))
+
+        reference = AttitudeReference("swings", thrust_n, wanted)
+        pilot = AttitudePid(vehicle, reference, gains, DERIVATIVE_S, most, steady.moments_n_m)
+        trace = simulate_as_stated(vehicle, pilot, seconds, 0.002, start=start)
+        made = record_as_stated(trace, vehicle, f"flight_{number + 1}", noise, rng, every=every)
+        believed = made.vehicle
+        runs += made.runs
+    return RecordingSet(name, believed, tuple(runs))
+
+
+def most_yaw_n_m(vehicle: Vehicle, hovering: np.ndarray) -> float:
+    """Yaw moment, N m, that the pilot asks for at most, beyond the wrench (4,) of the hover."""
+    asked, yaw = allocation_matrix(vehicle) @ hovering, allocation_matrix(vehicle)[:, 3]
+    limits = vehicle.rotor_speed_limits_rad_s
+    room = asked if limits is None else np.minimum(asked - limits[0] ** 2, limits[1] ** 2 - asked)
+    room = np.maximum(room, LEAST_ROOM * asked.mean())
+    return float(YAW_SHARE * (room / np.abs(yaw)).min())
+
+
+def turned_over(recordings: RecordingSet) -> tuple[str, ...]:
+    """A sentence where a vehicle that nothing held upright turned over, by the attitude that was recorded."""
+    names = []
+    for run in recordings.runs:
+        _, x, y, _ = run.array(c.QUATERNION).T
+        if (2 * (x**2 + y**2) > 1.0).any():  # 1 − 2 (x² + y²) is the cosine of the tilt
+            names.append(run.name)
+    return (
+        (f"The vehicle turned over in {', '.join(names)}: its attitude controller does not hold it.",) if names else ()
+    )
+
+
+def lateness_s(vehicle: Vehicle) -> float:
+    """Delays and time constants between command and rotor speed together, s."""
+    return sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))

@@ -1,0 +1,361 @@
+"""An exported vehicle flown in the tool it is for, beside ours with what the file expresses, on the same commands.
+
+What a file cannot express is named by `rotorid.vehicle.exports.forms`; a flight here shows that what it does express
+flies as it does with us. RotorPy and MuJoCo fly their file themselves. Gazebo and gym-pybullet-drones are no packages
+that pip installs: their file is read and integrated by an engine that is one (Drake reads SDF, Bullet is
+gym-pybullet-drones' own), and what their own code adds, the forces of the rotors, is written here by their published
+equations from the file's numbers.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from rotorid.errors import InputError
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.exports.forms import AT_ONCE_S, FLU, Exported, expressed
+from rotorid.vehicle.improved import simulate_as_stated
+from rotorid.vehicle.mixer import hover_speed_rad_s
+from rotorid.vehicle.simulator import Commands, Start
+
+STEP_S = 0.001
+START_M_S = 2.0
+"""Speed forward and to the right at the start, so that drag shows."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far two simulations part: largest distance and angle, beside how far ours flew and turned."""
+
+    position_m: float
+    angle_rad: float
+    flown_m: float
+    turned_rad: float
+    where: str = ""
+
+    @property
+    def sentence(self) -> str:
+        return (
+            f"flown in {self.where} beside ours, with what the file expresses, on the same commands: at most "
+            f"{self.position_m:.2g} m apart after {self.flown_m:.2g} m of way and "
+            f"{self.angle_rad:.2g} rad after {self.turned_rad:.2g} rad of turning"
+        )
+
+
+def commands_of(vehicle: Vehicle, duration_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) and rotor speeds (n, k), rad/s, about hover that turn the vehicle about every axis in turn."""
+    time = np.arange(int(duration_s / STEP_S) + 1) * STEP_S
+    hover = hover_speed_rad_s(vehicle)
+    phase = 2 * np.pi * np.arange(vehicle.rotor_count) / vehicle.rotor_count
+    # Phases around the vehicle roll and pitch it; their torques cancel, so yaw has a swing of its own.
+    swing = 0.004 * np.sin(2 * np.pi * 1.5 * time[:, None] + phase) + 0.02 * np.sin(2 * np.pi * 0.7 * time)[:, None]
+    swing = swing + 0.02 * np.sin(2 * np.pi * 1.1 * time)[:, None] * vehicle.yaw_signs()
+    return time, hover * (1 + swing)
+
+
+def ours(vehicle: Vehicle, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position (n, 3), attitude (n, 4), scalar first, and rotor speeds (n, k), forward-left-up, as we fly it.
+
+    `speeds` (n, k), rad/s, are those of the rotors, each held for a step.
+    """
+    start = Start(velocity_m_s=np.array([[START_M_S, START_M_S, 0.0]]), rotor_speed_rad_s=speeds[:1])
+    time = STEP_S * np.arange(len(speeds))
+    trace = simulate_as_stated(vehicle, Commands(time, speeds), time[-1], STEP_S, start=start)
+    quaternion = trace.quaternion[0] * np.array([1.0, *FLU])
+    return trace.position[0] * FLU, quaternion, trace.rotor_speed[0]
+
+
+def lagging(speeds: np.ndarray, up_s: float, down_s: float) -> np.ndarray:
+    """Speeds (n, k) that follow commands (n, k) with a first-order lag up and down; at once where it is 0."""
+    if up_s == 0 or down_s == 0:
+        return speeds
+    out = speeds.copy()
+    for k in range(1, len(out)):
+        keep = np.exp(-STEP_S / np.where(speeds[k - 1] > out[k - 1], up_s, down_s))
+        out[k] = keep * out[k - 1] + (1 - keep) * speeds[k - 1]
+    return out
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angle (n,), rad, between attitudes (n, 4); exact for small ones, where an arc cosine is not."""
+    a, b = (q / np.linalg.norm(q, axis=1, keepdims=True) for q in (a, b))
+    apart = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+    return 4 * np.arcsin(np.clip(apart / 2, 0, 1))
+
+
+def difference(
+    there: tuple[np.ndarray, np.ndarray], here: tuple[np.ndarray, np.ndarray, np.ndarray], where: str
+) -> Difference:
+    """Largest differences of positions (n, 3) and attitudes (n, 4)."""
+    return Difference(
+        float(np.linalg.norm(there[0] - here[0], axis=1).max()),
+        float(angle_between(there[1], here[1]).max()),
+        float(np.linalg.norm(np.diff(here[0], axis=0), axis=1).sum()),
+        float(angle_between(here[1], here[1][:1]).max()),
+        where,
+    )
+
+
+def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
+    """Fly RotorPy's Multirotor with the exported parameters beside ours."""
+    from rotorpy.vehicles.multirotor import Multirotor
+
+    time, speeds = commands_of(vehicle, duration_s)
+    tau_s = exported.parameters["tau_m"]
+    state = {
+        "x": np.zeros(3), "v": np.array([START_M_S, -START_M_S, 0.0]), "q": np.array([0.0, 0.0, 0.0, 1.0]),
+        "w": np.zeros(3), "wind": np.zeros(3), "rotor_speeds": speeds[0],
+    }  # fmt: skip
+    tight = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}
+    with read_by("RotorPy"):
+        flyer = Multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds", integrator_kwargs=tight)
+    at_once = tau_s == AT_ONCE_S
+    if at_once:  # the speed is set at every step and stays over it
+        flyer.tau_m = 1e6
+    position, attitude = [state["x"]], [np.array([1.0, 0, 0, 0])]
+    for k in range(len(time) - 1):
+        if at_once:
+            state["rotor_speeds"] = speeds[k]
+        state = flyer.step(state, {"cmd_motor_speeds": speeds[k]}, STEP_S)
+        position.append(state["x"])
+        attitude.append(np.asarray(state["q"])[[3, 0, 1, 2]])
+    turning = speeds if at_once else lagging(speeds, tau_s, tau_s)
+    here = ours(expressed(vehicle, "rotorpy"), turning)
+    return difference((np.array(position), np.array(attitude)), here, "RotorPy")
+
+
+def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
+    """Fly the exported model in MuJoCo beside ours without the effects that the model cannot express."""
+    import mujoco
+
+    with read_by("MuJoCo"):
+        model = mujoco.MjModel.from_xml_string(exported.text)
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0, 0, 0, 1, 0, 0, 0]
+    data.qvel[:3] = [START_M_S, -START_M_S, 0.0]
+    time, speeds = commands_of(vehicle, duration_s)
+    thrust = vehicle.thrust_coefficients_n_s2() * speeds**2
+    tau_s = float(model.actuator_dynprm[0, 0]) if model.na else 0.0
+    data.act[:] = thrust[0, : model.na]
+    position, attitude = [data.qpos[:3].copy()], [data.qpos[3:7].copy()]
+    for k in range(len(time) - 1):
+        data.ctrl[:] = thrust[k]
+        mujoco.mj_step(model, data)
+        position.append(data.qpos[:3].copy())
+        attitude.append(data.qpos[3:7].copy())
+    here = ours(expressed(vehicle, "mjcf"), np.sqrt(lagging(speeds**2, tau_s, tau_s)))
+    return difference((np.array(position), np.array(attitude)), here, "MuJoCo")
+
+
+@contextmanager
+def read_by(tool: str) -> Iterator[None]:
+    """What a tool says of a file that it does not read, in one sentence."""
+    try:
+        yield
+    except Exception as error:  # each tool has errors of its own
+        raise InputError(f"{tool} does not read the exported vehicle: {' '.join(str(error).split())}") from error
+
+
+@dataclass(frozen=True)
+class GazeboMotor:
+    """What one `MulticopterMotorModel` of an SDF file says; SI units."""
+
+    link: str
+    sense: float
+    """1 for counter-clockwise seen from above, else −1."""
+    up_s: float
+    down_s: float
+    thrust: float
+    moment: float
+    """Torque over thrust, m."""
+    drag: float
+
+    @staticmethod
+    def all_of(text: str) -> list[GazeboMotor]:
+        """The motors of a model, in the order of their numbers."""
+
+        def read(p: ElementTree.Element) -> GazeboMotor:
+            value = {e.tag: e.text or "" for e in p}
+            names = ("timeConstantUp", "timeConstantDown", "motorConstant", "momentConstant", "rotorDragCoefficient")
+            sense = 1.0 if value["turningDirection"] == "ccw" else -1.0
+            return GazeboMotor(value["linkName"], sense, *(float(value[name]) for name in names))
+
+        plugins = ElementTree.fromstring(text).iter("plugin")
+        return [read(p) for p in sorted(plugins, key=lambda p: int(p.findtext("motorNumber", "0")))]
+
+
+def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
+    """Fly the exported SDF model in Drake beside ours without the effects that the model cannot express.
+
+    Drake reads masses, inertias, places and joints. It has no motor model: thrust C_F ω² and drag −k ω v⊥ act on the
+    rotor's link and the torque on the body, as in Gazebo's `MulticopterMotorModel::UpdateForcesAndMoments`.
+    """
+    from pydrake.common.value import Value
+    from pydrake.math import RotationMatrix
+    from pydrake.multibody.math import SpatialForce, SpatialVelocity
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
+    from pydrake.systems.analysis import Simulator
+    from pydrake.systems.framework import DiagramBuilder, LeafSystem
+
+    motors = GazeboMotor.all_of(exported.text)
+    time, speeds = commands_of(vehicle, duration_s)
+    turning = np.stack(
+        [
+            speeds[:, i] if m.up_s == AT_ONCE_S else lagging(speeds[:, [i]], m.up_s, m.down_s)[:, 0]
+            for i, m in enumerate(motors)
+        ],
+        axis=1,
+    )
+    builder = DiagramBuilder()
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    with read_by("Drake"):
+        Parser(plant).AddModelsFromString(exported.text, "sdf")
+    plant.mutable_gravity_field().set_gravity_vector([0, 0, -vehicle.gravity_m_s2])
+    plant.Finalize()
+    base = plant.GetBodyByName("base_link")
+    links = [plant.GetBodyByName(m.link) for m in motors]
+    inside = plant.CreateDefaultContext()
+
+    class Rotors(LeafSystem):
+        def __init__(self) -> None:
+            super().__init__()
+            self.DeclareVectorInputPort("state", plant.num_multibody_states())
+            self.DeclareAbstractOutputPort("forces", lambda: Value[list[ExternallyAppliedSpatialForce]](), self.push)
+
+        def push(self, context: Any, out: Any) -> None:
+            plant.SetPositionsAndVelocities(inside, self.get_input_port().Eval(context))
+            step = min(int(context.get_time() / STEP_S + 1e-6), len(turning) - 1)
+            turned = plant.EvalBodyPoseInWorld(inside, base).rotation().matrix()
+            forces = []
+            for m, link, speed in zip(motors, links, turning[step], strict=True):
+                moving = plant.EvalBodySpatialVelocityInWorld(inside, link).translational()
+                across = moving - (moving @ turned[:, 2]) * turned[:, 2]
+                thrust = m.thrust * speed**2
+                pull = thrust * turned[:, 2] - abs(speed) * m.drag * across
+                for body, torque, force in (
+                    (link, np.zeros(3), pull),
+                    (base, -m.sense * m.moment * thrust * turned[:, 2], np.zeros(3)),
+                ):
+                    applied = ExternallyAppliedSpatialForce()
+                    applied.body_index, applied.p_BoBq_B = body.index(), np.zeros(3)
+                    applied.F_Bq_W = SpatialForce(torque, force)
+                    forces.append(applied)
+            out.set_value(forces)
+
+    rotors = builder.AddSystem(Rotors())
+    builder.Connect(plant.get_state_output_port(), rotors.get_input_port())
+    builder.Connect(rotors.get_output_port(), plant.get_applied_spatial_force_input_port())
+    simulator = Simulator(builder.Build())
+    simulator.get_mutable_integrator().set_fixed_step_mode(True)
+    simulator.get_mutable_integrator().set_maximum_step_size(STEP_S)
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    plant.SetFreeBodySpatialVelocity(context, base, SpatialVelocity([0, 0, 0], [START_M_S, -START_M_S, 0]))
+    start = plant.EvalBodyPoseInWorld(context, base).translation()
+    position, attitude = [], []
+    for now in time:
+        simulator.AdvanceTo(now)
+        pose = plant.EvalBodyPoseInWorld(context, base)
+        position.append(pose.translation() - start)
+        attitude.append(RotationMatrix(pose.rotation()).ToQuaternion().wxyz())
+    where = "Drake by the equations of Gazebo's motor model"
+    return difference((np.array(position), np.array(attitude)), ours(expressed(vehicle, "sdf"), turning), where)
+
+
+BULLET_DAMPING = 0.04
+"""c of the deceleration c (1 + |v|) v, and the same for turning, that Bullet gives to a body by default."""
+
+
+def in_pybullet(
+    vehicle: Vehicle, exported: Exported, duration_s: float = 0.3, damping: float = BULLET_DAMPING
+) -> Difference:
+    """Fly the exported URDF in Bullet beside ours without the effects that gym-pybullet-drones cannot express.
+
+    Forces on the rotors' links, torque and drag on the link at the centre of mass, all from the file's `properties`, as
+    in that tool's `BaseAviary._physics` and `_drag`.
+    """
+    from tempfile import TemporaryDirectory
+
+    import pybullet
+    from pybullet_utils.bullet_client import BulletClient
+
+    same = expressed(vehicle, "gym-pybullet-drones")
+    at_centre = {"form": "at the centre of mass"}  # where that tool has its drag
+    same = same.model_copy(
+        update={"effects": tuple(e | at_centre if e["id"] == "rotor_drag" else e for e in same.effects)}
+    )
+    says = {k: float(v) for k, v in ElementTree.fromstring(exported.text)[0].attrib.items()}
+    time, speeds = commands_of(vehicle, duration_s)
+    order = exported.rotor_order
+    substeps = 10  # its integrator is of first order
+    client = BulletClient(pybullet.DIRECT)
+    try:
+        client.setGravity(0, 0, -vehicle.gravity_m_s2)
+        client.setTimeStep(STEP_S / substeps)
+        with TemporaryDirectory() as folder:
+            path = f"{folder}/{exported.file_name}"
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(exported.text)
+            with read_by("Bullet"):
+                body = client.loadURDF(path, flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
+        client.changeDynamics(body, -1, linearDamping=damping, angularDamping=damping)
+        client.resetBaseVelocity(body, [START_M_S, -START_M_S, 0], [0, 0, 0])
+        position, attitude = [np.zeros(3)], [np.array([1.0, 0, 0, 0])]
+        for k in range(len(time) - 1):
+            turns = speeds[k][list(order)] * 60 / (2 * np.pi)
+            twist = says["km"] * turns**2 * (-1 if exported.mirrored else 1)
+            for _ in range(substeps):
+                for i in range(4):
+                    client.applyExternalForce(body, i, [0, 0, says["kf"] * turns[i] ** 2], [0, 0, 0], client.LINK_FRAME)
+                yaw = -twist[0] + twist[1] - twist[2] + twist[3]
+                client.applyExternalTorque(body, 4, [0, 0, yaw], client.LINK_FRAME)
+                _, turned = client.getBasePositionAndOrientation(body)
+                rotation = np.reshape(client.getMatrixFromQuaternion(turned), (3, 3))
+                velocity = rotation.T @ np.array(client.getBaseVelocity(body)[0])
+                coefficients = np.array([says["drag_coeff_xy"], says["drag_coeff_xy"], says["drag_coeff_z"]])
+                drag = -coefficients * (turns * 2 * np.pi / 60).sum() * velocity
+                client.applyExternalForce(body, 4, drag.tolist(), [0, 0, 0], client.LINK_FRAME)
+                client.stepSimulation()
+            place, turned = client.getBasePositionAndOrientation(body)
+            position.append(np.array(place))
+            attitude.append(np.array(turned)[[3, 0, 1, 2]])
+    finally:
+        client.disconnect()
+    where = "Bullet by the equations of gym-pybullet-drones"
+    return difference((np.array(position), np.array(attitude)), ours(same, speeds), where)
+
+
+FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], Difference]]] = {
+    "rotorpy": ("rotorpy", in_rotorpy),
+    "mjcf": ("mujoco", in_mujoco),
+    "sdf": ("pydrake", in_drake),
+    "gym-pybullet-drones": ("pybullet", in_pybullet),
+}
+"""By form, the module that must be there, and the flight."""
+
+
+def try_out(vehicle: Vehicle, to: str, exported: Exported) -> str:
+    """What a flight beside ours showed, or why none was made; empty for a form that no tool flies.
+
+    InputError where the tool does not read the file.
+    """
+    if to not in FLYERS:
+        return ""
+    package, fly = FLYERS[to]
+    try:
+        return fly(vehicle, exported).sentence
+    except InputError:
+        raise
+    except ImportError as error:
+        if error.name != package and package not in sys.modules:
+            return f"not flown there: {error}"
+        return f"not flown there: {package} is not installed"
+    except Exception as error:  # whatever another tool ends with, the file that it has read is right
+        return f"the trial flight there did not end: {' '.join(str(error).split())}"

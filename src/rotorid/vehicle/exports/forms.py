@@ -1,0 +1,512 @@
+"""A vehicle as RotorPy parameters, as models of MuJoCo, Gazebo and gym-pybullet-drones, and as PX4 parameters.
+
+Those tools have the body forward-left-up: y and z of places change sign, and a rotor that turns counter-clockwise seen
+from above pushes the airframe about minus z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from rotorid.errors import InputError
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.exports.limits import refusal
+from rotorid.vehicle.mixer import hover_speed_rad_s
+
+FLU = np.array([1.0, -1.0, -1.0])
+MOVED_CENTRES = ("moment", "moment and accelerometer", "moment and accelerometer, in space")
+"""Forms of `com_offset` whose moment is that of rotors which sit elsewhere."""
+AT_ONCE_S = 1e-3
+"""Time constant of a motor in tools that need one, where the vehicle states none."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A file for another tool and a sentence for each thing that it cannot express."""
+
+    text: str
+    file_name: str
+    left_out: tuple[str, ...] = ()
+    parameters: dict = field(default_factory=dict)
+    """RotorPy only: the parameters as RotorPy takes them."""
+    rotor_order: tuple[int, ...] = ()
+    """gym-pybullet-drones only: which of our rotors, from 0, its links 0 to 3 are."""
+    mirrored: bool = False
+    """gym-pybullet-drones only: the rotors turn as in its DroneModel.RACE."""
+    companions: dict[str, str] = field(default_factory=dict)
+    """Further files, to each name its text, that stand next to the file."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The effects of a vehicle as far as such forms know them; SI units, body axes forward-right-down."""
+
+    mass_kg: float
+    inertia: np.ndarray
+    """(3, 3), kg m2."""
+    places: np.ndarray
+    """Rotor hubs from the centre of mass, (n, 3), m."""
+    thrust: np.ndarray
+    """C_F by rotor, (n,), N s2."""
+    torque: np.ndarray
+    limits_rad_s: tuple[float, float] | None = None
+    """Lowest and highest rotor speed, with what saturates them."""
+    tau_s: tuple[float, float] = (0.0, 0.0)
+    """Time constants of the rotor speed, up and down; near hover those of the thrust, too."""
+    drag: tuple[float, float] = (0.0, 0.0)
+    """Rotor drag k_d along x and y, N s2/(rad m)."""
+    inflow: float = 0.0
+    lift: float = 0.0
+    flap: float = 0.0
+    frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    damping: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of turning about each axis, N m s/rad."""
+    curve: float = 0.0
+    """Linear share b of T/T_max = b u + (1 − b) u²."""
+    taken: tuple[dict, ...] = ()
+    """Entries of the vehicle's effects that found a place."""
+    left_out: tuple[str, ...] = ()
+
+
+KNOWS = {
+    "rotorpy": frozenset(
+        {"rotor_drag", "axial_inflow", "translational_lift", "flapping_moment", "frame_drag", "motor_lag"}
+        | {"com_offset", "inertia_products", "command_saturation"}
+    ),
+    "mjcf": frozenset({"com_offset", "inertia_products", "motor_lag", "command_saturation"}),
+    "sdf": frozenset({"rotor_drag", "motor_lag", "com_offset", "inertia_products", "command_saturation"}),
+    "gym-pybullet-drones": frozenset({"rotor_drag", "com_offset", "command_saturation"}),
+    "px4": frozenset({"com_offset", "throttle_curve"}),
+}
+"""By form, ids of the effects that it has a place for."""
+
+
+def expressed(vehicle: Vehicle, to: str) -> Vehicle:
+    """The vehicle with those of its effects that a form takes, and the file's limits.
+
+    The lag of the motors is left to who flies it: each tool has its own.
+    """
+    parts = parts_of(vehicle, KNOWS[to])
+    kept = tuple(e for e in parts.taken if e["id"] not in ("motor_lag", "command_saturation"))
+    return vehicle.model_copy(update={"effects": kept, "rotor_speed_limits_rad_s": parts.limits_rad_s})
+
+
+def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
+    """What a form that `knows` these effects can take of a vehicle; the rest goes to `left_out`."""
+    values: dict = {
+        "limits_rad_s": vehicle.rotor_speed_limits_rad_s,
+        "inertia": vehicle.inertia_kg_m2.matrix(),
+        "places": vehicle.rotor_positions_m(),
+        "thrust": vehicle.thrust_coefficients_n_s2(),
+        "torque": vehicle.torque_coefficients_n_m_s2(),
+    }
+    left, kept = [], []
+    for entry in vehicle.effects:
+        name, form, p = entry["id"], entry.get("form", ""), {k: float(v) for k, v in entry["parameters"].items()}
+        said = f"{name} ({form}: {', '.join(f'{k} = {v:.4g}' for k, v in p.items())})"
+        taken = name in knows and _take(values, name, form, p)
+        if not taken:
+            left.append(said)
+            continue
+        kept.append(entry)
+        if isinstance(taken, str):
+            left.append(f"{said}: {taken}")
+    return Parts(vehicle.mass_kg, taken=tuple(kept), left_out=tuple(left), **values)
+
+
+def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str:
+    """Put an effect into the parts; False where its form has no place there, a remark where it fits only nearly."""
+    if name == "rotor_drag" and "k_d" in p:
+        values["drag"] = (p["k_d"], p["k_d"])
+        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+    if name == "axial_inflow" and "k_z" in p:
+        values["inflow"] = p["k_z"]
+        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+    if name == "translational_lift":
+        values["lift"] = p["k_h"]
+        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+    if name == "flapping_moment" and form == "at the hubs":
+        values["flap"] = p["k_flap"]
+        return True
+    if name == "frame_drag" and form in ("isotropic", "per axis"):
+        values["frame"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
+        return True
+    if name == "rotational_damping" and form in ("one constant", "linear"):
+        values["damping"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
+        return True
+    if name == "motor_lag" and form == "one constant":
+        values["tau_s"] = (p["tau"], p["tau"])
+        return True
+    if name == "motor_lag" and form == "up and down":
+        values["tau_s"] = (p["tau_up"], p["tau_down"])
+        return True
+    if name == "motor_lag" and form == "on thrust":
+        values["tau_s"] = (p["tau"], p["tau"])
+        return "taken as a lag of the rotor speed, which near hover has the same time constant"
+    if name == "command_saturation" and values["limits_rad_s"] is not None:
+        low, high = values["limits_rad_s"]
+        if form == "upper limit":
+            values["limits_rad_s"] = (low, min(high, p["w_high"] * high))
+        else:
+            values["limits_rad_s"] = (max(low, p["w_low"] * high), high)
+        return True
+    if name == "throttle_curve" and form == "thrust curve of the throttle" and 0 <= p["b"] <= 1:
+        values["curve"] = p["b"]
+        return True
+    if name == "com_offset" and form in MOVED_CENTRES:
+        values["places"] = values["places"] - np.array([p["r_x"], p["r_y"], 0.0])
+        arm = "" if form == "moment" else "; the accelerometer stays where it was"
+        return f"taken as rotors that sit elsewhere, so that their drag acts there, too{arm}"
+    if name == "inertia_products":
+        j = values["inertia"].copy()
+        for (a, b), key in (((0, 1), "J_xy"), ((0, 2), "J_xz"), ((1, 2), "J_yz")):
+            j[a, b] += p.get(key, 0.0)
+            j[b, a] = j[a, b]
+        values["inertia"] = j
+        return True
+    return False
+
+
+def _in_flu(inertia: np.ndarray) -> np.ndarray:
+    return inertia * np.outer(FLU, FLU)
+
+
+def rotorpy(vehicle: Vehicle) -> Exported:
+    """RotorPy's `quad_params` as a Python file."""
+    parts = parts_of(vehicle, KNOWS["rotorpy"])
+    left = list(parts.left_out)
+    left += _left_of_each_rotor(parts)
+    up, down = parts.tau_s
+    if up != down:
+        left.append(f"motor_lag: {up:.4g} s up and {down:.4g} s down: the mean is taken")
+    if up == 0:
+        left.append(f"rotors that follow at once: RotorPy needs a lag, {AT_ONCE_S:g} s is taken")
+    if vehicle.gravity_m_s2 != 9.81:
+        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: RotorPy has 9.81")
+    j = _in_flu(parts.inertia)
+    low, high = parts.limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle))
+    values = {
+        "mass": parts.mass_kg,
+        **{f"I{a}{b}": float(j["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "yz", "xz")},
+        "num_rotors": vehicle.rotor_count,
+        "rotor_pos": {f"r{i}": (place * FLU).tolist() for i, place in enumerate(parts.places, 1)},
+        "rotor_directions": [-float(s) for s in vehicle.yaw_signs()],
+        "rI": (np.asarray(vehicle.accelerometer_position_m) * FLU).tolist(),
+        "c_Dx": parts.frame[0], "c_Dy": parts.frame[1], "c_Dz": parts.frame[2],
+        "k_eta": float(parts.thrust.mean()), "k_m": float(parts.torque.mean()),
+        "k_d": parts.drag[0], "k_z": parts.inflow, "k_h": parts.lift,
+        # RotorPy has the moment along z up × v, the catalogue along z down × v.
+        "k_flap": -parts.flap,
+        "tau_m": (up + down) / 2 or AT_ONCE_S,
+        "rotor_speed_min": low, "rotor_speed_max": high, "motor_noise_std": 0.0,
+    }  # fmt: skip
+    lines = [f'"""{vehicle.name}, exported by rotorid for RotorPy (body forward-left-up, SI units)."""', ""]
+    lines = [line.replace("\\", "/") for line in lines] + ["import numpy as np", ""]
+    lines += [f"# Not expressed: {sentence}" for sentence in left]
+    lines.append("quad_params = {")
+    for key, value in values.items():
+        if key == "rotor_pos":
+            lines.append('    "rotor_pos": {')
+            lines += [f'        "{name}": np.array({place!r}),' for name, place in value.items()]
+            lines.append("    },")
+        else:
+            shown = f"np.array({value!r})" if isinstance(value, list) else repr(value)
+            lines.append(f'    "{key}": {shown},')
+    lines += ["}", ""]
+    arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in values.items()}
+    arrays["rotor_pos"] = {k: np.array(v) for k, v in values["rotor_pos"].items()}
+    return Exported("\n".join(lines), "rotorpy_params.py", tuple(left), arrays)
+
+
+def mjcf(vehicle: Vehicle) -> Exported:
+    """A MuJoCo model: a free body, a site and a motor a rotor; control i is the thrust of rotor i, N.
+
+    The thrust of a rotor speed ω is C_F ω²; the torque goes along by the motor's gear. A lag is the actuator's own
+    (`dyntype="filterexact"`), of the thrust; `data.act` is then the thrust to start with.
+    """
+    parts = parts_of(vehicle, KNOWS["mjcf"])
+    left = list(parts.left_out)
+    tau_s, lag = 0.0, next((e for e in parts.taken if e["id"] == "motor_lag"), None)
+    if lag is not None:
+        tau_s = sum(parts.tau_s) / 2
+        if lag["form"] == "on thrust":  # what it has is just that
+            left = [sentence for sentence in left if not sentence.startswith("motor_lag")]
+        else:
+            left.append(f"motor_lag: a lag of the rotor speed is taken as one of the thrust, {tau_s:.4g} s")
+    j = _in_flu(parts.inertia)
+    full = " ".join(f"{v:.9g}" for v in (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
+    limit = parts.limits_rad_s
+    dynamics = f' dyntype="filterexact" dynprm="{tau_s:.9g}"' if tau_s > 0 else ""
+    sites, motors = [], []
+    for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True), 1):
+        at = " ".join(f"{v:.9g}" for v in place * FLU)
+        ratio = -signed * parts.torque[i - 1] / parts.thrust[i - 1]
+        ends = " ".join(f"{parts.thrust[i - 1] * speed**2:.9g}" for speed in limit) if limit else ""
+        most = f' ctrlrange="{ends}"' if limit else ""
+        sites.append(f'      <site name="rotor_{i}" pos="{at}"/>')
+        motors.append(f'    <general name="rotor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {ratio:.9g}"{most}{dynamics}/>')
+    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    c_f = ", ".join(f"{v:.6g}" for v in parts.thrust)
+    late = "\n  <!-- Thrust follows its control late: set data.act to the first thrust. -->" if tau_s > 0 else ""
+    name = quoteattr(vehicle.name)
+    nl = "\n"
+    text = f"""<mujoco model={name}>
+{comments}  <!-- Control i is the thrust of rotor i in N: C_F times the square of its speed, C_F = {c_f} N s2. -->{late}
+  <option timestep="0.001" gravity="0 0 -{vehicle.gravity_m_s2:g}" integrator="RK4"/>
+  <worldbody>
+    <body name="vehicle" pos="0 0 1">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="{parts.mass_kg:.9g}" fullinertia="{full}"/>
+      <geom type="box" size="0.02 0.02 0.01" contype="0" conaffinity="0" mass="0"/>
+{nl.join(sites)}
+    </body>
+  </worldbody>
+  <actuator>
+{nl.join(motors)}
+  </actuator>
+</mujoco>
+"""
+    return Exported(text, "vehicle.xml", tuple(left))
+
+
+def px4(vehicle: Vehicle) -> Exported:
+    """Parameters of PX4's control allocation and thrust model, as QGroundControl loads them."""
+    parts = parts_of(vehicle, KNOWS["px4"])
+    left = [*parts.left_out, "mass and inertia: they are parameters of PX4's own simulator alone (--to px4-sih)"]
+    rows: list[tuple[str, float, int]] = [("CA_AIRFRAME", 0, 6), ("CA_ROTOR_COUNT", vehicle.rotor_count, 6)]
+    strongest = parts.thrust.max()
+    for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
+        ratio = parts.torque[i] / parts.thrust[i]
+        values = {"PX": place[0], "PY": place[1], "PZ": place[2], "KM": signed * ratio}
+        values["CT"] = 6.5 * parts.thrust[i] / strongest
+        rows += [(f"CA_ROTOR{i}_{k}", float(v), 9) for k, v in values.items()]
+    limit = parts.limits_rad_s
+    if limit or parts.curve:
+        rows.append(("THR_MDL_FAC", 1.0 - parts.curve, 9))
+    if limit:
+        full = float((parts.thrust * limit[1] ** 2).sum())
+        rows.append(("MPC_THR_HOVER", min(max(vehicle.mass_kg * vehicle.gravity_m_s2 / full, 0.1), 0.8), 9))
+    else:
+        left.append("hover thrust: rotor_speed_limits_rad_s is not stated")
+    comments = [f"# {vehicle.name}, exported by rotorid", *(f"# Not expressed: {s}" for s in left)]
+    lines = [f"1\t1\t{name}\t{value:d}\t{kind}" if kind == 6 else f"1\t1\t{name}\t{value:.9g}\t{kind}"
+             for name, value, kind in rows]  # fmt: skip
+    return Exported("\n".join([*comments, *lines]) + "\n", "vehicle.params", tuple(left))
+
+
+def _left_of_each_rotor(parts: Parts) -> list[str]:
+    """Sentences for tools that know one coefficient for all rotors."""
+    left = []
+    for words, values in (("thrust", parts.thrust), ("torque", parts.torque)):
+        if np.ptp(values) > 0:
+            shown = ", ".join(f"{v:.4g}" for v in values)
+            left.append(f"{words} coefficients differ between rotors ({shown}): their mean is taken")
+    return left
+
+
+def _left_of_the_lowest_speed(parts: Parts) -> list[str]:
+    """A sentence for tools that know no lowest rotor speed."""
+    low = 0.0 if parts.limits_rad_s is None else parts.limits_rad_s[0]
+    return [f"lowest rotor speed of {low:.4g} rad/s: rotors may stand still there"] if low > 0 else []
+
+
+def sdf(vehicle: Vehicle) -> Exported:
+    """A Gazebo model: a body with a link and a joint a rotor, each driven by Gazebo's multicopter motor model.
+
+    That model has thrust C_F ω², torque momentConstant times thrust, a lag up and down, and a drag of the hub
+    −rotorDragCoefficient |ω| v⊥. Rotor speeds are commanded in rad/s on `command/motor_speed`. Source: gz-sim,
+    `src/systems/multicopter_motor_model`; the models of PX4's x500.
+    """
+    parts = parts_of(vehicle, KNOWS["sdf"])
+    left = [*parts.left_out, *_left_of_the_lowest_speed(parts)]
+    up, down = parts.tau_s
+    if up == 0:
+        left.append(f"rotors that follow at once: Gazebo's motor model needs a lag, {AT_ONCE_S:g} s is taken")
+    if vehicle.gravity_m_s2 != 9.81:
+        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it belongs to Gazebo's world file")
+    j = _in_flu(parts.inertia)
+    most = (parts.limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle)))[1]
+    share = min(1e-3 * parts.mass_kg, 0.005)
+    radius = vehicle.rotor_radius_m or 0.05
+    links, motors = [], []
+    for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
+        at = " ".join(f"{v:.9g}" for v in place * FLU)
+        # A light rotor of its own: its mass is taken off the body's; its inertia is small enough to do nothing.
+        spin = 1e-7
+        links.append(f"""    <link name="rotor_{i}">
+      <pose>{at} 0 0 0</pose>
+      <inertial><mass>{share:.9g}</mass>
+        <inertia><ixx>{spin}</ixx><iyy>{spin}</iyy><izz>{spin}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia>
+      </inertial>
+      <visual name="disc">
+        <geometry><cylinder><radius>{radius:.6g}</radius><length>0.002</length></cylinder></geometry>
+      </visual>
+    </link>
+    <joint name="rotor_{i}_joint" type="revolute">
+      <parent>base_link</parent><child>rotor_{i}</child>
+      <axis><xyz>0 0 1</xyz><limit><lower>-1e16</lower><upper>1e16</upper></limit></axis>
+    </joint>""")
+        motors.append(f"""    <plugin filename="gz-sim-multicopter-motor-model-system"
+            name="gz::sim::systems::MulticopterMotorModel">
+      <jointName>rotor_{i}_joint</jointName>
+      <linkName>rotor_{i}</linkName>
+      <turningDirection>{"ccw" if signed > 0 else "cw"}</turningDirection>
+      <timeConstantUp>{up or AT_ONCE_S:.9g}</timeConstantUp>
+      <timeConstantDown>{down or AT_ONCE_S:.9g}</timeConstantDown>
+      <maxRotVelocity>{most:.9g}</maxRotVelocity>
+      <motorConstant>{parts.thrust[i]:.9g}</motorConstant>
+      <momentConstant>{parts.torque[i] / parts.thrust[i]:.9g}</momentConstant>
+      <commandSubTopic>command/motor_speed</commandSubTopic>
+      <motorNumber>{i}</motorNumber>
+      <rotorDragCoefficient>{parts.drag[0]:.9g}</rotorDragCoefficient>
+      <rollingMomentCoefficient>0</rollingMomentCoefficient>
+      <rotorVelocitySlowdownSim>10</rotorVelocitySlowdownSim>
+      <motorType>velocity</motorType>
+    </plugin>""")
+    # What the rotors' links carry must not be counted twice.
+    body = parts.mass_kg - share * len(parts.places)
+    off = -share * (parts.places * FLU).sum(0) / body
+    spread = np.zeros((3, 3))
+    for place, m in [*((p * FLU, share) for p in parts.places), (off, body)]:
+        spread += m * (place @ place * np.eye(3) - np.outer(place, place))
+    own = j - spread - 1e-7 * len(parts.places) * np.eye(3)
+    inertia = "".join(f"<i{a}{b}>{own['xyz'.index(a), 'xyz'.index(b)]:.9g}</i{a}{b}>"
+                      for a, b in ("xx", "yy", "zz", "xy", "xz", "yz"))  # fmt: skip
+    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    nl = "\n"
+    text = f"""<?xml version="1.0"?>
+<sdf version="1.9">
+{comments}  <model name={quoteattr(vehicle.name)}>
+    <pose>0 0 0.3 0 0 0</pose>
+    <link name="base_link">
+      <inertial>
+        <pose>{off[0]:.9g} {off[1]:.9g} {off[2]:.9g} 0 0 0</pose>
+        <mass>{body:.9g}</mass>
+        <inertia>{inertia}</inertia>
+      </inertial>
+      <collision name="body"><geometry><box><size>0.1 0.1 0.04</size></box></geometry></collision>
+      <visual name="body"><geometry><box><size>0.1 0.1 0.04</size></box></geometry></visual>
+    </link>
+{nl.join(links)}
+{nl.join(motors)}
+  </model>
+</sdf>
+"""
+    return Exported(text, "model.sdf", tuple(left))
+
+
+def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
+    """The URDF of gym-pybullet-drones: its `properties` hold what its physics is made of, links 0 to 3 are the rotors.
+
+    It has the thrust kf n² and the yaw torque km n² (n in turns a minute) with the senses −, +, −, + of rotors 0 to 3
+    about z up, a ground effect, and a drag by the sum of rotor speeds at the centre. Source: gym-pybullet-drones,
+    `BaseAviary._parseURDFParameters`, `_physics`, `_drag`, `_groundEffect`, and `cf2x.urdf`.
+    """
+    parts = parts_of(vehicle, KNOWS["gym-pybullet-drones"])
+    left = [*parts.left_out, *_left_of_each_rotor(parts), *_left_of_the_lowest_speed(parts)]
+    if parts.drag[0]:
+        left.append("rotor drag at the hubs: it acts at the centre of mass there, and with Physics.PYB_DRAG alone")
+    order, turned = _round_the_left(parts.places, vehicle.yaw_signs(), vehicle.name)
+    left.append(f"order of the rotors: its links 0 to 3 are rotors {', '.join(str(i + 1) for i in order)} here")
+    if turned:
+        left.append("senses of the rotors: they are those of its DroneModel.RACE, not CF2X; choose that one")
+    j = parts.inertia
+    if np.abs(j - np.diag(np.diag(j))).max() > 0 or any(e["id"] == "inertia_products" for e in vehicle.effects):
+        left.append("products of inertia: it takes the diagonal alone")
+    left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it has 9.8")
+    left.append(
+        "air without friction: it leaves on Bullet's damping, a deceleration of 0.04 (1 + |v|) v and so for turning"
+    )
+    hover = hover_speed_rad_s(vehicle)
+    limit = (parts.limits_rad_s or (0.0, 2 * hover))[1]
+    lift = float(parts.thrust.sum() * limit**2 / (parts.mass_kg * vehicle.gravity_m_s2))
+    # kf and km are by the square of turns a minute, the drag by the sum of rad/s.
+    per_rpm = (2 * np.pi / 60) ** 2
+    arm = float(np.linalg.norm(parts.places[:, :2], axis=1).mean())
+    properties = {
+        "arm": arm,
+        "kf": float(parts.thrust.mean()) * per_rpm,
+        "km": float(parts.torque.mean()) * per_rpm,
+        "thrust2weight": lift,
+        "max_speed_kmh": 100.0,
+        "gnd_eff_coeff": 0.0,
+        "prop_radius": vehicle.rotor_radius_m or arm / 2,
+        "drag_coeff_xy": parts.drag[0],
+        "drag_coeff_z": 0.0,
+        "dw_coeff_1": 0.0,
+        "dw_coeff_2": 0.0,
+        "dw_coeff_3": 0.0,
+    }
+    shown = " ".join(f'{k}="{v:.9g}"' for k, v in properties.items())
+    links = []
+    for k, i in enumerate(order):
+        at = " ".join(f"{v:.9g}" for v in parts.places[i] * FLU)
+        links.append(f"""  <link name="prop{k}_link">
+    <inertial><origin rpy="0 0 0" xyz="{at}"/><mass value="0.0"/>
+      <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
+  </link>
+  <joint name="prop{k}_joint" type="fixed"><parent link="base_link"/><child link="prop{k}_link"/></joint>""")
+    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    nl = "\n"
+    text = f"""<?xml version="1.0" ?>
+<robot name={quoteattr(vehicle.name)}>
+{comments}  <properties {shown}/>
+  <link name="base_link">
+    <inertial><origin rpy="0 0 0" xyz="0 0 0"/><mass value="{parts.mass_kg:.9g}"/>
+      <inertia ixx="{j[0, 0]:.9g}" ixy="0.0" ixz="0.0" iyy="{j[1, 1]:.9g}" iyz="0.0" izz="{j[2, 2]:.9g}"/></inertial>
+    <visual><origin rpy="0 0 0" xyz="0 0 0"/><geometry><cylinder radius="{arm:.6g}" length="0.03"/></geometry></visual>
+    <collision><origin rpy="0 0 0" xyz="0 0 0"/>
+      <geometry><cylinder radius="{arm:.6g}" length="0.03"/></geometry></collision>
+  </link>
+{nl.join(links)}
+  <link name="center_of_mass_link">
+    <inertial><origin rpy="0 0 0" xyz="0 0 0"/><mass value="0.0"/>
+      <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
+  </link>
+  <joint name="center_of_mass_joint" type="fixed"><parent link="base_link"/><child link="center_of_mass_link"/></joint>
+</robot>
+"""
+    return Exported(text, "vehicle.urdf", tuple(left), rotor_order=tuple(order), mirrored=turned)
+
+
+def _round_the_left(places: np.ndarray, signs: np.ndarray, name: str) -> tuple[list[int], bool]:
+    """Rotors front left, rear left, rear right, front right, and whether their senses are the mirrored ones.
+
+    The yaw torque there is (−z0 + z1 − z2 + z3) about z up: 0 and 2 turn counter-clockwise; of `RACE` clockwise.
+    """
+    corners = {(int(np.sign(x)), int(np.sign(y))): i for i, (x, y, _) in enumerate(places)}
+    wanted = ((1, -1), (-1, -1), (-1, 1), (1, 1))
+    if set(corners) != set(wanted):
+        raise InputError(f"{name}: gym-pybullet-drones wants four rotors in X shape")
+    order = [corners[corner] for corner in wanted]
+    senses = [int(signs[i]) for i in order]
+    if senses not in ([1, -1, 1, -1], [-1, 1, -1, 1]):
+        raise InputError(f"{name}: gym-pybullet-drones wants rotors whose senses alternate around the vehicle")
+    return order, senses[0] < 0
+
+
+FORMS: dict[str, Callable[[Vehicle], Exported]] = {
+    "rotorpy": rotorpy,
+    "mjcf": mjcf,
+    "sdf": sdf,
+    "gym-pybullet-drones": gym_pybullet_drones,
+    "px4": px4,
+}
+
+
+def check_exportable(vehicle: Vehicle) -> None:
+    """InputError where a vehicle lacks what every form needs."""
+    if vehicle.kind == "bench" or vehicle.mass_kg is None or vehicle.inertia_kg_m2 is None:
+        raise InputError(f"vehicle {vehicle.name}: only a vehicle with mass, inertia and rotors can be exported")
+
+
+def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
+    """The vehicle for another tool, a form of `FORMS`; InputError says why the tool does not take it."""
+    check_exportable(vehicle)
+    if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
+        raise InputError(f"{vehicle.name}: {why}")
+    return FORMS[to](vehicle)

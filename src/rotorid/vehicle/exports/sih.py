@@ -1,0 +1,115 @@
+"""PX4's own simulator, SIH ("simulation in hardware"): its parameters, and its equations to fly them.
+
+Source: PX4-Autopilot, src/modules/simulation/simulator_sih: sih_params.c, and sih.cpp (read_motors,
+generate_force_and_torques, equations_of_motion) as of version 1.16. Written from them; no code of theirs is here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.exports.forms import Exported, Parts, parts_of
+from rotorid.vehicle.exports.four_in_x import order_in_x
+from rotorid.vehicle.mixer import hover_speed_rad_s
+
+KNOWS = frozenset({"rotor_drag", "rotational_damping", "motor_lag", "inertia_products", "command_saturation"})
+FASTEST_S = 0.005
+"""Shortest SIH_T_TAU that its Euler step of 4 ms stands."""
+RICHEST = 2.0
+"""Full speed over that of the hover, where the vehicle states no limit."""
+
+
+def full_speed_rad_s(vehicle: Vehicle, parts: Parts) -> float:
+    """The speed at which SIH_T_MAX is made."""
+    return parts.limits_rad_s[1] if parts.limits_rad_s else RICHEST * hover_speed_rad_s(vehicle)
+
+
+def with_drag_of_hover(vehicle: Vehicle) -> Vehicle:
+    """The vehicle with its rotor drag, whatever its form, as one that has the same coefficient at the hover's speed."""
+    total = vehicle.rotor_count * hover_speed_rad_s(vehicle)
+    effects = []
+    for entry in vehicle.effects:
+        p = entry.get("parameters", {})
+        if entry["id"] == "rotor_drag" and "k_d" not in p:
+            k_d = p["d"] / total if "d" in p else (p["k_d_x"] + p["k_d_y"]) / 2
+            entry = {"id": "rotor_drag", "form": "at the hubs", "parameters": {"k_d": float(k_d)}}
+        effects.append(entry)
+    return vehicle.model_copy(update={"effects": tuple(effects)})
+
+
+def px4_sih(vehicle: Vehicle) -> Exported:
+    """SIH's parameters as QGroundControl loads them.
+
+    SIH has thrust SIH_T_MAX u and torque SIH_Q_MAX u of a signal u that follows with SIH_T_TAU; arms SIH_L_ROLL and
+    SIH_L_PITCH; drag −SIH_KDV v and damping −SIH_KDW Ω.
+    """
+    parts = parts_of(with_drag_of_hover(vehicle), KNOWS)
+    order = order_in_x(parts.places, vehicle.yaw_signs(), vehicle.name, "PX4's SIH")
+    places, thrust, torque = parts.places[order], parts.thrust[order], parts.torque[order]
+    left = list(parts.left_out)
+    full = full_speed_rad_s(vehicle, parts)
+    if not parts.limits_rad_s:
+        left.append(
+            f"full thrust: rotor_speed_limits_rad_s is not stated, {RICHEST:g} times the hover's speed is taken"
+        )
+    for words, values in (("thrust", thrust), ("torque", torque)):
+        if np.ptp(values) > 0:
+            left.append(f"{words} coefficients of each rotor: their mean is taken")
+    for words, values in (("roll", places[:, 1]), ("pitch", places[:, 0])):
+        if np.ptp(np.abs(values)) > 1e-6:
+            left.append(f"arms in {words} of each rotor: their mean is taken")
+    hover = hover_speed_rad_s(vehicle)
+    drag = len(order) * float(np.mean(parts.drag)) * hover
+    if drag:
+        left.append("rotor drag: that of the hover's rotor speed is taken, and along z as along x and y")
+    if np.ptp(parts.damping) > 0:
+        left.append("damping about each axis: its mean is taken")
+    up, down = parts.tau_s
+    tau_s = max((up + down) / 2, FASTEST_S)
+    if tau_s > (up + down) / 2:
+        left.append(f"rotors that follow within {(up + down) / 2:g} s: SIH's steps stand {FASTEST_S:g} s")
+    left.append("motor signals: in SIH thrust is proportional to them, so THR_MDL_FAC belongs to 0 there")
+    if vehicle.gravity_m_s2 != 9.81:
+        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: SIH has that of its latitude")
+    j = parts.inertia
+    values = {
+        "SIH_MASS": parts.mass_kg,
+        "SIH_IXX": j[0, 0], "SIH_IYY": j[1, 1], "SIH_IZZ": j[2, 2],
+        "SIH_IXY": j[0, 1], "SIH_IXZ": j[0, 2], "SIH_IYZ": j[1, 2],
+        "SIH_T_MAX": thrust.mean() * full**2, "SIH_Q_MAX": torque.mean() * full**2,
+        "SIH_L_ROLL": np.abs(places[:, 1]).mean(), "SIH_L_PITCH": np.abs(places[:, 0]).mean(),
+        "SIH_KDV": drag, "SIH_KDW": np.mean(parts.damping), "SIH_T_TAU": tau_s, "THR_MDL_FAC": 0.0,
+    }  # fmt: skip
+    comments = [f"# {vehicle.name}, exported by rotorid for PX4's SIH", *(f"# Not expressed: {s}" for s in left)]
+    rows = ["1\t1\tSIH_VEHICLE_TYPE\t0\t6", *(f"1\t1\t{name}\t{float(value):.9g}\t9" for name, value in values.items())]
+    return Exported(
+        "\n".join([*comments, *rows]) + "\n", "sih.params", tuple(left), parameters=values, rotor_order=tuple(order)
+    )
+
+
+def values_of(text: str) -> dict[str, float]:
+    """The parameters of a QGroundControl file."""
+    rows = [line.split("\t") for line in text.splitlines() if line and line[0] != "#"]
+    return {name: float(value) for _, _, name, value, _ in rows}
+
+
+def wrench(values: dict[str, float], signal: np.ndarray, velocity: np.ndarray, rates: np.ndarray):
+    """Force and moment (n, 3), body axes, N and N m, without the weight, of signals (n, 4) in SIH's order.
+
+    `velocity` (n, 3) through the air and `rates` (n, 3) are in body axes.
+    """
+    u = signal.T
+    force = -values["SIH_KDV"] * velocity
+    force[:, 2] -= values["SIH_T_MAX"] * u.sum(axis=0)
+    moment = -values["SIH_KDW"] * rates
+    moment[:, 0] += values["SIH_L_ROLL"] * values["SIH_T_MAX"] * (-u[0] + u[1] + u[2] - u[3])
+    moment[:, 1] += values["SIH_L_PITCH"] * values["SIH_T_MAX"] * (u[0] - u[1] + u[2] - u[3])
+    moment[:, 2] += values["SIH_Q_MAX"] * (u[0] + u[1] - u[2] - u[3])
+    return force, moment
+
+
+def inertia_of(values: dict[str, float]) -> np.ndarray:
+    """The inertia (3, 3), kg m²."""
+    xx, yy, zz, xy, xz, yz = (values[f"SIH_I{k}"] for k in ("XX", "YY", "ZZ", "XY", "XZ", "YZ"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -1,0 +1,660 @@
+"""Importers on small files written here, byte by byte where the format is binary."""
+
+import struct
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+from scipy.spatial.transform import Rotation
+
+from rotorid.errors import InputError
+from rotorid.recordings import columns as c
+from rotorid.recordings.importers import clean, crazyflie, frames, known, px4_ulog
+from rotorid.recordings.importers.crazyflie_usd import decode_usd_log, read_usd_log
+from rotorid.recordings.importers.imrc_bench_csv import read_imrc_bench
+from rotorid.recordings.importers.neurobem import USED, read_neurobem
+from rotorid.recordings.importers.rcbenchmark import decode_text, read_rcbenchmark
+from rotorid.recordings.importers.vicon_csv import read_vicon_csv
+
+
+def kinds(faults) -> list[str]:
+    return [fault.kind for fault in faults]
+
+
+# Frames -------------------------------------------------------------------------------------------
+
+
+def test_half_a_turn_about_x_keeps_forward_and_turns_left_and_up_over() -> None:
+    assert frames.half_turn_about_x([[1.0, 2.0, 3.0]]).tolist() == [[1.0, -2.0, -3.0]]
+
+
+def test_a_quaternion_turned_over_turns_the_same_vectors() -> None:
+    rng = np.random.default_rng(1)
+    attitude = Rotation.random(20, rng=rng)
+    body_flu = rng.normal(size=(20, 3))
+    wxyz = frames.quaternion_to_frd_ned(attitude.as_quat()[:, [3, 0, 1, 2]])
+    turned = Rotation.from_quat(wxyz[:, [1, 2, 3, 0]])
+    expected = frames.half_turn_about_x(attitude.apply(body_flu))
+    np.testing.assert_allclose(turned.apply(frames.half_turn_about_x(body_flu)), expected, atol=1e-12)
+
+
+def test_quaternions_are_made_continuous_in_sign() -> None:
+    once = np.array([[1.0, 0, 0, 0], [-1.0, 0, 0, 0], [-0.9, 0.1, 0, 0], [0.9, 0, 0, 0]])
+    assert (frames.continuous(once)[:, 0] > 0).all()
+
+
+def test_euler_angles_nose_up_is_positive_pitch() -> None:
+    wxyz = frames.quaternion_from_euler_frd(np.zeros(1), np.radians([90.0]), np.zeros(1))
+    nose = Rotation.from_quat(wxyz[:, [1, 2, 3, 0]]).apply([1.0, 0, 0])
+    np.testing.assert_allclose(nose, [[0, 0, -1.0]], atol=1e-12)
+
+
+# Cleaning -----------------------------------------------------------------------------------------
+
+
+def test_rows_that_do_not_move_the_clock_on_are_dropped_and_counted() -> None:
+    table = pd.DataFrame({"time_s": [0.0, 1.0, 1.0, 0.5, 2.0, np.nan], "x": range(6)})
+    kept, faults = clean.drop_repeated_times(table)
+    assert kept["x"].tolist() == [0, 1, 4]
+    assert kinds(faults) == ["repeated_time"]
+    assert faults[0].samples == 3
+    assert "3 rows do not move the clock on (first at 1 s)" in faults[0].sentence
+
+
+def test_held_values_become_empty_cells_and_rows_with_nothing_go() -> None:
+    table = pd.DataFrame(
+        {
+            "time_s": np.arange(6.0),
+            "a": [1, 1, 2, 2, 3, 3.0],
+            "b": [1, 2, 3, 4, 5, 5.0],
+            "d": [1, 1, 1, 1, 1, 1.0],
+        }
+    )
+    kept, faults = clean.blank_held(table, {"slow": ["a"], "fast": ["b"]}, share=0.3)
+    assert kept["a"].isna().tolist() == [False, True, False, True, False, True]
+    assert kept["b"].tolist() == [1, 2, 3, 4, 5, 5]
+    assert kinds(faults) == ["held"]
+    dropped, _ = clean.blank_held(table[["time_s", "a"]], {"slow": ["a"]})
+    assert dropped["time_s"].tolist() == [0, 2, 4]
+
+
+def test_gaps_are_reported_and_left() -> None:
+    time = np.array([0, 1, 2, 3, 8, 9.0])
+    assert kinds(clean.report_gaps(pd.DataFrame({"time_s": time}))) == ["gap"]
+    assert clean.report_gaps(pd.DataFrame({"time_s": np.arange(5.0)})) == []
+
+
+def test_stretches_of_true_and_cutting() -> None:
+    time = np.arange(10.0)
+    mask = np.array([0, 1, 1, 1, 0, 0, 1, 1, 1, 1], bool)
+    assert clean.true_stretches(mask, time, 2.5) == [(6.0, 9.0)]
+    assert clean.true_stretches(mask, time, 2.0) == [(1.0, 3.0), (6.0, 9.0)]
+    assert clean.cut(pd.DataFrame({"time_s": time}), 1.0, 3.0)["time_s"].tolist() == [0, 1, 2]
+
+
+# RCbenchmark --------------------------------------------------------------------------------------
+
+HEADING = (
+    "Time (s),ESC signal (µs),Servo 1 (µs),Servo 2 (µs),Servo 3 (µs),Thrust (gf),Voltage (V),Current (A),"
+    "Motor Electrical Speed (RPM),Motor Optical Speed (RPM),Electrical Power (W),Overall Efficiency (gf/W),"
+    "App message,"
+)
+ROWS = [
+    "0,1050,,,,10,11.1,0.5,0,0,5,2,,",
+    "1.7,1500,,,,100,11.0,2.5,9549.2966,0,28,3.5,,",
+    "3.4,1500,,,,400,11.0,2.5,19098.5932,0,28,3.5,,",
+    "5.1,2000,,,,900,10.8,9.5,28647.8898,0,100,3.5,,",
+]
+
+
+def bench(tmp_path: Path, rows=None, encoding="utf-8-sig", end="\n") -> Path:
+    path = tmp_path / "a1_11.csv"
+    path.write_bytes((end.join([HEADING, *(rows or ROWS)]) + end).encode(encoding))
+    return path
+
+
+def test_a_bench_run_has_si_units_and_the_thrust_points_up(tmp_path: Path) -> None:
+    table, faults = read_rcbenchmark(bench(tmp_path))
+    assert table["rotor_speed_1_rad_s"].tolist() == pytest.approx([0, 1000, 2000, 3000], abs=1e-3)
+    assert table["force_z_n"].tolist() == pytest.approx([-0.0980665, -0.980665, -3.92266, -8.825985])
+    assert table["throttle_1"].tolist() == [0.05, 0.5, 0.5, 1.0]
+    assert table["battery_voltage_v"].tolist() == [11.1, 11.0, 11.0, 10.8]
+    assert kinds(faults) == ["byte_order_mark", "speed_missing"]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
+def test_every_encoding_and_line_end_gives_the_same_table(tmp_path: Path, encoding: str, end: str) -> None:
+    expected, _ = read_rcbenchmark(bench(tmp_path))
+    table, faults = read_rcbenchmark(bench(tmp_path, encoding=encoding, end=end))
+    pd.testing.assert_frame_equal(table, expected)
+    assert ("encoding" in kinds(faults)) == (encoding == "latin-1")
+    assert ("line_ends" in kinds(faults)) == (end == "\r")
+
+
+def test_a_flipped_sign_is_flagged_and_kept(tmp_path: Path) -> None:
+    rows = [row.replace(",,,,", ",,,,-", 1) for row in ROWS]
+    table, faults = read_rcbenchmark(bench(tmp_path, rows))
+    assert "flipped_sign" in kinds(faults)
+    assert table["force_z_n"].iloc[-1] == pytest.approx(8.825985)
+
+
+def test_a_speed_far_too_low_for_its_thrust_is_flagged(tmp_path: Path) -> None:
+    rows = [ROWS[0], "0.9,1150,,,,50,11.0,1,286,0,9,3,,", *ROWS[1:]]
+    assert "speed_lost" in kinds(read_rcbenchmark(bench(tmp_path, rows))[1])
+
+
+def test_bench_messages_name_line_and_column(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"line 3, column Thrust \(gf\): expected a number, found 'x'"):
+        read_rcbenchmark(bench(tmp_path, [ROWS[0], ROWS[1].replace(",100,", ",x,")]))
+    path = tmp_path / "b.csv"
+    path.write_text("Time (s),ESC signal\n0,1000\n")
+    with pytest.raises(InputError, match="no column whose heading starts with 'Thrust'"):
+        read_rcbenchmark(path)
+    path.write_text("")
+    with pytest.raises(InputError, match="expected a heading and rows"):
+        read_rcbenchmark(path)
+    with pytest.raises(InputError, match="file is missing"):
+        read_rcbenchmark(tmp_path / "none.csv")
+    assert decode_text(b"a\r\nb")[1] == []
+
+
+# NeuroBEM -----------------------------------------------------------------------------------------
+
+
+def neurobem_matrix(samples: int = 50, columns: int = 41) -> np.ndarray:
+    """FLU: a hover, nose turned left by 90 degrees, moving forward at 2 m/s and up at 1 m/s."""
+    matrix = np.zeros((samples, columns))
+    matrix[:, 0] = 9.0 + np.arange(samples) * 0.0025
+    matrix[:, 1:4] = [1.0, 2.0, 3.0]
+    matrix[:, 4:7] = [0.1, 0.2, 0.3]
+    matrix[:, 7:11] = Rotation.from_euler("z", 90, degrees=True).as_quat()
+    matrix[:, 11:14] = [0.1, 0.2, 9.81]
+    matrix[:, 14:17] = [2.0, 0.0, 1.0]
+    matrix[:, 17:20] = [1.0, 2.0, 3.0]
+    matrix[:, 20:24] = [1000.0, 1100.0, 1200.0, 1300.0]
+    matrix[:, 28] = 160.0
+    matrix[:, 29:32] = [0.1, 0.2, 7.5]
+    matrix[:, 32:35] = [0.01, 0.02, 0.03]
+    return matrix
+
+
+def test_neurobem_ends_in_north_east_down_and_forward_right_down(tmp_path: Path) -> None:
+    savemat(tmp_path / "bemnn1.mat", {"bemnn1": neurobem_matrix()})
+    table, faults = read_neurobem(tmp_path / "bemnn1.mat")
+    row = table.iloc[0]
+    assert row["time_s"] == 0.0
+    # Turned left by 90 degrees, forward is y of the z-up world; y and z change sign.
+    assert [row[n] for n in c.VELOCITY] == pytest.approx([0.0, -2.0, -1.0], abs=1e-12)
+    assert [row[n] for n in c.POSITION] == [1.0, -2.0, -3.0]
+    assert [row[n] for n in c.SPECIFIC_FORCE] == [0.1, -0.2, -9.81]
+    assert [row[n] for n in c.ANGULAR_VELOCITY] == [0.1, -0.2, -0.3]
+    # Left seen from above is a negative yaw when z points down.
+    assert [row[n] for n in c.QUATERNION] == pytest.approx([np.sqrt(0.5), 0, 0, -np.sqrt(0.5)])
+    assert [row[n] for n in c.rotor_columns("rotor_speed", 4)] == [1000, 1100, 1200, 1300]
+    assert row["battery_voltage_v"] == 16.0
+    assert [row[f"neurobem_force_{a}_n"] for a in "xyz"] == [0.1, -0.2, -7.5]
+    assert [row[f"neurobem_moment_{a}_n_m"] for a in "xyz"] == [0.01, -0.02, -0.03]
+    assert [row[f"angular_acceleration_{a}_rad_s2"] for a in "xyz"] == [1.0, -2.0, -3.0]
+    assert kinds(faults) == ["unit", "superseded", "derived"]
+    assert "6 columns of residuals" in faults[1].found
+
+
+def test_neurobem_messages(tmp_path: Path) -> None:
+    savemat(tmp_path / "few.mat", {"m": neurobem_matrix()[:, : USED - 1]})
+    with pytest.raises(InputError, match=f"expected one matrix with at least {USED} columns"):
+        read_neurobem(tmp_path / "few.mat")
+    (tmp_path / "text.mat").write_text("no")
+    with pytest.raises(InputError, match="not a MATLAB file"):
+        read_neurobem(tmp_path / "text.mat")
+    with pytest.raises(InputError, match="file is missing"):
+        read_neurobem(tmp_path / "none.mat")
+
+
+# Vicon --------------------------------------------------------------------------------------------
+
+
+def vicon_rows(seconds: float = 12.0, rate: float = 50.0) -> np.ndarray:
+    """At rest for 2 s, in the air at 0.5 m for 8 s, at rest again; nose up 2 deg, rolled right 3 deg."""
+    time = np.arange(int(seconds * rate)) / rate
+    air = (time >= 2) & (time < 10)
+    rows = np.zeros((len(time), 25))
+    rows[:, 0] = time
+    rows[:, 1:4] = np.column_stack([0.001 * time, 0.002 * time, np.where(air, 0.5, 0.05) + 1e-4 * np.sin(time)])
+    rows[:, 4:7] = [0.1, 0.2, 0.3]
+    rows[:, 7:10] = [3.0, 2.0, 0.0]
+    rows[:, 10:13] = np.column_stack([np.sin(time), np.cos(time), time])
+    slow = np.floor(time * 5) / 5  # rotor speeds come at 5 Hz and are held
+    rows[:, 13:17] = np.where(air[:, None], 6000 + slow[:, None], 0)
+    rows[:, 17:21] = 15.0 + 0.001 * slow[:, None]
+    rows[:, 21:25] = 2.5
+    return rows
+
+
+def write_vicon(path: Path, rows: np.ndarray, tail: str = "") -> Path:
+    path.write_text("\n".join(",".join(f"{v:.9g}" for v in row) for row in rows) + "\n" + tail)
+    return path
+
+
+def test_vicon_turns_only_the_height_over_and_keeps_the_part_in_the_air(tmp_path: Path) -> None:
+    rows = vicon_rows()
+    rows[:3, 1:4] = np.nan
+    table, faults = read_vicon_csv(write_vicon(tmp_path / "v.csv", rows, tail="12,0.1,0.2"))
+    assert kinds(faults) == ["cut_off", "no_lock", "on_ground", "held", "held"]
+    assert "last line has 3 of 25 columns" in faults[0].found
+    assert table["time_s"].iloc[0] == 0.0
+    assert table["time_s"].iloc[-1] == pytest.approx(6.98)  # 3 to 9.98 s of the log
+    assert table["position_z_m"].iloc[0] == pytest.approx(-0.5, abs=1e-3)
+    assert table["height_m"].iloc[0] == pytest.approx(0.5, abs=1e-3)
+    assert table[list(c.VELOCITY)].iloc[0].tolist() == pytest.approx([0.1, 0.2, -0.3])
+    attitude = Rotation.from_quat(table.loc[0, [f"quaternion_{a}" for a in "xyzw"]].to_numpy(float))
+    thrust = attitude.apply([0, 0, -1.0])
+    assert thrust[0] < 0  # nose up: pushed backwards
+    assert thrust[1] > 0  # rolled right: pushed to the right
+    assert table["battery_current_a"].dropna().iloc[0] == 10.0
+
+
+def test_vicon_empties_held_rotor_speeds(tmp_path: Path) -> None:
+    table, _ = read_vicon_csv(write_vicon(tmp_path / "v.csv", vicon_rows()))
+    speeds = table["rotor_speed_1_rad_s"]
+    assert 34 <= speeds.notna().sum() <= 36  # 7 s at 5 Hz
+    assert speeds.dropna().iloc[1] == pytest.approx((6000 + 3.2) * 2 * np.pi / 60)
+    assert table["angular_velocity_x_rad_s"].notna().all()
+
+
+def test_vicon_messages(tmp_path: Path) -> None:
+    path = tmp_path / "v.csv"
+    good = ",".join(["1"] * 25)
+    path.write_text(f"{good}\n{good.replace('1', 'x', 1)}\n{good}\n")
+    with pytest.raises(InputError, match="line 2, column 1: expected a number, found 'x'"):
+        read_vicon_csv(path)
+    path.write_text(f"{good}\n1,2\n{good}\n")
+    with pytest.raises(InputError, match="line 2: expected 25 columns, found 2"):
+        read_vicon_csv(path)
+    path.write_text("")
+    with pytest.raises(InputError, match="expected at least two rows of 25 numbers"):
+        read_vicon_csv(path)
+    rows = vicon_rows()
+    rows[:, 13:17] = 0
+    with pytest.raises(InputError, match=r"v.csv: no stretch of 5 s in the air"):
+        read_vicon_csv(write_vicon(path, rows))
+    with pytest.raises(InputError, match="file is missing"):
+        read_vicon_csv(tmp_path / "none.csv")
+
+
+# IMRC bench ---------------------------------------------------------------------------------------
+
+
+def test_a_vehicle_on_a_scale_in_both_layouts(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n32768,4.0,9549.2966,0,1,1,100\n0,4.1,0,0,0,0,0\n")
+    table, faults = read_imrc_bench(path)
+    assert table["force_z_n"].tolist() == pytest.approx([-0.980665, 0])
+    assert table["throttle_4"].tolist() == [0.5, 0.0]
+    assert table["rotor_speed_1_rad_s"].tolist() == pytest.approx([1000, 0])
+    assert [(f.kind, f.column) for f in faults] == [
+        ("no_clock", "time_s"),
+        ("speed_dropout", "rotor_speed_2_rad_s"),
+    ]
+    path.write_text(
+        "weight[g],pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,v[V],i[A],p[W]\n1,0,4,0,0,0,0,4,0.5,2\n1,0,x,0,0,0,0,4,1,4\n"
+    )
+    with pytest.raises(InputError, match=r"line 3, column vbat\[V\]: expected a number, found 'x'"):
+        read_imrc_bench(path)
+    path.write_text("pwm,rpm1\n1,2\n")
+    with pytest.raises(InputError, match=r"line 1: expected the column vbat\[V\]"):
+        read_imrc_bench(path)
+    with pytest.raises(InputError, match="file is missing"):
+        read_imrc_bench(tmp_path / "none.csv")
+
+
+# Crazyflie uSD ------------------------------------------------------------------------------------
+
+
+def usd_bytes(variables, rows, version: int = 2, times=None, name: str = "fixedFrequency", extra=b"") -> bytes:
+    """A log as the firmware writes it: header, events, checksum. `rows` match `variables` [(name, type)]."""
+    data = struct.pack("<BHH", 0xBC, version, 1) + struct.pack("<H", 7) + name.encode() + b"\0"
+    data += struct.pack("<H", len(variables))
+    for variable, letter in variables:
+        data += f"{variable}({letter})".encode() + b"\0"
+    layout = "<" + "".join(letter for _, letter in variables)
+    for number, row in enumerate(rows):
+        stamp = number * (2000 if version == 2 else 2) if times is None else times[number]
+        data += struct.pack("<HQ" if version == 2 else "<HI", 7, stamp) + struct.pack(layout, *row)
+    data += extra
+    return data + struct.pack("<I", crc32(data))
+
+
+def test_a_usd_log_is_decoded_type_by_type() -> None:
+    variables = [("acc.z", "f"), ("motor.m1", "I"), ("rpm.m1", "H"), ("state", "B"), ("error", "h")]
+    data = usd_bytes(variables, [(1.5, 40000, 20000, 3, -5), (0.5, 41000, 20001, 4, 6)])
+    tables, faults = decode_usd_log(data)
+    assert faults == []
+    table = tables["fixedFrequency"]
+    assert table["time_s"].tolist() == [0.0, 0.002]
+    assert table["acc.z"].tolist() == [1.5, 0.5]
+    assert table["motor.m1"].tolist() == [40000, 41000]
+    assert table["error"].tolist() == [-5, 6]
+
+
+def test_version_1_counts_milliseconds() -> None:
+    tables, _ = decode_usd_log(usd_bytes([("a", "f")], [(1,), (2,)], version=1))
+    assert tables["fixedFrequency"]["time_s"].tolist() == [0.0, 0.002]
+
+
+def test_a_wrong_checksum_is_told_and_the_log_kept() -> None:
+    data = bytearray(usd_bytes([("a", "f")], [(1,), (2,)]))
+    data[-6] ^= 0xFF
+    tables, faults = decode_usd_log(bytes(data))
+    assert kinds(faults) == ["checksum"]
+    assert len(tables["fixedFrequency"]) == 2
+
+
+def test_a_log_cut_off_anywhere_keeps_every_whole_event() -> None:
+    data = usd_bytes([("a", "f")], [(float(n),) for n in range(5)])
+    header = len(usd_bytes([("a", "f")], [])) - 4
+    for length in range(header + 4, len(data)):
+        tables, faults = decode_usd_log(data[:length])
+        whole = (length - 4 - header) // 14
+        assert len(tables["fixedFrequency"]) == whole
+        assert "checksum" in kinds(faults)
+
+
+def test_an_unknown_event_stops_the_reading_there() -> None:
+    data = usd_bytes([("a", "f")], [(1,)], extra=struct.pack("<HQ", 99, 5) + b"abcd")
+    tables, faults = decode_usd_log(data)
+    assert kinds(faults) == ["unknown_event"]
+    assert len(tables["fixedFrequency"]) == 1
+
+
+def test_usd_messages(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="starting with 0xBC, found 0x41"):
+        decode_usd_log(b"A" * 20)
+    with pytest.raises(InputError, match="found an empty file"):
+        decode_usd_log(b"")
+    with pytest.raises(InputError, match="expected format version 1 or 2, found 3"):
+        decode_usd_log(usd_bytes([], [], version=3))
+    with pytest.raises(InputError, match="header is cut off"):
+        decode_usd_log(usd_bytes([("a", "f")], [])[:-9])
+    with pytest.raises(InputError, match=r"variable 'a\(z\)' has a type that is not known"):
+        decode_usd_log(usd_bytes([("a", "z")], []))
+    with pytest.raises(InputError, match="file is missing"):
+        read_usd_log(tmp_path / "none")
+
+
+def flight_log(samples: int = 4000) -> pd.DataFrame:
+    """500 Hz, in the air from 1 s to 7 s, rolled left; the state estimate is new every other sample."""
+    time = np.arange(samples) * 0.002
+    air = (time >= 1.0) & (time < 7.0)
+    half = np.repeat(np.arange(samples // 2), 2) * 1e-3
+    left = Rotation.from_euler("x", -10, degrees=True).as_quat()  # FLU: left side down is negative roll
+    log = {"time_s": 10 + time, "pm.vbatMV": 3700.0 + np.arange(samples)}
+    for k, axis in enumerate("xyz"):
+        log[f"stateEstimate.{axis}"] = half + (np.where(air, 1.0, 0.0) if axis == "z" else 0)
+        log[f"stateEstimate.v{axis}"] = half + k
+        log[f"gyro.{axis}"] = np.full(samples, 180.0 * (k + 1))
+        log[f"acc.{axis}"] = np.full(samples, [0.1, 0.2, 1.0][k])
+        log[f"stateEstimate.q{axis}"] = np.full(samples, left[k])
+    log["stateEstimate.qw"] = np.full(samples, left[3])
+    for i in range(1, 5):
+        log[f"pwm.m{i}_pwm"] = np.where(air, 32768.0, 0.0)
+        log[f"rpm.m{i}"] = np.where(air, 20000.0 + i, 0.0)
+    return pd.DataFrame(log)
+
+
+def test_a_crazyflie_flight_has_contract_units_and_axes() -> None:
+    table, _ = crazyflie.convert(flight_log())
+    row = table.iloc[1000]
+    assert [row[n] for n in c.ANGULAR_VELOCITY] == pytest.approx([np.pi, -2 * np.pi, -3 * np.pi])
+    assert [row[n] for n in c.SPECIFIC_FORCE] == pytest.approx([0.981, -1.962, -9.81])
+    assert row["position_z_m"] == pytest.approx(-1.5, abs=1e-9)
+    assert row["throttle_1"] == 0.5
+    assert row["rotor_speed_2_rad_s"] == pytest.approx(20002 * 2 * np.pi / 60)
+    assert row["battery_voltage_v"] == pytest.approx(4.7)
+    attitude = Rotation.from_quat([row[f"quaternion_{a}"] for a in "xyzw"])
+    assert attitude.apply([0, 0, -1.0])[1] < 0  # left side down: pushed to the left, which is -y
+
+
+def test_the_part_in_the_air_is_cut_out_with_a_margin() -> None:
+    table, _ = crazyflie.convert(flight_log())
+    assert crazyflie.in_the_air(table) == [(pytest.approx(12.0), pytest.approx(15.998))]
+    run, faults = crazyflie.flight_run(table, 12.0, 15.998)
+    assert run["time_s"].iloc[0] == 0.0
+    assert kinds(faults) == ["held"]
+    assert run["position_x_m"].isna().mean() == pytest.approx(0.5, abs=0.01)
+    assert run["rotor_speed_1_rad_s"].notna().all()
+
+
+def test_a_rotor_speed_that_drops_to_zero_is_flagged_and_kept() -> None:
+    log = flight_log()
+    log.loc[1500:1600, "rpm.m1"] = 0
+    log["pm.vbatMV"] = 3700.0
+    table, _ = crazyflie.convert(log)
+    run, faults = crazyflie.flight_run(table, 12.0, 15.998)
+    assert "speed_dropout" in kinds(faults)
+    dropout = faults[kinds(faults).index("speed_dropout")]
+    assert dropout.column == "rotor_speed_1_rad_s"
+    assert dropout.samples == 101
+    assert (run["rotor_speed_1_rad_s"] == 0).sum() == 101
+    assert "stuck" in kinds(faults)
+    assert "battery_voltage_v" not in run
+
+
+def test_attitude_without_pitch_finds_the_pitch_of_a_thrust_along_z() -> None:
+    roll, pitch, yaw = (
+        np.radians([[5.0, -8.0]]).T.ravel(),
+        np.radians([12.0, 3.0]),
+        np.radians([40.0, -100.0]),
+    )
+    attitude = Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll]))
+    force = attitude.apply([[0.0, 0.05, 1.1], [0.0, -0.02, 0.9]])
+    wxyz, body = crazyflie.attitude_without_pitch(force, roll, yaw)
+    np.testing.assert_allclose(np.abs(np.sum(wxyz * attitude.as_quat()[:, [3, 0, 1, 2]], axis=1)), 1, atol=1e-12)
+    np.testing.assert_allclose(body, [[0.0, 0.05, 1.1], [0.0, -0.02, 0.9]], atol=1e-12)
+
+
+def test_a_log_without_gyro_leaves_the_missing_axis_empty() -> None:
+    log = flight_log().drop(columns=[f"gyro.{a}" for a in "xyz"] + [f"acc.{a}" for a in "xyz"])
+    log = log.drop(columns=[f"stateEstimate.q{a}" for a in "wxyz"])
+    log = log.assign(**{"stateEstimate.ax": 0.0, "stateEstimate.ay": 0.0, "stateEstimate.az": 0.1})
+    log = log.assign(**{"stateEstimate.roll": 0.0, "stateEstimate.yaw": 0.0})
+    table, faults = crazyflie.convert(log)
+    assert "no_pitch" in kinds(faults)
+    assert "specific_force_x_m_s2" not in table
+    assert table["specific_force_z_m_s2"].iloc[0] == pytest.approx(-1.1 * 9.81)
+
+
+# PX4 ----------------------------------------------------------------------------------------------
+
+
+def ulog_bytes(topics: dict[str, tuple[str, np.dtype, np.ndarray]]) -> bytes:
+    """A ULog: magic, formats, subscriptions, data, a dropout. `topics`: name -> (format, dtype, rows)."""
+
+    def message(kind: str, body: bytes) -> bytes:
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    data += message("B", bytes(40))
+    for name, (text, _, _) in topics.items():
+        data += message("F", f"{name}:{text}".encode())
+    for number, name in enumerate(topics):
+        data += message("A", struct.pack("<BH", 0, number) + name.encode())
+    for number, (_, _, rows) in enumerate(topics.values()):
+        for row in rows:
+            data += message("D", struct.pack("<H", number) + row.tobytes())
+    return data + message("O", struct.pack("<H", 20))
+
+
+def test_a_px4_log_is_laid_out_on_the_fastest_inertial_clock(tmp_path: Path) -> None:
+    rate_type = np.dtype([("timestamp", "<u8"), ("xyz", "<f4", 3)])
+    rates = np.zeros(50, rate_type)
+    rates["timestamp"] = 1_000_000 + np.arange(50) * 4000
+    rates["xyz"] = [0.1, 0.2, 0.3]
+    pose_type = np.dtype([("timestamp", "<u8"), ("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    pose = np.zeros(10, pose_type)
+    pose["timestamp"] = 1_001_000 + np.arange(10) * 20_000
+    pose["z"] = -np.arange(10.0)
+    motor_type = np.dtype([("timestamp", "<u8"), ("control", "<f4", 4)])
+    motors = np.zeros(50, motor_type)
+    motors["timestamp"] = rates["timestamp"]
+    motors["control"] = [0.25, 0.5, 0.75, 1.0]
+    path = tmp_path / "log.ulg"
+    path.write_bytes(
+        ulog_bytes(
+            {
+                "vehicle_angular_velocity": ("uint64_t timestamp;float[3] xyz;", rate_type, rates),
+                "vehicle_local_position": ("uint64_t timestamp;float x;float y;float z;", pose_type, pose),
+                "actuator_motors": ("uint64_t timestamp;float[4] control;", motor_type, motors),
+            }
+        )
+    )
+    converted = px4_ulog.convert(px4_ulog.open_log(path), 4)
+    table, faults = converted.table, converted.faults
+    assert table["time_s"].tolist() == pytest.approx(np.arange(50) * 0.004)
+    assert table[list(c.ANGULAR_VELOCITY)].iloc[0].tolist() == pytest.approx([0.1, 0.2, 0.3])
+    assert table["throttle_3"].tolist() == [0.75] * 50
+    assert table["position_z_m"].dropna().index.tolist() == list(range(0, 50, 5))
+    assert table["position_z_m"].dropna().tolist() == [-float(n) for n in range(10)]
+    assert kinds(faults) == ["dropout"]
+    assert "1 stretches, 0.02 s in all" in faults[0].found
+
+
+def px4(parameters=None, **topics) -> px4_ulog.Px4Log:
+    """A log of topics given as one instance or a list of instances."""
+    instances = {k: v if isinstance(v, list) else [v] for k, v in topics.items()}
+    return px4_ulog.Px4Log(instances, parameters or {})
+
+
+def gyro(count: int = 5, step_us: int = 1000) -> dict:
+    return {"timestamp": np.arange(count) * step_us, **{f"gyro_rad[{i}]": np.ones(count) for i in range(3)}}
+
+
+def outputs(*pulses: float, count: int = 5) -> dict:
+    return {"timestamp": np.arange(count) * 1000, **{f"output[{i}]": np.full(count, p) for i, p in enumerate(pulses)}}
+
+
+def test_px4_rotor_speeds_and_messages(tmp_path: Path) -> None:
+    time = np.arange(5) * 1000
+    speeds = {"timestamp": time, "esc[0].esc_rpm": np.full(5, 6000.0)}
+    log = px4(sensor_combined=gyro(), esc_status=speeds, actuator_outputs=outputs(1500.0))
+    converted = px4_ulog.convert(log, rotors=1)
+    assert converted.table["rotor_speed_1_rad_s"].tolist() == pytest.approx([200 * np.pi] * 5)
+    assert converted.table["throttle_1"].tolist() == [0.5] * 5
+    assert kinds(converted.faults) == ["unit"]
+    assert kinds(px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=speeds), 1).faults) == ["no_command"]
+    with pytest.raises(InputError, match="to take the clock from"):
+        px4_ulog.convert(px4(battery_status={"timestamp": time}), rotors=1)
+    (tmp_path / "x.ulg").write_bytes(b"nothing")
+    with pytest.raises(InputError, match="not a ULog file"):
+        px4_ulog.open_log(tmp_path / "x.ulg")
+    with pytest.raises(InputError, match="file is missing"):
+        px4_ulog.open_log(tmp_path / "none.ulg")
+
+
+def test_px4_pulses_take_the_range_of_their_own_output() -> None:
+    parameters = {"PWM_MAIN_MIN": 1075, "PWM_MAIN_MAX": 1950, "PWM_MAIN_MIN2": 1000, "PWM_MAIN_MAX1": -1}
+    log = px4(parameters, sensor_combined=gyro(), actuator_outputs=outputs(1512.5, 1475.0, 900.0))
+    converted = px4_ulog.convert(log, rotors=3)
+    table = converted.table
+    assert table[["throttle_1", "throttle_2", "throttle_3"]].iloc[0].tolist() == pytest.approx([0.5, 0.5, 0.0])
+    assert kinds(converted.faults) == ["range"]
+
+
+def test_px4_motors_are_found_by_the_function_of_an_output() -> None:
+    parameters = {"PWM_MAIN_FUNC1": 102, "PWM_MAIN_FUNC2": 101, "PWM_MAIN_MIN": 1000, "PWM_MAIN_MAX": 2000}
+    log = px4(parameters, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
+    table = px4_ulog.convert(log, rotors=2).table
+    assert table[["throttle_1", "throttle_2"]].iloc[0].tolist() == [0.75, 0.25]
+    silent = px4({"PWM_MAIN_FUNC1": 201}, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
+    assert kinds(px4_ulog.convert(silent, rotors=2).faults) == ["no_command"]
+
+
+def test_px4_takes_the_instance_whose_outputs_move() -> None:
+    moving = outputs(1500.0, 1500.0)
+    moving["output[0]"], moving["output[1]"] = np.linspace(1000, 2000, 5), np.linspace(2000, 1000, 5)
+    log = px4(sensor_combined=gyro(), actuator_outputs=[outputs(1000.0, 1500.0), moving])
+    converted = px4_ulog.convert(log, rotors=2)
+    assert converted.table["throttle_1"].tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+    assert "instances" in kinds(converted.faults)
+
+
+def test_px4_thrusts_become_signals_by_the_thrust_model() -> None:
+    motors = {"timestamp": np.arange(5) * 1000, "control[0]": np.full(5, 0.3 * 0.5**2 + 0.7 * 0.5)}
+    table = px4_ulog.convert(px4({"THR_MDL_FAC": 0.3}, sensor_combined=gyro(), actuator_motors=motors), 1).table
+    assert table["throttle_1"].tolist() == pytest.approx([0.5] * 5)
+
+
+def test_px4_speeds_follow_their_function_and_an_offline_controller_is_missing() -> None:
+    esc = {
+        "timestamp": np.arange(5) * 1000,
+        "esc_online_flags": np.array([3, 3, 1, 3, 3]),
+        "esc[0].esc_rpm": np.full(5, -6000),
+        "esc[0].actuator_function": np.full(5, 102),
+        "esc[1].esc_rpm": np.full(5, 3000),
+        "esc[1].actuator_function": np.full(5, 101),
+    }
+    table = px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=esc), 2).table
+    assert table["rotor_speed_2_rad_s"].iloc[0] == pytest.approx(200 * np.pi)
+    assert table["rotor_speed_1_rad_s"].isna().tolist() == [False, False, True, False, False]
+
+
+def test_px4_invalid_positions_heights_and_currents_are_missing() -> None:
+    place = {
+        "timestamp": np.arange(5) * 1000,
+        **{name: np.arange(5.0) for name in ("x", "y", "z", "vx", "vy", "vz", "dist_bottom")},
+        "xy_valid": np.array([0, 0, 1, 1, 1]),
+        "z_valid": np.ones(5),
+        "v_xy_valid": np.zeros(5),
+        "v_z_valid": np.ones(5),
+        "dist_bottom_valid": np.ones(5),
+        "dist_bottom_sensor_bitfield": np.zeros(5),
+    }
+    battery = {"timestamp": np.arange(5) * 1000, "voltage_v": np.full(5, 16.0), "current_a": np.full(5, -1.0)}
+    second = {**battery, "voltage_v": np.full(5, 24.0), "current_a": np.full(5, 3.0)}
+    log = px4(sensor_combined=gyro(), vehicle_local_position=place, battery_status=[battery, second])
+    converted = px4_ulog.convert(log, 1)
+    table = converted.table
+    assert table["position_x_m"].isna().tolist() == [True, True, False, False, False]
+    assert table["position_z_m"].tolist() == [0, 1, 2, 3, 4]
+    assert not {"velocity_x_m_s", "velocity_y_m_s", "height_m", "battery_current_a"} & set(table.columns)
+    assert table["battery_2_voltage_v"].tolist() == [24.0] * 5
+    assert {"invalid", "not_measured", "instances"} <= set(kinds(converted.faults))
+
+
+def px4_flight(**more) -> px4_ulog.Px4Log:
+    """A log of 20 s that is in the air from 5 to 15 s."""
+    count = 2001
+    land = {"timestamp": np.array([0, 5, 15]) * 10**6, "landed": np.array([1, 0, 1])}
+    status = {"timestamp": np.array([0]), "arming_state": np.array([2])}
+    return px4(sensor_combined=gyro(count, 10_000), vehicle_land_detected=land, vehicle_status=status, **more)
+
+
+def test_px4_only_the_part_in_the_air_is_flown_and_a_jump_of_the_estimator_ends_it() -> None:
+    flying = px4_ulog.convert(px4_flight(), 1).flying
+    time_s = np.arange(2001) * 0.01
+    assert (time_s[flying].min(), time_s[flying].max()) == (5.0, pytest.approx(14.99))
+    jump = {
+        "timestamp": np.arange(21) * 10**6,
+        **{name: np.zeros(21) for name in ("x", "y", "z", "vx", "vy", "vz")},
+        "vxy_reset_counter": (np.arange(21) >= 10).astype(int),
+    }
+    converted = px4_ulog.convert(px4_flight(vehicle_local_position=jump), 1)
+    assert len(clean.true_stretches(converted.flying, time_s, 1.0)) == 2
+    assert "estimator_reset" in kinds(converted.faults)
+
+
+def test_px4_rotors_and_torque_come_from_control_allocation() -> None:
+    parameters = {"CA_ROTOR_COUNT": 2, "MAV_TYPE": 2}
+    for i, (x, y, km) in enumerate([(0.1, 0.2, 0.05), (-0.1, -0.2, -0.03)]):
+        parameters |= {f"CA_ROTOR{i}_PX": x, f"CA_ROTOR{i}_PY": y, f"CA_ROTOR{i}_PZ": 0.0, f"CA_ROTOR{i}_KM": km}
+    assert px4_ulog.rotor_count(px4(parameters)) == 2
+    found, faults = known.px4_vehicle(parameters, 2)
+    assert [(r.x_m, r.y_m, r.spin) for r in found.rotors] == [(0.1, 0.2, "ccw"), (-0.1, -0.2, "cw")]
+    assert found.torque_over_thrust_m == pytest.approx(0.04)
+    assert faults == []
+    assert known.px4_vehicle({}, 4)[0].rotors is None
+    with pytest.raises(InputError, match="VTOL"):
+        px4_ulog.rotor_count(px4({"MAV_TYPE": 22}))

@@ -1,0 +1,129 @@
+"""Tables of one's own, as `rotorid import` reads them: by the reader of sets, and nothing is lost in silence."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from rotorid.cli import app
+from rotorid.errors import InputError
+from rotorid.recordings import read_set
+from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.mapping import Mapping, read_by_mapping, read_columns
+from tests.unit.recordings.wrong_inputs import LINES, RUN, SPEEDS, WIDTH, table
+
+WORDS = table().assign(angular_velocity_x_rad_s="oops").to_csv(index=False)
+DECIMAL_COMMAS = "\n".join([LINES[0], *(line.replace(".", ",") for line in LINES[1:])]) + "\n"
+SHIFTED = "\n".join([LINES[0], *("7," + line for line in LINES[1:])]) + "\n"
+CUT = RUN[:-40]
+SET_BACK = table().assign(time_s=lambda t: t["time_s"] - 3600 * (t["time_s"] > 5)).to_csv(index=False)
+SUMMER_TIME = table().assign(time_s=lambda t: t["time_s"] + 3600 * (t["time_s"] > 5)).to_csv(index=False)
+WRONG = (
+    ("words in a column", WORDS, "line 2, column angular_velocity_x_rad_s: expected a number, found 'oops'"),
+    ("a word in a cell", RUN.replace("0.05,", "soon,", 1), "line 3, column time_s: expected a number, found 'soon'"),
+    ("decimal commas", DECIMAL_COMMAS, "the heading has 18 (are decimals written with commas? expected points)"),
+    ("decimal commas between semicolons", RUN.replace(",", ";").replace(".", ","), "line 2, column time_s: expected"),
+    ("a cell too many at each start", SHIFTED, f"line 2: has {WIDTH + 1} cells, the heading has {WIDTH}"),
+    ("a cell too many in a line", RUN.replace("\n0.05,", "\n0.05,7,"), f"line 3: has {WIDTH + 1} cells"),
+    ("a last line cut off", CUT, f"line {len(LINES)}: has", "the file is cut off: delete its last line"),
+    ("a column twice", RUN.replace("velocity_y_m_s", "velocity_x_m_s", 1), "column velocity_x_m_s is there twice"),
+    ("no heading", "\n".join(LINES[1:]) + "\n", "line 1: expected the names of the columns, found numbers"),
+    ("an underscore in a number", RUN.replace("\n0.05,", "\n0_0.05,"), "line 3, column time_s: expected a number"),
+    ("a clock set to summer time", SUMMER_TIME, "line 103: time_s jumps by 3600.05 s"),
+    ("a clock set back", SET_BACK, "line 103: time_s jumps by -3599.95 s"),
+    ("a clock that stands still", table().assign(time_s=3.0).to_csv(index=False), "time_s moves on in 1 of 200 rows"),
+)
+MAPPING = Mapping.model_validate(
+    {
+        "channels": {
+            "time": {"columns": ["time_s"], "unit": "s"},
+            "angular_velocity": {"columns": [f"angular_velocity_{a}_rad_s" for a in "xyz"], "unit": "rad/s"},
+            "rotor_speed": {"columns": list(SPEEDS), "unit": "rad/s"},
+        }
+    }
+)
+
+
+@pytest.mark.parametrize("packed", [False, True], ids=["plain", "gzipped"])
+@pytest.mark.parametrize("mapping", [None, MAPPING], ids=["by names", "by mapping"])
+@pytest.mark.parametrize(("text", "said"), [(text, said) for _, text, *said in WRONG], ids=[w[0] for w in WRONG])
+def test_a_wrong_table_is_one_sentence(
+    text: str, said: list[str], mapping: Mapping | None, packed: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / ("own.csv.gz" if packed else "own.csv")
+    path.write_bytes(gzip.compress(text.encode()) if packed else text.encode())
+    with pytest.raises(InputError) as error:
+        read_by_mapping(path, mapping)
+    assert str(error.value).startswith(str(path)) and str(error.value).isprintable()
+    for words in said:
+        assert words in str(error.value)
+
+
+@pytest.mark.parametrize("command", ["import", "verdict"])
+@pytest.mark.parametrize("text", [WORDS, DECIMAL_COMMAS, SHIFTED, CUT], ids=["words", "commas", "shifted", "cut"])
+def test_the_commands_say_so_and_write_nothing(command: str, text: str, tmp_path: Path) -> None:
+    """Before: exit code 0, a column emptied, 797 of 800 rows dropped, columns moved by one, a line left out."""
+    path, out = tmp_path / "own.csv", tmp_path / "out"
+    path.write_text(text)
+    done = CliRunner().invoke(app, [command, str(path), "--like", "thesis", "-o", str(out)])
+    assert done.exit_code == 1 and len(done.output.strip().splitlines()) == 1
+    assert str(path) in done.output and not out.exists()
+
+
+@pytest.mark.parametrize("sign", [",", ";", "\t", "|", " "], ids=["commas", "semicolons", "tabs", "bars", "blanks"])
+def test_columns_may_be_separated_by_other_signs(sign: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.csv"
+    path.write_text(RUN.replace(",", sign))
+    found, faults, _ = read_by_mapping(path, None)
+    pd.testing.assert_frame_equal(found, table())
+    assert faults == []
+
+
+def test_a_column_without_a_name_is_kept_by_its_number(tmp_path: Path) -> None:
+    """pandas writes the index so, and many a logger a separator at the end of each line."""
+    path = tmp_path / "own.csv"
+    table().to_csv(path)
+    found, _, _ = read_by_mapping(path, None)
+    assert found["column_1"].tolist() == list(range(200))
+
+
+def test_text_that_no_channel_names_is_no_fault_and_the_proposal_says_what_it_leaves_out(tmp_path: Path) -> None:
+    path = tmp_path / "own.csv"
+    table().assign(mode="HOVER", armed=True).to_csv(path, index=False)
+    found, _, _ = read_by_mapping(path, MAPPING)
+    assert found["angular_velocity_x_rad_s"].notna().all()
+    found = guess(read_columns(path))
+    assert "mode" not in found.mapping.keep and "armed" in found.mapping.keep
+    assert any(re.search(r"column mode: .*'HOVER'", sentence) for sentence in found.left_out)
+
+
+def test_a_parquet_is_read_by_the_same_rules(tmp_path: Path) -> None:
+    path = tmp_path / "own.parquet"
+    table().assign(velocity_x_m_s="oops").to_parquet(path, index=False)
+    with pytest.raises(InputError, match="row 1, column velocity_x_m_s: expected a number, found 'oops'"):
+        read_by_mapping(path, None)
+    assert read_by_mapping(path, MAPPING)[0]["angular_velocity_x_rad_s"].notna().all()
+
+
+def test_a_log_with_a_jump_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    (tmp_path / "own.csv").write_text(SUMMER_TIME)
+    done = CliRunner().invoke(
+        app, ["import", str(tmp_path / "own.csv"), "--like", "thesis", "-o", str(tmp_path / "set")]
+    )
+    assert done.exit_code == 1 and not (tmp_path / "set").exists()
+
+
+def test_a_sound_table_comes_back_exactly(tmp_path: Path) -> None:
+    (tmp_path / "own.csv").write_text(RUN)
+    done = CliRunner().invoke(
+        app, ["import", str(tmp_path / "own.csv"), "--like", "thesis", "-o", str(tmp_path / "set")]
+    )
+    assert done.exit_code == 0, done.output
+    again = read_set(tmp_path / "set").runs[0].table
+    np.testing.assert_array_equal(again.to_numpy(), table().to_numpy())

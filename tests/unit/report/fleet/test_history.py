@@ -1,0 +1,68 @@
+"""A fleet's vehicles over their flights: a change is reported at the set in which it begins, once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pandas as pd
+
+from rotorid.recordings import RecordingSet, write_set
+from rotorid.recordings.templates import read
+from rotorid.report.fleet.history import by_vehicle, history
+from rotorid.report.plots.fleet import draw_history
+from rotorid.vehicle.control.swings import swings
+
+DAYS = 6
+HEAVIER_FROM = 5
+
+
+def flown(day: int) -> RecordingSet:
+    """A day's flight of the thesis's vehicle, a tenth heavier from the fifth day on, with the vehicle as believed."""
+    believed = read("thesis")
+    mass = believed.mass_kg * (1.1 if day >= HEAVIER_FROM else 1.0)
+    recorded = swings(believed.model_copy(update={"mass_kg": mass}), f"heron-2026-10-0{day}", 14.0, 1, day)
+    return replace(recorded, vehicle=believed, held_out=None)
+
+
+@cache
+def made() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Tables of the numbers and events of that vehicle."""
+    return history({"heron": [flown(day) for day in range(1, DAYS + 1)]}, good=3)
+
+
+def test_the_heavier_vehicle_is_the_one_event_at_the_day_it_begins():
+    _, events = made()
+    (event,) = events.to_dict("records")
+    assert event["set"] == "heron-2026-10-05" and event["day"] == "2026-10-05" and event["lasts"] == 2
+    assert event["id"] in ("mass_kg", "thrust_coefficient_n_s2")
+    assert event["sentence"].startswith("heron, from heron-2026-10-05 on: ")
+
+
+def test_every_later_set_has_its_numbers_with_intervals():
+    numbers, _ = made()
+    assert list(dict.fromkeys(numbers["set"])) == [f"heron-2026-10-0{day}" for day in (4, 5, 6)]
+    ratio = numbers.pivot(index="set", columns="name", values="change")
+    ratio = ratio["mass_kg"] - ratio["thrust_coefficient_n_s2"]
+    assert abs(ratio["heron-2026-10-04"]) < 0.02
+    assert 0.06 < ratio["heron-2026-10-06"] < 0.14
+    assert (numbers["low_95"] < numbers["high_95"]).all()
+
+
+def test_the_history_is_drawn(tmp_path: Path):
+    draw_history(*made(), tmp_path / "history.svg")
+    assert "heron" in (tmp_path / "history.svg").read_text(encoding="utf-8")
+
+
+def test_sets_are_ordered_by_vehicle_and_day_and_a_broken_one_is_named(tmp_path: Path):
+    for day in (2, 1):
+        write_set(flown(day), tmp_path)
+    (tmp_path / "broken-2026-10-03").mkdir()
+    (tmp_path / "broken-2026-10-03" / "vehicle.yaml").write_text("name: x\n", encoding="utf-8")
+    said: list[str] = []
+    found = by_vehicle(list(tmp_path.iterdir()), said.append)
+    assert {v: [s.name for s in own] for v, own in found.items()} == {
+        flown(1).vehicle.name: ["heron-2026-10-01", "heron-2026-10-02"]
+    }
+    assert len(said) == 1 and said[0].startswith("broken-2026-10-03 is left out: ")
