@@ -324,8 +324,8 @@ def one_line(value: Any) -> str:
 def unit(value: Any) -> str:
     """A unit on one line with its powers raised: `kg m2` is `kg m²`, `1e-6 N` is `10⁻⁶ N`, `N/(N)2` is `1/N`."""
     raised = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-    plain = re.sub(r"(?<=^1e-\d) 1$", "", re.sub(r"([^\s/]+)/\(\1\)2$", r"1/\1", str(value)))
-    shown = re.sub(r"(?<=[A-Za-z])-?[0-9]+", lambda power: power[0].translate(raised), text(plain))
+    plain = re.sub(r"(?<=^1e-\d) 1$", "", re.sub(r"([^\s/]+)/\(\1\)2$", r"1/\1", text(value)))
+    shown = re.sub(r"(?<=[A-Za-z])-?[0-9]+", lambda power: power[0].translate(raised), plain)
     return re.sub("^1e(?=[⁻⁰-⁹¹²³])", "10", shown).replace(" ", "\u00a0")
 
 

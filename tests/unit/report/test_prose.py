@@ -139,7 +139,7 @@ def test_symbols_are_set_as_mathematics() -> None:
 
 
 def test_units_and_names_stay_on_one_line_and_small_numbers_keep_their_digits() -> None:
-    assert [prose.unit(u) for u in ("kg m2", "N s2/(rad m)", "1e-6 kg/rad", "1", "1e-6 1", "N/(N)2")] == [
+    assert [prose.unit(u) for u in ("kg m2", "N s2/(rad m)", "1e-6 kg/rad", 1.0, "1e-6 1", "N/(N)2")] == [
         "kg\u00a0m²",
         "N\u00a0s²/(rad\u00a0m)",
         "10⁻⁶\u00a0kg/rad",
