@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 def compare(
     sets: Annotated[
         list[Path],
-        typer.Argument(help="Sets: one or more of flights that were good, then the one in question."),
+        typer.Argument(
+            metavar="GOOD... NEW", help="Sets: one or more of flights that were good, then the one in question."
+        ),
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File for the result as JSON.")] = None,
     page: Annotated[Path | None, typer.Option("--page", help="File for a page with figures (HTML).")] = None,
