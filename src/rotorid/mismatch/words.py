@@ -183,8 +183,10 @@ def plus_minus(value: float, low: float | None, high: float | None) -> str:
 
 
 def percent_words(share: float) -> str:
-    """A share as a percentage of two digits: `0.84 %`; below a thousandth of a percent `less than 0.001 %`."""
-    return "less than 0.001 %" if share < 1e-5 else f"{100 * share:.2g} %"
+    """A share as a percentage of two digits: `0.84 %`, `520 %`; below a thousandth of a percent `less than 0.001 %`."""
+    if share < 1e-5:
+        return "less than 0.001 %"
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{float(f'{100 * share:.2g}'):.0f} %"
 
 
 def sure(p_value: float) -> str:

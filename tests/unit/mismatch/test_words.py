@@ -4,7 +4,7 @@ import pytest
 
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.sentences import _left_out, unexplained_words
-from rotorid.mismatch.words import channel_words, listed, number, plus_minus, regime_words, sure
+from rotorid.mismatch.words import channel_words, listed, number, percent_words, plus_minus, regime_words, sure
 
 
 @pytest.mark.parametrize(
@@ -49,3 +49,8 @@ def test_a_fault_of_the_recording_was_not_left_out():
 def test_of_causes_that_explain_next_to_nothing_it_is_said(share, words):
     """`Ground effect was left out; 100 % stays unexplained` contradicts itself."""
     assert unexplained_words(share) == words
+
+
+def test_a_share_beyond_the_whole_is_a_plain_number():
+    shown = [percent_words(x) for x in (0.0084, 0.21, 0.999, 5.2, 1.049)]
+    assert shown == ["0.84 %", "21 %", "100 %", "520 %", "100 %"]

@@ -55,7 +55,8 @@ def unchanged_words(limits: tuple[UpperLimit, ...]) -> str:
     values = [
         f"{name_words(x.id)} by at most {percent_words(x.at_most)}" for x in limits if x.id in VALUES and x.at_most
     ]
-    others = [x for x in limits if x.id not in VALUES and x.share > 0]
+    # A limit above the weight excludes nothing: the page has it in its table.
+    others = [x for x in limits if x.id not in VALUES and 0 < x.share < 1]
     named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of the weight" for x in others[:MOST_LIMITS]]
     if len(others) > MOST_LIMITS:
         named.append(f"{len(others) - MOST_LIMITS} others by less")
