@@ -239,7 +239,9 @@ def test_the_list_is_long_drawn_once_and_read_as_it_was_written(tmp_path: Path) 
         assert sow.planned(flight(flight_name), kinds) == own
 
 
-@pytest.mark.skipif(not (ROOT / "results/recordings/neurobem").is_dir(), reason="the public sets are not imported")
+@pytest.mark.skipif(
+    not all((ROOT / "results/recordings" / f.set).is_dir() for f in FLIGHTS), reason="not all public sets are imported"
+)
 def test_the_list_is_that_of_the_public_sets() -> None:
     assert sow.list_text(ROOT / "results/recordings") == (ROOT / "workflow/plantings.tsv").read_text()
 
