@@ -6,7 +6,7 @@
         [--out benchmarks/fleet.md --measured "processor time, h: 0.9" ...]    its table, with what was measured
 
 A vehicle hides what its number says: nothing, a drag that grows from flight to flight, a payload, a motor lag, drag and
-lag, a centre of mass beside the believed one. Every 25th set is a bench or a stand of `proof/rotorid_proof/concealed`,
+lag, a centre of mass off the believed one. Every 25th set is a bench or a stand of `proof/rotorid_proof/concealed`,
 one effect each or none. Every fiftieth flight is broken in one of four ways.
 """
 

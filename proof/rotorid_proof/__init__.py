@@ -1,4 +1,4 @@
-"""The proof: verdicts on recordings with something hidden in them, scored; beside other methods and real recordings."""
+"""The proof: verdicts on recordings with something hidden in them, scored, and what other methods say of them."""
 
 OPEN = (
     "ablation",

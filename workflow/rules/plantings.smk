@@ -94,7 +94,7 @@ rule judge_plantings:
 
 
 rule tabulate_plantings:
-    """What was reported of each planted cause, its size, what is new beside it and what is lost."""
+    """What was reported of each planted cause, its size, which other names are new and which are lost."""
     message:
         "Plantings: tables"
     input:

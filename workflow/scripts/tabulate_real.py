@@ -1,6 +1,6 @@
 """The table of real recordings.
 
-- One line a study that could be made or on which the stage stopped; published coefficients beside ours.
+- One line a study that could be made or on which the stage stopped; published coefficients next to ours.
 - Beside the NeuroBEM flights held out, NeuroBEM's own prediction of the same flight.
 """
 

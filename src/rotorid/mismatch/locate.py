@@ -61,7 +61,7 @@ AT_WORK = 0.03
 """Local size beside its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
 LOUDER = 4.0
-"""Energy of a window beside the usual, below which noise of higher variance is not called a mismatch."""
+"""Energy of a window over the usual, below which noise of higher variance is not called a mismatch."""
 MOVES_S = 0.2
 """Lags over which larger residuals may follow each other."""
 FIRST_LAGS = 4

@@ -105,8 +105,8 @@ def test_every_value_has_its_change_with_an_interval():
     assert same["mass_kg"].low < 0.0 < same["mass_kg"].high
     assert same["inertia_xx_kg_m2"].low < 0.0 < same["inertia_xx_kg_m2"].high
     changed = {p.symbol: p for p in compared("believed lighter").values}
-    told = sure(compared("believed lighter"))[0]
-    assert changed[told.id].low == pytest.approx(told.parameters[0].low)
+    named = sure(compared("believed lighter"))[0]
+    assert changed[named.id].low == pytest.approx(named.parameters[0].low)
 
 
 def test_a_set_that_goes_farther_than_the_good_one_is_noted():

@@ -60,7 +60,7 @@ class Changes:
     base: str
     new: str
     changes: tuple[Change, ...]
-    """The surest first."""
+    """The most probable first."""
     limits: tuple[UpperLimit, ...]
     """By how much everything else may have changed at most, with 95 % probability; of a value relative."""
     values: tuple[Estimate, ...]
@@ -79,12 +79,12 @@ def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior(
 def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the flights of a reference to another set of flights."""
     joint, base = joint_of(reference, new), reference.recordings
-    usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia)
+    usual = usual_spread(joint.base, joint.new, reference.known, joint.inertia)
 
     def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
         return decide_changes(flights, other, np.hypot(usual, more), prior)
 
-    found = decide(joint.base, joint.new, spread_of_flights(joint.runs_of_base, decide))
+    found = decide(joint.base, joint.new, spread_of_flights(reference.runs, decide))
     vehicles = base.vehicle, new.vehicle
     changes = [
         Change(s.id, s.status, s.alternatives, s.probability, in_percent(s.id, s.parameters, *vehicles))
@@ -92,12 +92,11 @@ def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()
         if s.status != "not_established"
     ]
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
-    squares = joint.squares | joint.value_squares
     return Changes(
         base=base.name,
         new=new.name,
-        changes=(*mistakes_that_differ(joint.mistakes_of_base, joint.mistakes_of_new), *changes),
-        limits=tuple(limit for limit in limits_of(found, squares) if limit.id not in changed),
+        changes=(*mistakes_that_differ(reference.mistakes, joint.mistakes_of_new), *changes),
+        limits=tuple(limit for limit in limits_of(found, joint.squares) if limit.id not in changed),
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
         notes=notes_of(joint, base.name, new.name),

@@ -1,7 +1,7 @@
 """Two sets of flights on the same columns: the sums of products of each, ready to be weighed against each other.
 
 Model, sensors' noise, whitening and the chain from command to rotor speed are the first set's. What they are wrong by
-is the same in both sets, and cancels where the second is set against the first.
+is the same in both sets, and cancels between them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from rotorid.recordings import RecordingSet, Vehicle
 FORCES = (0, 1, 2)
 """Channels of the forces."""
 REGIMES = ("airspeed_m_s", "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
-"""Regime variables by which two sets are held against each other."""
+"""Regime variables by which two sets are compared."""
 INERTIA_OF = {3: "inertia_xx", 4: "inertia_yy", 5: "inertia_zz"}
 """Channel of each moment to the inertia that it turns."""
 
@@ -41,36 +41,37 @@ class Joint:
 
     base: Evidence
     new: Evidence
-    runs_of_base: tuple[Evidence, ...]
-    """The first set run by run."""
-    known: np.ndarray
-    """(K,) coefficients of the effects that the first set's model holds, 0 of all others."""
     inertia: np.ndarray
     """(C,) mass, or inertia, of the second vehicle.yaml over that of the first, in each channel."""
     flown_by_base: Mapping[str, float]
     flown_by_new: Mapping[str, float]
     """How far each set goes: 95th percentile of the magnitude of some regime variables."""
     rows_of_new: tuple[Rows, ...]
-    mistakes_of_base: tuple[Finding, ...]
     mistakes_of_new: tuple[Finding, ...]
-    """Mistakes in the recordings of each set, which were undone before."""
+    """Mistakes in the recordings of the second set, corrected."""
     squares: dict[str, np.ndarray]
-    """To the key of each effect what its columns amount to in the second set (`absent.squares_of`)."""
-    value_squares: dict[str, np.ndarray]
-    """The same to the key of each believed value."""
+    """To the key of each effect and believed value what its columns amount to in the second set
+    (`absent.squares_of`)."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The first set, fitted: what other sets are held against."""
+    """The first set, fitted once: what other sets are compared with."""
 
     recordings: RecordingSet
     found: Fitted
     terms: tuple[Term, ...]
     segments: tuple[Segment, ...]
     rows: tuple[Rows, ...]
+    block_s: float
+    """Length of a block of rows in both sets."""
     known: np.ndarray
+    """(K,) coefficients of the effects that its model holds, 0 of all others."""
+    evidence: Evidence
+    runs: tuple[Evidence, ...]
+    """The same run by run."""
     mistakes: tuple[Finding, ...]
+    """Mistakes in its recordings, corrected."""
 
     @property
     def keys(self) -> list[str]:
@@ -88,13 +89,27 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     # As another set's stretches are made: what making them leaves out is left out of both.
     segments = stretches_of(found, base)
     rows = as_seen(assemble_rows(model.prepared, terms, segments, model.effects), model, keys)
-    return Reference(base, found, tuple(terms), tuple(segments), tuple(rows), known_effects(model, keys), mistakes)
+    block_s, known = block_seconds(rows, model.prepared.thinner.rate_hz), known_effects(model, keys)
+    regression = regression_of(rows, terms, model, block_s)
+    evidence = with_known_effects(evidence_from(regression), known)
+    return Reference(
+        recordings=base,
+        found=found,
+        terms=tuple(terms),
+        segments=tuple(segments),
+        rows=tuple(rows),
+        block_s=block_s,
+        known=known,
+        evidence=evidence,
+        runs=by_run(evidence, regression),
+        mistakes=mistakes,
+    )
 
 
 def joint_of(reference: Reference, new: RecordingSet) -> Joint:
     """Two sets of flights on the same columns.
 
-    Each is held against its own vehicle.yaml: what was changed on purpose and is written there is no change.
+    Each is compared with its own vehicle.yaml: what was changed on purpose and is written there is no change.
     """
     new, mistakes, _ = find_mistakes(replace(new, held_out=()))
     found, terms, model = reference.found, list(reference.terms), reference.found.model
@@ -106,24 +121,20 @@ def joint_of(reference: Reference, new: RecordingSet) -> Joint:
         )
     rows = against_own(assemble_rows(model.prepared, terms, segments, model.effects), model, segments, new)
     rows = as_seen(rows, model, reference.keys)
-    block_s = block_seconds(list(reference.rows), model.prepared.thinner.rate_hz)
-    of_base, of_new = (regression_of(list(own), terms, model, block_s) for own in (reference.rows, rows))
+    of_new = regression_of(rows, terms, model, reference.block_s)
     held = replace(model, rows=rows, regression=of_new)
-    squares = (squares_of(held, [t for t in terms if t.kind == kind]) for kind in ("effect", "value"))
-    in_base, in_new = (with_known_effects(evidence_from(own), reference.known) for own in (of_base, of_new))
-    believed = (inertia_of(v, in_base.channels) for v in (new.vehicle, reference.recordings.vehicle))
-    flown = (how_far(own, model.prepared) for own in (reference.segments, segments))
+    inertia, inertia_of_base = (
+        inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
+    )
     return Joint(
-        in_base,
-        in_new,
-        by_run(in_base, of_base),
-        reference.known,
-        np.divide(*believed),
-        *flown,
-        tuple(rows),
-        reference.mistakes,
-        mistakes,
-        *squares,
+        base=reference.evidence,
+        new=with_known_effects(evidence_from(of_new), reference.known),
+        inertia=inertia / inertia_of_base,
+        flown_by_base=how_far(reference.segments, model.prepared),
+        flown_by_new=how_far(segments, model.prepared),
+        rows_of_new=tuple(rows),
+        mistakes_of_new=mistakes,
+        squares=squares_of(held, [t for t in terms if t.kind in ("effect", "value")]),
     )
 
 

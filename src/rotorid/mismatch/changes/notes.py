@@ -8,6 +8,8 @@ import numpy as np
 
 from rotorid.mismatch.changes.joint import Joint
 from rotorid.mismatch.changes.usual import left_by_all
+from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
+from rotorid.mismatch.posterior.leftover import TINY
 from rotorid.mismatch.rows import CHANNELS
 from rotorid.mismatch.words import channel_words, listed, number, regime_words
 
@@ -15,8 +17,6 @@ LARGER = 2.0
 """How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""
 FARTHER = 1.5
 """How many times as far the second set must go in a regime variable."""
-FIRST_SENSOR = 6
-"""Channels from here on are sensors, not forces and moments."""
 
 
 def notes_of(joint: Joint, base: str, new: str) -> tuple[str, ...]:
@@ -27,8 +27,10 @@ def notes_of(joint: Joint, base: str, new: str) -> tuple[str, ...]:
 def residual_notes(joint: Joint, base: str, new: str) -> list[str]:
     """That more is left unexplained in the second set than in the first: something outside the catalogue changed."""
     per_block = [left_by_all(own) / own.blocks.sum() for own in (joint.base, joint.new)]
-    ratio = np.sqrt(per_block[1] / joint.inertia**2 / np.maximum(per_block[0], 1e-300))
-    larger = [(r, int(c)) for r, c in zip(ratio, joint.base.channels, strict=True) if r > LARGER and c < FIRST_SENSOR]
+    ratio = np.sqrt(per_block[1] / joint.inertia**2 / np.maximum(per_block[0], TINY))
+    larger = [
+        (r, int(c)) for r, c in zip(ratio, joint.base.channels, strict=True) if r > LARGER and c < CHANNELS_OF_WRENCH
+    ]
     if not larger:
         return []
     most = max(r for r, _ in larger)

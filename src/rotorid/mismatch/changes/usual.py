@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.mismatch.posterior.evidence import Evidence
+from rotorid.mismatch.posterior.leftover import FULL_RIDGE, TINY
 from rotorid.mismatch.posterior.score import places, scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import statements_of
@@ -26,8 +27,6 @@ OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
 FORM_SD = 0.02
 """Share of what the first set's effects contribute to a channel that may differ there by their forms."""
-RIDGE = 1e-6
-"""Ridge of the fit of all columns of a channel, in units of their length."""
 FEWEST_FLIGHTS = 3
 """Two good flights give one difference alone, of which no variance is known."""
 
@@ -42,7 +41,7 @@ def usual_spread(base: Evidence, new: Evidence, known: np.ndarray, inertia: np.n
     hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
     own = np.einsum("ckk->ck", gram)
     explained = np.einsum("k,ckl,l->c", known, gram, known)
-    total = np.maximum(own.sum(axis=0), 1e-300)
+    total = np.maximum(own.sum(axis=0), TINY)
     form = FORM_SD * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
     out = np.zeros(len(known))
     for term in base.terms:
@@ -73,7 +72,7 @@ def left_by_all(evidence: Evidence) -> np.ndarray:
     out = np.empty(len(gram))
     for c, own in enumerate(np.einsum("ckk->ck", gram)):
         unit = np.where(own > NEVER_EXCITED, 1.0 / np.sqrt(np.maximum(own, NEVER_EXCITED)), 0.0)
-        scaled = gram[c] * np.outer(unit, unit) + RIDGE * np.eye(len(unit))
+        scaled = gram[c] * np.outer(unit, unit) + FULL_RIDGE * np.eye(len(unit))
         out[c] = evidence.square[c].sum() - (cross[c] * unit) @ np.linalg.solve(scaled, cross[c] * unit)
     return out
 
@@ -103,7 +102,7 @@ def differences(found: Found, count: int) -> np.ndarray:
         for key, term in problem.terms.items():
             if term.effect in said.alternatives and key != said.key:
                 others = problem.columns_of[key]
-                energy = np.maximum(np.einsum("ckk->k", problem.channel_gram[:, others[:, None], others]), 1e-300)
+                energy = np.maximum(np.einsum("ckk->k", problem.channel_gram[:, others[:, None], others]), TINY)
                 out[others] = np.maximum(out[others], size / energy * problem.unit[others] ** 2)
     return out
 

@@ -14,7 +14,7 @@ MOST_LIMITS = 4
 
 
 def sentences(found: Changes) -> list[str]:
-    """One sentence a change, the surest first, and one on what did not change."""
+    """One sentence a change, the most probable first, and one on what did not change."""
     out = [change_words(c) for c in found.changes]
     if not out:
         out.append(f"Nothing changed from {found.base} to {found.new} as far as these recordings can tell.")

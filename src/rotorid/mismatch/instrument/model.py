@@ -148,7 +148,7 @@ class ReadingModel:
 
 
 def kept_values(search: Search, active: Sequence[str]) -> list[str]:
-    """Terms that stand beside effects always, less believed values that a form at work absorbs."""
+    """Terms that are in every model next to the effects, less believed values that a form at work absorbs."""
     taken = {v for k in active for v in search.terms[k].form.takes_up}
     return [k for k in search.always if k not in taken]
 

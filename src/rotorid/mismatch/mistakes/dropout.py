@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.mistakes.signals import replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import COMMANDED, replace_columns, sensor_columns
 from rotorid.mismatch.motion import stretches
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
@@ -34,7 +34,6 @@ PLAIN_CHANGE = 8.0
 """Times the noise by which a reading should have changed to be called held."""
 PLAIN_STEPS = 2.0
 """The same in steps of a coarse reading, which stands still until the load has changed by one."""
-COMMANDED = ("commands", "throttle")
 OTHERS_GO_ON = 0.5
 """Share of the samples in which every other rotor's command changes while one stands still."""
 LEAST_JUMP = 5.0

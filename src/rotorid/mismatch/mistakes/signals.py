@@ -13,6 +13,8 @@ from rotorid.mismatch.motion import continuous, fresh_samples, own_rate_hz, rota
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 
+COMMANDED = ("commands", "throttle")
+"""Sensors that are what was asked of the rotors, not what was measured."""
 LONGEST_BRIDGED_SAMPLES = 6
 """A hole of up to this many of a sensor's own periods is interpolated; a longer one stays missing."""
 

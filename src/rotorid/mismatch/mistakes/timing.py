@@ -20,11 +20,10 @@ from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Result, signals_of
 from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit
-from rotorid.mismatch.mistakes.signals import Signals, replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import COMMANDED, Signals, replace_columns, sensor_columns
 from rotorid.mismatch.motion import fresh_samples
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
-COMMANDED = ("commands", "throttle")
 LEAST_ALONE = 0.9
 """Share of the motion that commands must explain to tell a constant lateness: below it the motors' lag, fitted later,
 tells their dead time better. A growth of it is bounded by what disturbances can feign (`disturbed_s`)."""

@@ -47,7 +47,7 @@ def history(
     sets
         By vehicle, in the order they were flown.
     good
-        How many of the first sets are the good ones, which all later ones are held against.
+        How many of the first sets are the good ones, which all later ones are compared with.
     progress
         Gets one line a set.
 
