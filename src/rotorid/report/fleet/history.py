@@ -64,7 +64,11 @@ def history(
         if len(own) <= good:
             continue
         compared = {}
-        reference = reference_of(as_one(own[:good]))
+        try:
+            reference = reference_of(as_one(own[:good]))
+        except InputError as error:
+            progress(f"{vehicle} is left out: {error}")
+            continue
         for later in own[good:]:
             try:
                 compared[later.name] = changes_from(reference, later)

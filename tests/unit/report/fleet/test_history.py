@@ -66,3 +66,15 @@ def test_sets_are_ordered_by_vehicle_and_day_and_a_broken_one_is_named(tmp_path:
         flown(1).vehicle.name: ["heron-2026-10-01", "heron-2026-10-02"]
     }
     assert len(said) == 1 and said[0].startswith("broken-2026-10-03 is left out: ")
+
+
+def test_a_vehicle_whose_first_sets_believe_different_things_is_left_out_with_a_line():
+    first, second = flown(1), flown(2)
+    other = replace(second, vehicle=second.vehicle.model_copy(update={"mass_kg": 2.0 * second.vehicle.mass_kg}))
+    said: list[str] = []
+    numbers, events = history({"heron": [first, other, flown(3)]}, good=2, progress=said.append)
+    assert numbers.empty and events.empty
+    assert said == [
+        "heron is left out: heron-2026-10-02/vehicle.yaml: differs from that of heron-2026-10-01; "
+        "expected one vehicle in all good sets"
+    ]
