@@ -8,9 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.changes.joint import Reference, joint_of, reference_of
+from rotorid.mismatch.changes.chain import (
+    change_of_chain,
+    speed_evidence,
+    speed_filters,
+    speed_rows,
+    squares_of_speeds,
+)
+from rotorid.mismatch.changes.joint import Joint, Reference, joined_at, joints_of, reference_of
 from rotorid.mismatch.changes.notes import notes_of
-from rotorid.mismatch.changes.problem import decide_changes
+from rotorid.mismatch.changes.problem import decide_changes, evidence_for
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
@@ -25,6 +32,8 @@ from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, Rows
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 
+CHAIN_ROUNDS = 4
+"""Times that the chain's columns are taken, at most."""
 KEYS = {name: key for key, name in PARAMETER_NAMES.items()}
 
 
@@ -78,29 +87,75 @@ def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior(
 
 def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the flights of a reference to another set of flights."""
-    joint, base = joint_of(reference, new), reference.recordings
-    usual = usual_spread(joint.base, joint.new, reference.known, joint.inertia)
-
-    def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
-        return decide_changes(flights, other, np.hypot(usual, more), prior)
-
-    found = decide(joint.base, joint.new, spread_of_flights(reference.runs, decide))
+    base = reference.recordings
+    options = [decided(reference, own, prior) for own in joints_of(reference, new)]
+    # A mistake in the second set is one change more: with it the two sets must be alike by more than it costs.
+    joint, found, _ = max(options, key=lambda o: o[2] - prior.effect_nats * len(o[0].mistakes_of_new))
+    of_speeds = decided_of_speeds(reference, joint, prior)
     vehicles = base.vehicle, new.vehicle
+    both = [found, *([of_speeds[0]] if of_speeds else [])]
     changes = [
         Change(s.id, s.status, s.alternatives, s.probability, in_percent(s.id, s.parameters, *vehicles))
-        for s in statements_of(found)
+        for own in both
+        for s in statements_of(own)
         if s.status != "not_established"
     ]
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
+    limits = [*limits_of(found, joint.squares), *(limits_of(*of_speeds) if of_speeds else [])]
     return Changes(
         base=base.name,
         new=new.name,
         changes=(*mistakes_that_differ(reference.mistakes, joint.mistakes_of_new), *changes),
-        limits=tuple(limit for limit in limits_of(found, joint.squares) if limit.id not in changed),
+        limits=tuple(sorted((x for x in limits if x.id not in changed), key=lambda x: -x.share)),
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
         notes=notes_of(joint, base.name, new.name),
     )
+
+
+def decided(reference: Reference, joint: Joint, prior: Prior) -> tuple[Joint, Found, float]:
+    """The changes of force, moment and sensors, the joint products in which they were found, and their log posterior.
+
+    Where the chain changed its columns are taken anew at what was found (Gauss and Newton).
+    """
+    usual = np.hypot(usual_spread(joint.base, joint.new, reference.known, joint.inertia), reference.usual_of_chain)
+
+    def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
+        return decide_changes(flights, other, np.hypot(usual, more), prior)
+
+    more = spread_of_flights(reference.runs, decide)
+    found, now = decide(joint.base, joint.new, more), reference.chain
+    for _ in range(CHAIN_ROUNDS if reference.found.commanded else 0):
+        chain = reference.chain.at(reference.chain.values + change_of_chain(found, reference.chain))
+        if np.all(np.abs(chain.values - now.values) < reference.chain.spread):
+            break
+        now = chain
+        joint = joined_at(reference, joint.recordings, joint.recorded, now, joint.mistakes_of_new)
+        found = decide(joint.base, joint.new, more)
+    return joint, found, evidence_for(joint.base, joint.new, found, np.hypot(usual, more))
+
+
+def decided_of_speeds(
+    reference: Reference, joint: Joint, prior: Prior
+) -> tuple[Found, Mapping[str, np.ndarray]] | None:
+    """The changes between command and measured rotor speed, and what the columns amount to; None without both."""
+    found, first = reference.found, reference.chain
+    both = reference.recorded, joint.recorded
+    if first is None or found.commanded or any(s.command is None for own in both for s in own):
+        return None
+    now, rate_hz, spread = first, both[0][0].rate_hz, np.append(first.spread, 0.0)
+    base = speed_rows(both[0], found, first, first)
+    for _ in range(CHAIN_ROUNDS):
+        new = speed_rows(both[1], found, now, first)
+        # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second.
+        filters = speed_filters([*base, *speed_rows(both[1], found, now, now)])
+        products = (speed_evidence(rows, filters, at, first, rate_hz) for rows, at in ((base, first), (new, now)))
+        changed = decide_changes(*products, spread, prior)
+        chain = first.at(first.values + change_of_chain(changed, first))
+        if np.all(np.abs(chain.values - now.values) < first.spread):
+            break
+        now = chain
+    return changed, squares_of_speeds(new, both[1], now)
 
 
 def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:

@@ -49,6 +49,16 @@ def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pri
     return small if gain > prior.leftover_nats else large
 
 
+def evidence_for(base: Evidence, new: Evidence, found: Found, spread: np.ndarray) -> float:
+    """Log posterior of changes that were found between two sets, nats, less a constant of the first set alone.
+
+    By it variants of the second set are compared: as recorded, or corrected for a mistake.
+    """
+    unit = unit_of(base, new)
+    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
+    return joint(spectra, found, spread) - 0.5 * float(new.square.sum())
+
+
 def settled(
     new: Evidence, spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, prior: Prior
 ) -> Found:

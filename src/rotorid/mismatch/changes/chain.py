@@ -1,0 +1,194 @@
+"""The chain from command to rotor speed in two sets: lag, delay, throttle curve, battery.
+
+What a small change of each of its parameters does is a column like any other: of the rotor speeds where they are
+measured, of force and moment where they are known from the commands alone. The chain holds the forms that the first
+set has, and one of every other id at the values that change nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.effects.contract import LIMIT, Parameter
+from rotorid.mismatch.changes.problem import change_of
+from rotorid.mismatch.fitted import Fitted
+from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.posterior.evidence import Evidence, LinearParameter, evidence_from
+from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.prepare import assemble_rows
+from rotorid.mismatch.regression import autoregression, build
+from rotorid.mismatch.report_runs import as_flown
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.speedpath import Chain, candidate_forms, commanded_path
+
+SAME_TIME_SD, SAME_SHARE_SD = 0.03, 0.01
+"""One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number
+without unit (another charge of the battery)."""
+STEP_S, STEP = 0.002, 0.01
+"""Changes of a time and of another parameter from which its column is taken."""
+SHIFT = "offset:commands"
+"""Nuisance: commands stamped a part of a sample late or early."""
+
+
+@dataclass(frozen=True)
+class ChainTerms:
+    """The chain's forms with the parameters at which columns are taken, for the first set."""
+
+    chain: Chain
+    values: np.ndarray
+    """(P,) parameters of every form in order."""
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """All parameters, in the order of `values`."""
+        return [p for _, form in self.chain for p in form.parameters]
+
+    @property
+    def terms(self) -> list[Term]:
+        """A term for each form."""
+        sizes = [len(form.parameters) for _, form in self.chain]
+        return [
+            Term(key_of(effect, form.name), "effect", effect, size=size, prior_sd=(np.inf,) * size)
+            for (effect, form), size in zip(self.chain, sizes, strict=True)
+        ]
+
+    @property
+    def spread(self) -> np.ndarray:
+        """One-sigma (P,) of each parameter between two flights in which nothing changed, in its unit."""
+        times = np.array([p.unit == "s" for p in self.parameters])
+        least = np.array([p.negligible for p in self.parameters])
+        return np.hypot(np.where(times, SAME_TIME_SD * np.abs(self.values), SAME_SHARE_SD), least)
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(P,) changes from which columns are taken, away from the upper bound."""
+        own = self.parameters
+        size = np.array([STEP_S if p.unit == "s" else STEP for p in own])
+        return np.where(self.values + size > [p.high for p in own], -size, size)
+
+    def at(self, values: np.ndarray) -> ChainTerms:
+        """The same forms with other parameters (P,), within their bounds."""
+        own = self.parameters
+        return replace(self, values=np.clip(values, [p.low for p in own], [p.high for p in own]))
+
+    def stepped(self) -> list[ChainTerms]:
+        """The chain with each parameter changed by its step."""
+        return [replace(self, values=self.values + row) for row in np.diag(self.steps)]
+
+    def named(self, evidence: Evidence, first: ChainTerms) -> Evidence:
+        """Evidence whose terms know the parameters' symbols, as changes from those of the first set."""
+        at, known = 0, {}
+        for term, (_, form) in zip(self.terms, self.chain, strict=True):
+            values = first.values[at : at + term.size]
+            known[term.key] = (
+                form.name,
+                tuple(
+                    LinearParameter(p.symbol, p.unit, p.low - v, p.high - v, p.negligible)
+                    for p, v in zip(form.parameters, values, strict=True)
+                ),
+            )
+            at += term.size
+        named = (
+            replace(t, form=known[t.key][0], linear=known[t.key][1]) if t.key in known else t for t in evidence.terms
+        )
+        return replace(evidence, terms=tuple(named))
+
+
+def key_of(effect: str, form: str) -> str:
+    """Key of a form's term."""
+    return f"{effect}/{form}"
+
+
+def chain_terms(found: Fitted, segments: Sequence[Segment]) -> ChainTerms | None:
+    """The chain of a set's model, and one form of every other id; None where no commands are recorded."""
+    if found.chain is None:
+        return None
+    result, _, full_voltage = found.chain
+    chain, values = list(result.fit.chain), [float(v) for v in result.fit.values]
+    held = {effect for effect, _ in chain}
+    for effect, form in candidate_forms(list(segments), full_voltage is not None):
+        if effect not in held and form.stage != LIMIT:
+            held.add(effect)
+            chain.append((effect, form))
+            values += form.neutral
+    kept = ChainTerms(tuple(chain), np.array(values))
+    return kept.at(kept.values)
+
+
+def turning(found: Fitted, chain: ChainTerms) -> Fitted:
+    """The set's model with another chain."""
+    result, *full = found.chain
+    fit = replace(result.fit, chain=chain.chain, values=chain.values)
+    return replace(found, chain=(replace(result, fit=fit), *full))
+
+
+def change_of_chain(found: Found, chain: ChainTerms) -> np.ndarray:
+    """By how much the chain's parameters (P,) changed in a model, 0 of those that did not."""
+    change = change_of(found) * found.problem.unit
+    return np.concatenate([change[found.problem.columns_of[t.key]] for t in chain.terms])
+
+
+def chain_columns(
+    rows: Sequence[Rows], recorded: Sequence[Segment], found: Fitted, chain: ChainTerms
+) -> list[np.ndarray]:
+    """What a unit of each parameter of the chain leaves less in every channel of some stretches, (n, 12, P) each.
+
+    `rows` are those of the stretches with the rotors turning as `chain` makes of their commands.
+    """
+    prepared, effects = found.model.prepared, found.model.effects
+    columns = []
+    for other, step in zip(chain.stepped(), chain.steps, strict=True):
+        moved = assemble_rows(prepared, [], as_flown(list(recorded), turning(found, other)), effects)
+        columns.append([(r.y - m.y) / step for r, m in zip(rows, moved, strict=True)])
+    return [np.stack(own, axis=2) for own in zip(*columns, strict=True)]
+
+
+def speed_rows(segments: Sequence[Segment], found: Fitted, chain: ChainTerms, first: ChainTerms) -> list[Rows]:
+    """Rows of measured rotor speeds, rad/s: what the chain leaves of them, and a column for each of its parameters and
+    for commands that are stamped late. `first` is the first set's chain: what the rows leave is that of it."""
+    result, full_speed, full_voltage = found.chain
+    fit = result.fit
+
+    def speeds(segment: Segment, values: np.ndarray, shift_s: float) -> np.ndarray:
+        return commanded_path(segment, chain.chain, values, shift_s, full_speed, full_voltage, fit.holds)
+
+    out = []
+    for segment in segments:
+        now = speeds(segment, chain.values, fit.shift_s)
+        steps = zip(chain.stepped(), chain.steps, strict=True)
+        columns = [(speeds(segment, other.values, fit.shift_s) - now) / step for other, step in steps]
+        late = (speeds(segment, chain.values, fit.shift_s + STEP_S) - now) / STEP_S
+        x = np.stack([*columns, late], axis=2)
+        y = segment.motion.rotor_speed - now + x[:, :, :-1] @ (chain.values - first.values)
+        out.append(Rows(segment.run, segment.motion.time_s, y, x))
+    return out
+
+
+def speed_evidence(
+    rows: list[Rows], filters: dict[int, np.ndarray], chain: ChainTerms, first: ChainTerms, rate_hz: float
+) -> Evidence:
+    """The evidence of measured rotor speeds, one channel a rotor."""
+    shift = Term(SHIFT, "nuisance", prior_sd=(0.5 / rate_hz,))
+    regression = build(rows, [*chain.terms, shift], filters, lambda run, time_s: True, 1.0, rate_hz, by_channel=True)
+    return chain.named(evidence_from(regression), first)
+
+
+def speed_filters(rows: list[Rows]) -> dict[int, np.ndarray]:
+    """Whitening filters of what the chain leaves of each rotor's speed."""
+    return {k: autoregression([r.y[:, k] for r in rows]) for k in range(rows[0].y.shape[1])}
+
+
+def squares_of_speeds(rows: list[Rows], segments: Sequence[Segment], chain: ChainTerms) -> dict[str, np.ndarray]:
+    """To the key of each form what its columns amount to (k, k), as mean squares of shares of the thrust."""
+    out, at, count = {}, 0, sum(len(r.y) for r in rows)
+    for term in chain.terms:
+        own = [
+            2.0 * r.x[:, :, at : at + term.size] / np.maximum(s.motion.rotor_speed, 1.0)[:, :, None]
+            for r, s in zip(rows, segments, strict=True)
+        ]
+        out[term.key] = sum(np.einsum("nci,ncj->ij", x, x) / x.shape[1] for x in own) / count
+        at += term.size
+    return out
