@@ -10,7 +10,12 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.joint import Reference, joint_of, reference_of
 from rotorid.mismatch.changes.notes import notes_of
-from rotorid.mismatch.changes.problem import decide_changes
+from rotorid.mismatch.changes.of_instruments import (
+    InstrumentReference,
+    instrument_reference_of,
+    joint_of_instruments,
+)
+from rotorid.mismatch.changes.problem import NAMES, decide_changes
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
@@ -21,11 +26,11 @@ from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import parameters, statements_of
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, Rows
+from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 
-KEYS = {name: key for key, name in PARAMETER_NAMES.items()}
+KEYS = {name: key for key, name in NAMES.items()}
 
 
 @dataclass(frozen=True)
@@ -69,17 +74,26 @@ class Changes:
     """Of the longest stretch of each set, by channel."""
     notes: tuple[str, ...] = ()
     """What keeps the two sets from being compared fully, in sentences."""
+    kind: str = "flight"
+    """Of both sets: `flight`, `stand` or `bench`."""
 
 
 def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the first set of flights to the second."""
-    return changes_from(reference_of(base), new, prior)
+    if base.vehicle.kind == "flight":
+        return changes_from(reference_of(base), new, prior)
+    return changes_from(instrument_reference_of(base), new, prior)
 
 
-def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
+def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the flights of a reference to another set of flights."""
-    joint, base = joint_of(reference, new), reference.recordings
-    usual = usual_spread(joint.base, joint.new, reference.known, joint.inertia)
+    base = reference.recordings
+    if new.vehicle.kind != base.vehicle.kind:
+        raise InputError(
+            f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
+        )
+    joint = joint_of(reference, new) if isinstance(reference, Reference) else joint_of_instruments(reference, new)
+    usual = np.hypot(usual_spread(joint.base, joint.new, reference.known, joint.inertia), joint.more_usual)
 
     def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
         return decide_changes(flights, other, np.hypot(usual, more), prior)
@@ -100,6 +114,7 @@ def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
         notes=notes_of(joint, base.name, new.name),
+        kind=new.vehicle.kind,
     )
 
 
@@ -147,22 +162,25 @@ def in_percent(name: str, changes: tuple[Estimate, ...], base: Vehicle, new: Veh
     key = KEYS.get(name)
     if key is None:
         return changes
-    scale = believed_over(key, base, new)
+    scale, flown = believed_over(key, base, new), new.kind == "flight"
+
+    def relative(coefficient: float) -> float:
+        # Nothing accelerates on a stand: there a coefficient is the change itself.
+        return scale * (relative_change(key, coefficient, 0.0)[0] if flown else coefficient)
+
     ends = ("value", "low", "high")
-    return tuple(
-        replace(p, **{end: scale * relative_change(key, getattr(p, end), 0.0)[0] for end in ends}) for p in changes
-    )
+    return tuple(replace(p, **{end: relative(getattr(p, end)) for end in ends}) for p in changes)
 
 
 def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
     """The first vehicle's number over the second's, of a value whose column is in units of the first.
 
-    The column of a mass or an inertia is the force or moment itself, whatever was believed.
+    The column of a mass or an inertia is in flight the force or moment itself, whatever was believed.
     """
     if key == "arm":
         size = [float(np.linalg.norm(v.rotor_positions_m()[:, :2])) for v in (base, new)]
         return size[0] / size[1] if size[1] > 0 else 1.0
-    if key in ("thrust", "torque"):
+    if key in ("thrust", "torque") or (key == "mass" and new.kind != "flight"):
         return believed_value(base, key) / believed_value(new, key)
     return 1.0
 

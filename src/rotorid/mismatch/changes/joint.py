@@ -52,6 +52,8 @@ class Joint:
     squares: dict[str, np.ndarray]
     """To the key of each effect and believed value what its columns amount to in the second set
     (`absent.squares_of`)."""
+    more_usual: np.ndarray | float = 0.0
+    """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual.usual_spread`."""
 
 
 @dataclass(frozen=True)

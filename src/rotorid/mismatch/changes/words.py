@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from rotorid.mismatch.changes.compare import Change, Changes
+from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.findings import Estimate
 from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.words import capital, effect_words, listed, number, parameter_words, percent_words
 
-VALUES = frozenset(PARAMETER_NAMES.values())
+VALUES = frozenset(NAMES.values())
 MOST_LIMITS = 4
 """Things that did not change and are named with their limit; more are counted."""
 

@@ -1,0 +1,310 @@
+"""Two sets of a stand or of a bench on the same columns, ready to be weighed against each other as two flights are.
+
+Model, noise, whitening and the chain from command to rotor speed are the first set's. A stand is not quite the same on
+two days even where nothing changed: the zero is only as good as the few samples it was taken from, and it wanders a
+little within a run. Both are learnt from the runs of the first set, one by one, and are no change (`Wander`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.effects.loading import AXES, CHANNELS, Loading
+from rotorid.errors import InputError
+from rotorid.mismatch.absent import mean_squares
+from rotorid.mismatch.changes.joint import Joint, by_run
+from rotorid.mismatch.changes.usual import joined
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.instrument.analyse import first_model
+from rotorid.mismatch.instrument.chain import ChainResult, moved
+from rotorid.mismatch.instrument.columns import make_terms, rows_of
+from rotorid.mismatch.instrument.mistakes import find_mistakes
+from rotorid.mismatch.instrument.model import ReadingModel, everything, whole_reading
+from rotorid.mismatch.instrument.setup import Setup, compared_channels, loaded_by, session_of, set_up, with_unseen
+from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
+from rotorid.mismatch.posterior.leftover import TINY
+from rotorid.mismatch.regression import Regression, build
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.recordings import RecordingSet
+
+OTHER_RATE = 0.3
+"""Relative difference of two sampling rates from which one set's columns are not the other's."""
+FEWEST_RUNS = 3
+"""Runs that each set must have for its runs to be the environments in which a coefficient must be the same."""
+TARE_NOISE = 0.5
+"""One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples."""
+WANDERS = (("tare_offset", "constant"), ("zero_drift", "linear in time"))
+"""Effects, with the name of their forms, by which the zero differs from run to run."""
+LEAST_MOMENT_N_M = 1e-6
+"""Largest moment of the load below which none is put on."""
+
+
+@dataclass(frozen=True)
+class Wander:
+    """By how much the zero differs from run to run where nothing changed."""
+
+    columns: np.ndarray
+    """(C, 2) columns of a constant, and of the time within the run, in each channel; −1 where there is none."""
+    variance: np.ndarray
+    """(C, 2) variances of their coefficients, in their units."""
+
+
+@dataclass(frozen=True)
+class InstrumentReference:
+    """The first set, fitted once: what other sets are compared with."""
+
+    recordings: RecordingSet
+    model: ReadingModel
+    chain: ChainResult | None
+    """What lies between command and rotor speed, where speeds are not measured."""
+    terms: tuple[Term, ...]
+    rows: tuple[Rows, ...]
+    known: np.ndarray
+    """(K,) coefficients of the effects that its model holds, 0 of all others."""
+    evidence: Evidence
+    by_run: tuple[Evidence, ...]
+    """The same run by run."""
+    wander: Wander
+    mistakes: tuple[Finding, ...]
+    """Mistakes in its recordings, corrected."""
+
+    @property
+    def runs(self) -> tuple[Evidence, ...]:
+        """One: a bench's runs load different axes, and none can be compared with the others."""
+        return (self.evidence,)
+
+
+def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
+    """The first set of a stand or bench as a verdict fits it, all of its runs."""
+    base, mistakes, _ = find_mistakes(replace(base, held_out=()))
+    setup = set_up(base)
+    model, chain, loadings = first_model(setup, make_terms(setup)[0])
+    terms = compared_terms(model.terms, setup)
+    rows = rows_of(setup, terms, model.loadings, whole_reading(model.terms, model.selection.active))
+    regression = regression_of(rows, terms, model)
+    evidence = evidence_from(regression)
+    runs, known = by_run(evidence, regression), known_effects(model, terms)
+    return InstrumentReference(
+        recordings=base,
+        model=model,
+        chain=None if loadings is None else chain,
+        terms=tuple(terms),
+        rows=tuple(rows),
+        known=known,
+        evidence=evidence,
+        by_run=runs,
+        wander=wander_of(terms, runs, evidence, known, model.noise),
+        mistakes=tuple(mistakes),
+    )
+
+
+def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> Joint:
+    """Two sets of one stand or bench on the same columns.
+
+    Raises
+    ------
+    InputError
+        They have not the same channels, columns or rate.
+    """
+    must_compare(reference.recordings, new)
+    new, mistakes, _ = find_mistakes(replace(new, held_out=()))
+    model, terms = reference.model, list(reference.terms)
+    setup = replace(model.setup, loadings=loadings_of(reference, new))
+    rows = rows_of(setup, terms, setup.loadings, whole_reading(model.terms, model.selection.active))
+    rows = against_own(rows, reference, setup, new)
+    if not rows:
+        raise InputError(f"set {new.name}: no stretch is long enough to be compared with {reference.recordings.name}")
+    regression = regression_of(rows, terms, model)
+    evidence = evidence_from(regression)
+    runs = by_run(evidence, regression)
+    count = len(reference.by_run), len(runs)
+    both, more = [reference.by_run, runs], 0.0
+    if min(count) >= FEWEST_RUNS:
+        both = [[wandering(as_one_environment(run), reference.wander) for run in own] for own in both]
+    else:
+        more = between_sets(reference.wander, terms, evidence, sum(1.0 / n for n in count))
+    first, second = (joined(own) for own in both)
+    return Joint(
+        base=first,
+        new=second,
+        inertia=np.ones(len(evidence.channels)),
+        flown_by_base=how_large(model.loadings, setup.instrument.channels),
+        flown_by_new=how_large(setup.loadings, setup.instrument.channels),
+        rows_of_new=tuple(rows),
+        mistakes_of_new=tuple(mistakes),
+        squares=mean_squares(
+            rows, regression, [t for t in terms if t.kind in ("effect", "value")], scales(setup.instrument.largest)
+        ),
+        more_usual=more,
+    )
+
+
+def must_compare(base: RecordingSet, new: RecordingSet) -> None:
+    """InputError unless both sets are of the same kind, with the same channels, rotors, columns and rate."""
+    first, second = base.vehicle, new.vehicle
+    alike = {
+        "kind": (first.kind, second.kind),
+        "number of rotors": (first.rotor_count, second.rotor_count),
+        "tared": (first.tared, second.tared),
+        "sensor_mount": (first.sensor_mount, second.sensor_mount),
+    }
+    for name, (own, other) in alike.items():
+        if own != other:
+            raise InputError(f"{new.name}/vehicle.yaml: {name} is {other}, expected {own} as in {base.name}")
+    lost = sorted(columns_of(base) - columns_of(new))
+    if lost:
+        raise InputError(f"set {new.name}: {', '.join(lost)} is not in every run, expected as in {base.name}")
+    if compared_channels(base) != compared_channels(new):
+        raise InputError(f"set {new.name}: other forces or moments are read in every run than in {base.name}")
+    step_s = [float(np.median(np.concatenate([np.diff(r.time_s) for r in own.runs]))) for own in (base, new)]
+    if abs(step_s[1] / step_s[0] - 1.0) > OTHER_RATE:
+        raise InputError(
+            f"set {new.name}: recorded at {1 / step_s[1]:.3g} Hz, expected {1 / step_s[0]:.3g} Hz as {base.name}"
+        )
+
+
+def columns_of(recordings: RecordingSet) -> set[str]:
+    """Columns that every run of a set has values in."""
+    return set.intersection(*({n for n in r.table.columns if r.has(n)} for r in recordings.runs))
+
+
+def compared_terms(terms: Sequence[Term], setup: Setup) -> list[Term]:
+    """The terms that both sets have: less numbers of single runs, and on a stand with the gains of the reading.
+
+    A stand's gain is as good as its last calibration; a verdict takes it as it is, and asks of the rotors alone.
+    """
+    kept = [t for t in terms if t.form is None or not of_single_runs(t, setup)]
+    there = {t.key for t in kept}
+    loaded = [k for k in setup.instrument.loaded if k < 3]
+    gains = ["gain", *(f"gain_{'xyz'[k]}" for k in loaded if len(loaded) > 1)]
+    return [*(Term(key, "value", prior_sd=(1.0,)) for key in gains if key not in there), *kept]
+
+
+def of_single_runs(term: Term, setup: Setup) -> bool:
+    """Whether parameters of a form are those of single runs, named after them."""
+    return any(p.symbol.endswith(f"({run})") for p in term.form.parameters for run in setup.instrument.runs)
+
+
+def regression_of(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel) -> Regression:
+    """The regression that some rows make, whitened as the model's, with its products by channel."""
+    rate_hz = model.setup.rate_hz
+    block_s = model.rows_per_block / rate_hz
+    return build(list(rows), list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
+
+
+def known_effects(model: ReadingModel, terms: Sequence[Term]) -> np.ndarray:
+    """Coefficients (K,) of what is at work in the first set's model, and of its values, on the columns of `terms`."""
+    fit, keys = model.selection.fit, {t.key for t in model.regression.terms}
+    found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True)}
+    out: list[float] = []
+    for term in terms:
+        own = model.regression.columns([term.key]) if term.key in keys else [-1] * term.size
+        out += [found.get(c, 0.0) for c in own]
+    return np.array(out)
+
+
+def loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loading, ...]:
+    """Stretches of another set, prepared and loaded as the first set's, its rotors turning by the same chain."""
+    setup = replace(reference.model.setup, session=session_of(new))
+    own = with_unseen(setup, replace(new, vehicle=setup.vehicle)).loadings[len(setup.loadings) :]
+    return own if reference.chain is None else moved(replace(setup, loadings=own), reference.chain)
+
+
+def against_own(rows: list[Rows], reference: InstrumentReference, setup: Setup, new: RecordingSet) -> list[Rows]:
+    """Rows of the second set with what its own vehicle.yaml leaves of every channel; the columns stay the first's."""
+    if new.vehicle == setup.vehicle:
+        return rows
+    own = rows_of(setup, [], [loaded_by(x, new.vehicle) for x in setup.loadings])
+    return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
+
+
+def wander_of(
+    terms: Sequence[Term], runs: Sequence[Evidence], every: Evidence, known: np.ndarray, noise: np.ndarray
+) -> Wander:
+    """How the zero differs from run to run of the first set, by the estimates of each run given the set's model.
+
+    The variance between runs is the moment estimate of DerSimonian and Laird (Controlled Clinical Trials 7, 1986). A
+    variance of n runs is widened by (n + 1)/(n − 1).
+    """
+    found = [[columns_of_zero(terms, every, *one, int(c)) for one in WANDERS] for c in every.channels]
+    columns = np.array([[of_one[0] if of_one else -1 for of_one in own] for own in found])
+    variance = np.zeros(columns.shape)
+    for place, channel in enumerate(every.channels):
+        at = columns[place][columns[place] >= 0]
+        estimates, weights = [], []
+        for run in runs:
+            gram, cross = run.gram[place].sum(axis=0), run.cross[place].sum(axis=0)
+            inverse = np.linalg.pinv(gram[np.ix_(at, at)], hermitian=True)
+            estimates.append(inverse @ (cross - gram @ known)[at])
+            weights.append(1.0 / np.maximum(np.diag(inverse), TINY))
+        variance[place, columns[place] >= 0] = between(np.array(estimates), np.array(weights))
+        variance[place, 0] = max(variance[place, 0], (TARE_NOISE * noise[channel]) ** 2)
+    return Wander(columns, variance)
+
+
+def between(estimates: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Variance (k,) between n estimates (n, k) of weights (n, k), widened for their number; 0 of one alone."""
+    number = len(estimates)
+    if number < 2:
+        return np.zeros(estimates.shape[1])
+    total = np.maximum(weights.sum(axis=0), TINY)
+    mean = (weights * estimates).sum(axis=0) / total
+    squares = (weights * (estimates - mean) ** 2).sum(axis=0)
+    scale = np.maximum(total - (weights**2).sum(axis=0) / total, TINY)
+    return np.maximum(squares - (number - 1), 0.0) / scale * (number + 1) / (number - 1)
+
+
+def columns_of_zero(terms: Sequence[Term], evidence: Evidence, effect: str, form: str, channel: int) -> list[int]:
+    """Columns of the forms of an effect, named `form` or after it, that act in one channel alone."""
+    out = []
+    for term in terms:
+        if term.effect == effect and term.form.name.startswith(form) and not term.form.nonlinear:
+            names = [term.form.parameters[i].symbol for i in term.form.linear]
+            out += [evidence.start[term.key] + k for k, n in enumerate(names) if n == f"b_{AXES[channel]}"]
+    return out
+
+
+def wandering(evidence: Evidence, wander: Wander) -> Evidence:
+    """Evidence in which the zero of each environment is its own, with the variances of `wander`, and integrated out."""
+    gram, cross, square = evidence.gram.copy(), evidence.cross.copy(), evidence.square.copy()
+    for place, (columns, variances) in enumerate(zip(wander.columns, wander.variance, strict=True)):
+        at, variance = columns[columns >= 0], variances[columns >= 0]
+        for e in range(gram.shape[1]):
+            pulls, read = gram[place, e][:, at].copy(), cross[place, e, at].copy()
+            prior = np.diag(variance)
+            inverse = np.linalg.solve(np.eye(len(at)) + prior @ pulls[at], prior)
+            gram[place, e] -= pulls @ inverse @ pulls.T
+            cross[place, e] -= pulls @ (inverse @ read)
+            square[place, e] -= read @ inverse @ read
+    return replace(evidence, gram=gram, cross=cross, square=square)
+
+
+def between_sets(wander: Wander, terms: Sequence[Term], evidence: Evidence, shares: float) -> np.ndarray:
+    """One-sigma (K,) by which the zero's coefficients differ between two sets; `shares` is 1/n + 1/m of their runs."""
+    out = np.zeros(evidence.gram.shape[-1])
+    for place, channel in enumerate(evidence.channels):
+        for which, one in enumerate(WANDERS):
+            for column in columns_of_zero(terms, evidence, *one, int(channel)):
+                out[column] = np.sqrt(wander.variance[place, which] * shares)
+    return out
+
+
+def as_one_environment(evidence: Evidence) -> Evidence:
+    """Evidence of a run as that of one environment."""
+    parts = {name: getattr(evidence, name).sum(axis=1, keepdims=True) for name in ("gram", "cross", "square")}
+    return replace(evidence, **parts, blocks=evidence.blocks.sum(keepdims=True))
+
+
+def how_large(loadings: Sequence[Loading], channels: Sequence[int]) -> dict[str, float]:
+    """95th percentile of the magnitude of the load on each channel, N and N m, by regime variable."""
+    load = np.abs(np.concatenate([x.load for x in loadings]))
+    return {f"load_{CHANNELS[c]}": float(np.quantile(load[:, c], 0.95)) for c in channels}
+
+
+def scales(largest: Sequence[float]) -> np.ndarray:
+    """The largest force, N, and the largest moment, N m, of each channel's kind, (6,)."""
+    force, moment = max(largest[:3]), max(largest[3:])
+    return np.repeat([force, moment if moment > LEAST_MOMENT_N_M else np.inf], 3)
