@@ -15,7 +15,7 @@ from rotorid.mismatch.changes.of_instruments import (
     instrument_reference_of,
     joint_of_instruments,
 )
-from rotorid.mismatch.changes.problem import NAMES, decide_changes
+from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
@@ -93,10 +93,10 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
         )
     joint = joint_of(reference, new) if isinstance(reference, Reference) else joint_of_instruments(reference, new)
-    usual = np.hypot(usual_spread(joint.base, joint.new, reference.known, joint.inertia), joint.more_usual)
+    usual = np.hypot(usual_spread(joint.base, joint.new, joint.known, joint.inertia), joint.more_usual)
 
     def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
-        return decide_changes(flights, other, np.hypot(usual, more), prior)
+        return joint.decide(flights, other, np.hypot(usual, more), prior)
 
     found = decide(joint.base, joint.new, spread_of_flights(reference.runs, decide))
     vehicles = base.vehicle, new.vehicle

@@ -6,19 +6,22 @@ is the same in both sets, and cancels between them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.mismatch.absent import squares_of
+from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.changes.usual import of_environments
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.prepare import Prepared, assemble_rows, prepare, prepare_like
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.regression import Regression, build
@@ -41,6 +44,8 @@ class Joint:
 
     base: Evidence
     new: Evidence
+    known: np.ndarray
+    """(K,) coefficients of the effects that the first set's model holds, 0 of all others."""
     inertia: np.ndarray
     """(C,) mass, or inertia, of the second vehicle.yaml over that of the first, in each channel."""
     flown_by_base: Mapping[str, float]
@@ -54,6 +59,8 @@ class Joint:
     (`absent.squares_of`)."""
     more_usual: np.ndarray | float = 0.0
     """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual.usual_spread`."""
+    decide: Callable[[Evidence, Evidence, np.ndarray, Prior], Found] = decide_changes
+    """The most probable changes from one set's evidence to another's, given the usual spread (K,)."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +138,7 @@ def joint_of(reference: Reference, new: RecordingSet) -> Joint:
     return Joint(
         base=reference.evidence,
         new=with_known_effects(evidence_from(of_new), reference.known),
+        known=reference.known,
         inertia=inertia / inertia_of_base,
         flown_by_base=how_far(reference.segments, model.prepared),
         flown_by_new=how_far(segments, model.prepared),

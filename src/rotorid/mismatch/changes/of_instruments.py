@@ -9,23 +9,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import AXES, CHANNELS, Loading
 from rotorid.errors import InputError
 from rotorid.mismatch.absent import mean_squares
 from rotorid.mismatch.changes.joint import Joint, by_run
+from rotorid.mismatch.changes.problem import difference_of, joint, leftover_of, problem_of_changes, settled
 from rotorid.mismatch.changes.usual import joined
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.instrument.analyse import first_model
 from rotorid.mismatch.instrument.chain import ChainResult, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
-from rotorid.mismatch.instrument.model import ReadingModel, everything, whole_reading
-from rotorid.mismatch.instrument.setup import Setup, compared_channels, loaded_by, session_of, set_up, with_unseen
+from rotorid.mismatch.instrument.model import ReadingModel, ReadingSearch, everything, refined, whole_reading
+from rotorid.mismatch.instrument.sampling import quantisation
+from rotorid.mismatch.instrument.setup import (
+    Setup,
+    compared_channels,
+    loaded_by,
+    pieces_of,
+    session_of,
+    set_up,
+    with_unseen,
+)
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
-from rotorid.mismatch.posterior.leftover import TINY
+from rotorid.mismatch.posterior.leftover import TINY, spectrum_of, unit_of
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Problem
+from rotorid.mismatch.posterior.score import Posterior
+from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.recordings import RecordingSet
@@ -38,6 +54,8 @@ TARE_NOISE = 0.5
 """One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples."""
 WANDERS = (("tare_offset", "constant"), ("zero_drift", "linear in time"))
 """Effects, with the name of their forms, by which the zero differs from run to run."""
+MOST_REFINED = 4
+"""Ids whose nonlinear parameters are refined on the second set, the most promising first."""
 LEAST_MOMENT_N_M = 1e-6
 """Largest moment of the load below which none is put on."""
 
@@ -53,6 +71,17 @@ class Wander:
 
 
 @dataclass(frozen=True)
+class OnColumns:
+    """A set on some columns."""
+
+    rows: tuple[Rows, ...]
+    regression: Regression
+    evidence: Evidence
+    by_run: tuple[Evidence, ...]
+    """The same run by run."""
+
+
+@dataclass(frozen=True)
 class InstrumentReference:
     """The first set, fitted once: what other sets are compared with."""
 
@@ -61,20 +90,22 @@ class InstrumentReference:
     chain: ChainResult | None
     """What lies between command and rotor speed, where speeds are not measured."""
     terms: tuple[Term, ...]
-    rows: tuple[Rows, ...]
+    own: OnColumns
     known: np.ndarray
-    """(K,) coefficients of the effects that its model holds, 0 of all others."""
-    evidence: Evidence
-    by_run: tuple[Evidence, ...]
-    """The same run by run."""
+    """(K,) coefficients of its model on the columns of the terms, 0 of what is not at work."""
     wander: Wander
     mistakes: tuple[Finding, ...]
     """Mistakes in its recordings, corrected."""
 
     @property
+    def rows(self) -> tuple[Rows, ...]:
+        """Rows of all stretches."""
+        return self.own.rows
+
+    @property
     def runs(self) -> tuple[Evidence, ...]:
-        """One: a bench's runs load different axes, and none can be compared with the others."""
-        return (self.evidence,)
+        """None: a bench's runs load different axes, and none can be compared with the others."""
+        return ()
 
 
 def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
@@ -83,21 +114,16 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
     setup = set_up(base)
     model, chain, loadings = first_model(setup, make_terms(setup)[0])
     terms = compared_terms(model.terms, setup)
-    rows = rows_of(setup, terms, model.loadings, whole_reading(model.terms, model.selection.active))
-    regression = regression_of(rows, terms, model)
-    evidence = evidence_from(regression)
-    runs, known = by_run(evidence, regression), known_effects(model, terms)
+    own, known = on_columns(rows_like(model, terms, model.loadings), terms, model), known_effects(model, terms)
     return InstrumentReference(
         recordings=base,
         model=model,
         chain=None if loadings is None else chain,
         terms=tuple(terms),
-        rows=tuple(rows),
+        own=own,
         known=known,
-        evidence=evidence,
-        by_run=runs,
-        wander=wander_of(terms, runs, evidence, known, model.noise),
-        mistakes=tuple(mistakes),
+        wander=wander_of(terms, own, known, model.noise),
+        mistakes=(*mistakes, *steps_of(setup, model)),
     )
 
 
@@ -111,35 +137,140 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     """
     must_compare(reference.recordings, new)
     new, mistakes, _ = find_mistakes(replace(new, held_out=()))
-    model, terms = reference.model, list(reference.terms)
-    setup = replace(model.setup, loadings=loadings_of(reference, new))
-    rows = rows_of(setup, terms, setup.loadings, whole_reading(model.terms, model.selection.active))
-    rows = against_own(rows, reference, setup, new)
-    if not rows:
+    model = reference.model
+    setup = replace(model.setup, recordings=new, loadings=loadings_of(reference, new))
+    if not any(pieces_of(x, setup.average) for x in setup.loadings):
         raise InputError(f"set {new.name}: no stretch is long enough to be compared with {reference.recordings.name}")
-    regression = regression_of(rows, terms, model)
-    evidence = evidence_from(regression)
-    runs = by_run(evidence, regression)
-    count = len(reference.by_run), len(runs)
-    both, more = [reference.by_run, runs], 0.0
+
+    def of_new(terms: Sequence[Term]) -> OnColumns:
+        return on_columns(against_own(rows_like(model, terms, setup.loadings), reference, setup, new), terms, model)
+
+    terms, base, second = list(reference.terms), reference.own, of_new(reference.terms)
+    if more_terms := refined_on(second, setup, reference):
+        terms += more_terms
+        base, second = on_columns(rows_like(model, terms, model.loadings), terms, model), of_new(terms)
+    count, more = (len(base.by_run), len(second.by_run)), 0.0
+    both: Sequence[Sequence[Evidence]] = (base.by_run, second.by_run)
     if min(count) >= FEWEST_RUNS:
         both = [[wandering(as_one_environment(run), reference.wander) for run in own] for own in both]
     else:
-        more = between_sets(reference.wander, terms, evidence, sum(1.0 / n for n in count))
-    first, second = (joined(own) for own in both)
+        more = between_sets(reference.wander, terms, second.evidence, sum(1.0 / n for n in count))
+    channels, compared = setup.instrument.channels, [t for t in terms if t.kind in ("effect", "value")]
     return Joint(
-        base=first,
-        new=second,
-        inertia=np.ones(len(evidence.channels)),
-        flown_by_base=how_large(model.loadings, setup.instrument.channels),
-        flown_by_new=how_large(setup.loadings, setup.instrument.channels),
-        rows_of_new=tuple(rows),
-        mistakes_of_new=tuple(mistakes),
-        squares=mean_squares(
-            rows, regression, [t for t in terms if t.kind in ("effect", "value")], scales(setup.instrument.largest)
-        ),
+        base=joined(both[0]),
+        new=joined(both[1]),
+        known=np.concatenate([reference.known, np.zeros(sum(t.size for t in terms) - len(reference.known))]),
+        inertia=np.ones(len(channels)),
+        flown_by_base=how_large(model.loadings, channels),
+        flown_by_new=how_large(setup.loadings, channels),
+        rows_of_new=second.rows,
+        mistakes_of_new=(*mistakes, *steps_of(setup, model)),
+        squares=mean_squares(second.rows, second.regression, compared, scales(setup.instrument.largest)),
         more_usual=more,
+        decide=partial(decide_instrument_changes, sizes=second.evidence.gram.sum(axis=1)),
     )
+
+
+def rows_like(model: ReadingModel, terms: Sequence[Term], loadings: Sequence[Loading]) -> list[Rows]:
+    """Rows of stretches with columns of `terms`, what is at work in the model moved by its clock."""
+    return rows_of(model.setup, list(terms), loadings, whole_reading(model.terms, model.selection.active))
+
+
+def on_columns(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel) -> OnColumns:
+    """What some rows hold, whitened as the model's, with its products by channel."""
+    rate_hz = model.setup.rate_hz
+    block_s = model.rows_per_block / rate_hz
+    regression = build(list(rows), list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
+    evidence = evidence_from(regression)
+    return OnColumns(tuple(rows), regression, evidence, by_run(evidence, regression))
+
+
+def refined_on(second: OnColumns, setup: Setup, reference: InstrumentReference) -> list[Term]:
+    """The forms that say most of a change by one id alone, with nonlinear parameters as the second set has them.
+
+    A filter or a resonance at the first set's values, or at those a search starts from, would leave much of itself,
+    and several others would be needed to make up for it. `setup` holds the second set's stretches.
+    """
+    model, terms = reference.model, {t.key: t for t in reference.terms}
+    problem = problem_without_leftover(reference.own.evidence, second.evidence)
+    posterior, best = Posterior(problem), {}
+    for key, effect in problem.effects.items():
+        if key in terms and terms[key].form is not None and terms[key].form.nonlinear:
+            gain = posterior((key,)) - posterior(())
+            if gain > best.get(effect, ("", 0.0))[1]:
+                best[effect] = key, gain
+    chosen = sorted(best.values(), key=lambda of: -of[1])[:MOST_REFINED]
+    at_work = [k for k in model.selection.active if k in terms]
+    own = replace(
+        model,
+        setup=setup,
+        loadings=setup.loadings,
+        terms=list(reference.terms),
+        rows=list(second.rows),
+        regression=second.regression,
+        search=ReadingSearch(second.regression, model.search.ask),
+    )
+    out = []
+    for key, _ in chosen:
+        active = list(dict.fromkeys([*at_work, key]))
+        found = refined(replace(own, selection=replace(model.selection, active=active)))
+        values = next(t.values for t in found if t.key == key)
+        out.append(replace(terms[key], key=f"{key} as changed", values=values))
+    return out
+
+
+def problem_without_leftover(base: Evidence, new: Evidence) -> Problem:
+    """The problem of all changes between two sets where all that no change explains is white noise."""
+    unit = unit_of(base, new)
+    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
+    return problem_of_changes(new, spectra, np.zeros(len(new.channels)), np.zeros(len(unit)), Prior())
+
+
+def decide_instrument_changes(
+    base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior, sizes: np.ndarray
+) -> Found:
+    """The most probable changes between two sets on the same columns.
+
+    As `problem.decide_changes`, but also from no leftover at all, and with one effect that takes time in place of
+    several where it explains nearly as much. `sizes` (C, K, K) are products that sizes of contributions are taken from.
+    """
+    unit = unit_of(base, new)
+    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
+    starts = [leftover_of(spectra, d) for d in (np.zeros(len(unit)), difference_of(spectra))]
+    best, *others = (settled(new, spectra, v, spread, prior, sizes) for v in (*starts, np.zeros(len(new.channels))))
+    for found in others:
+        if joint(spectra, found, spread) - joint(spectra, best, spread) > prior.leftover_nats:
+            best = found
+    return with_one_of_time(best)
+
+
+def with_one_of_time(found: Found) -> Found:
+    """The same with one effect that takes time in place of several, where what it leaves may be its form's error.
+
+    A filter of the fourth order is one of the second and a delay to the catalogue, at thousands of nats.
+    """
+    posterior, problem = found.posterior, found.problem
+    of_time = [k for k in found.model if takes_time(problem.terms[k].effect)]
+    if len(of_time) < 2:
+        return found
+    rest = tuple(k for k in found.model if k not in of_time)
+    effects = {problem.effects[k] for k in of_time}
+    plainer = [tuple(sorted((*rest, k))) for k, effect in problem.effects.items() if effect in effects]
+    best, none = max(plainer, key=posterior), posterior(rest)
+    if posterior(best) - none < (1.0 - problem.prior.form_error**2) * (found.log_posterior - none):
+        return found
+    return Found(posterior, best, posterior(best))
+
+
+def takes_time(effect: str) -> bool:
+    """Whether an effect shows in what takes time alone: a filter, a delay, a resonance, a clock, creep."""
+    return effect in catalogue() and bool(catalogue()[effect].shows)
+
+
+def steps_of(setup: Setup, model: ReadingModel) -> tuple[Finding, ...]:
+    """That a set's readings are rounded to steps that are coarse next to the noise: one finding or none."""
+    found, _ = quantisation(setup, model.noise)
+    return () if found is None else (found,)
 
 
 def must_compare(base: RecordingSet, new: RecordingSet) -> None:
@@ -188,13 +319,6 @@ def of_single_runs(term: Term, setup: Setup) -> bool:
     return any(p.symbol.endswith(f"({run})") for p in term.form.parameters for run in setup.instrument.runs)
 
 
-def regression_of(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel) -> Regression:
-    """The regression that some rows make, whitened as the model's, with its products by channel."""
-    rate_hz = model.setup.rate_hz
-    block_s = model.rows_per_block / rate_hz
-    return build(list(rows), list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
-
-
 def known_effects(model: ReadingModel, terms: Sequence[Term]) -> np.ndarray:
     """Coefficients (K,) of what is at work in the first set's model, and of its values, on the columns of `terms`."""
     fit, keys = model.selection.fit, {t.key for t in model.regression.terms}
@@ -221,14 +345,13 @@ def against_own(rows: list[Rows], reference: InstrumentReference, setup: Setup, 
     return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
-def wander_of(
-    terms: Sequence[Term], runs: Sequence[Evidence], every: Evidence, known: np.ndarray, noise: np.ndarray
-) -> Wander:
+def wander_of(terms: Sequence[Term], own: OnColumns, known: np.ndarray, noise: np.ndarray) -> Wander:
     """How the zero differs from run to run of the first set, by the estimates of each run given the set's model.
 
     The variance between runs is the moment estimate of DerSimonian and Laird (Controlled Clinical Trials 7, 1986). A
     variance of n runs is widened by (n + 1)/(n − 1).
     """
+    every, runs = own.evidence, own.by_run
     found = [[columns_of_zero(terms, every, *one, int(c)) for one in WANDERS] for c in every.channels]
     columns = np.array([[of_one[0] if of_one else -1 for of_one in own] for own in found])
     variance = np.zeros(columns.shape)

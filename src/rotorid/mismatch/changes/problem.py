@@ -55,12 +55,20 @@ def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pri
 
 
 def settled(
-    new: Evidence, spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, prior: Prior
+    new: Evidence,
+    spectra: tuple[Spectrum, Spectrum],
+    variance: np.ndarray,
+    spread: np.ndarray,
+    prior: Prior,
+    sizes: np.ndarray | None = None,
 ) -> Found:
-    """The most probable changes and their leftover, from a `variance` (C,) of the leftover."""
+    """The most probable changes and their leftover, from a `variance` (C,) of the leftover.
+
+    `sizes` (C, K, K) are products that the sizes of contributions are taken from where they are not those of `new`.
+    """
     starts = [()]
     for _ in range(ROUNDS):
-        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior), starts)
+        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior, sizes), starts)
         starts = [(), found.model]
         before, variance = variance, leftover_of(spectra, change_of(found))
         if np.array_equal(before, variance):
@@ -113,7 +121,12 @@ def change_of(found: Found) -> np.ndarray:
 
 
 def problem_of_changes(
-    new: Evidence, spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, prior: Prior
+    new: Evidence,
+    spectra: tuple[Spectrum, Spectrum],
+    variance: np.ndarray,
+    spread: np.ndarray,
+    prior: Prior,
+    sizes: np.ndarray | None = None,
 ) -> Problem:
     """The problem that two sets pose on the same columns, with a leftover of `variance` (C,) in each channel.
 
@@ -157,7 +170,7 @@ def problem_of_changes(
         rows=rows,
         variance=variance,
         prior=prior,
-        channel_gram=new.gram.sum(axis=1) * np.outer(unit, unit),
+        channel_gram=(new.gram.sum(axis=1) if sizes is None else sizes) * np.outer(unit, unit),
     )
 
 

@@ -77,14 +77,15 @@ def left_by_all(evidence: Evidence) -> np.ndarray:
     return out
 
 
-def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, Evidence], Found]) -> np.ndarray:
-    """One-sigma (K,) of each coefficient by which the good flights differ among themselves, in its unit.
+def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, Evidence], Found]) -> np.ndarray | float:
+    """One-sigma (K,) of each coefficient by which the good flights differ among themselves, in its unit; 0 of too few.
 
     Of a class each member gets what makes it contribute as much. A variance of n flights is widened by (n + 1)/(n − 1).
     """
-    number, squares = len(flights), np.zeros(flights[0].gram.shape[-1])
+    number = len(flights)
     if number < FEWEST_FLIGHTS:
-        return squares
+        return 0.0
+    squares = np.zeros(flights[0].gram.shape[-1])
     for k, flight in enumerate(flights):
         others = joined([f for j, f in enumerate(flights) if j != k])
         squares += differences(decide(others, flight), len(squares))
