@@ -129,7 +129,7 @@ def test_a_zero_of_each_environment_is_integrated_out_as_more_noise_of_its_colum
     none = np.zeros(0)
     gram, cross = (x.T @ x)[None, None], (x.T @ y)[None, None]
     evidence = Evidence((), {}, np.array([0]), gram, cross, np.array([[y @ y]]), np.ones(1), none, none, none, none)
-    found = wandering(evidence, Wander(np.array([[0, -1]]), np.array([[sd**2, 0.0]])))
+    found = wandering(evidence, Wander((([0],),), (np.array([sd**2]),)))
     assert found.gram[0, 0] == pytest.approx(x.T @ inverse @ x)
     assert found.cross[0, 0] == pytest.approx(x.T @ inverse @ y)
     assert found.square[0, 0] == pytest.approx(y @ inverse @ y)

@@ -93,7 +93,8 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
         )
     joint = joint_of(reference, new) if isinstance(reference, Reference) else joint_of_instruments(reference, new)
-    usual = np.hypot(usual_spread(joint.base, joint.new, joint.known, joint.inertia), joint.more_usual)
+    usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia, joint.form_sd)
+    usual = np.hypot(usual, joint.more_usual)
 
     def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
         return joint.decide(flights, other, np.hypot(usual, more), prior)

@@ -14,7 +14,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.mismatch.absent import squares_of
 from rotorid.mismatch.changes.problem import decide_changes
-from rotorid.mismatch.changes.usual import of_environments
+from rotorid.mismatch.changes.usual import FORM_SD, of_environments
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
@@ -59,6 +59,8 @@ class Joint:
     (`absent.squares_of`)."""
     more_usual: np.ndarray | float = 0.0
     """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual.usual_spread`."""
+    form_sd: float = FORM_SD
+    """Share of what effects contribute that their forms are wrong by."""
     decide: Callable[[Evidence, Evidence, np.ndarray, Prior], Found] = decide_changes
     """The most probable changes from one set's evidence to another's, given the usual spread (K,)."""
 

@@ -1,8 +1,9 @@
 """Two sets of a stand or of a bench on the same columns, ready to be weighed against each other as two flights are.
 
 Model, noise, whitening and the chain from command to rotor speed are the first set's. A stand is not quite the same on
-two days even where nothing changed: the zero is only as good as the few samples it was taken from, and it wanders a
-little within a run. Both are learnt from the runs of the first set, one by one, and are no change (`Wander`).
+two days even where nothing changed: the zero is only as good as the few samples it was taken from, it wanders within a
+run, and a load is put on a little otherwise each time. How much is learnt from the runs of the first set, one by one,
+and is no change (`Wander`).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from rotorid.effects.loading import AXES, CHANNELS, Loading
 from rotorid.errors import InputError
 from rotorid.mismatch.absent import mean_squares
 from rotorid.mismatch.changes.joint import Joint, by_run
-from rotorid.mismatch.changes.problem import difference_of, joint, leftover_of, problem_of_changes, settled
+from rotorid.mismatch.changes.problem import change_of, difference_of, joint, leftover_of, problem_of_changes, settled
 from rotorid.mismatch.changes.usual import joined
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.instrument.analyse import first_model
@@ -42,7 +43,7 @@ from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem
 from rotorid.mismatch.posterior.score import Posterior
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.regression import Regression, build
+from rotorid.mismatch.regression import Regression, build, ridge_inverse
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.recordings import RecordingSet
 
@@ -52,8 +53,15 @@ FEWEST_RUNS = 3
 """Runs that each set must have for its runs to be the environments in which a coefficient must be the same."""
 TARE_NOISE = 0.5
 """One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples."""
-WANDERS = (("tare_offset", "constant"), ("zero_drift", "linear in time"))
-"""Effects, with the name of their forms, by which the zero differs from run to run."""
+WANDERS = {"": "", "tare_offset": "constant", "zero_drift": "linear in time", "crosstalk": ""}
+"""Effects by which readings differ from run to run, with how the names of their forms begin."""
+MOUNTED_RAD = 0.001
+"""One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree."""
+FORM_SD_OF_READING = 0.1
+"""Share of what the first set's effects add to a reading that their forms are wrong by: loops and creep hang on what
+was loaded before."""
+HARDLY = 1e-3
+"""Share of all runs' squares of a column below which one run says nothing of it."""
 MOST_REFINED = 4
 """Ids whose nonlinear parameters are refined on the second set, the most promising first."""
 LEAST_MOMENT_N_M = 1e-6
@@ -62,12 +70,13 @@ LEAST_MOMENT_N_M = 1e-6
 
 @dataclass(frozen=True)
 class Wander:
-    """By how much the zero differs from run to run where nothing changed."""
+    """By how much readings differ from run to run where nothing changed."""
 
-    columns: np.ndarray
-    """(C, 2) columns of a constant, and of the time within the run, in each channel; −1 where there is none."""
-    variance: np.ndarray
-    """(C, 2) variances of their coefficients, in their units."""
+    columns: tuple[tuple[list[int], ...], ...]
+    """In each channel of a constant, of the time within the run, of the channel's own load and of each other load: the
+    columns that are this in that channel."""
+    variance: tuple[np.ndarray, ...]
+    """In each channel (k,) their coefficients' variances, in their units."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +131,7 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
         terms=tuple(terms),
         own=own,
         known=known,
-        wander=wander_of(terms, own, known, model.noise),
+        wander=wander_of(terms, own, known, model),
         mistakes=(*mistakes, *steps_of(setup, model)),
     )
 
@@ -149,12 +158,12 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     if more_terms := refined_on(second, setup, reference):
         terms += more_terms
         base, second = on_columns(rows_like(model, terms, model.loadings), terms, model), of_new(terms)
-    count, more = (len(base.by_run), len(second.by_run)), 0.0
+    count, more = (len(base.by_run), len(second.by_run)), mounted_anew(terms, setup)
     both: Sequence[Sequence[Evidence]] = (base.by_run, second.by_run)
     if min(count) >= FEWEST_RUNS:
         both = [[wandering(as_one_environment(run), reference.wander) for run in own] for own in both]
     else:
-        more = between_sets(reference.wander, terms, second.evidence, sum(1.0 / n for n in count))
+        more = np.hypot(more, between_sets(reference.wander, len(more), sum(1.0 / n for n in count)))
     channels, compared = setup.instrument.channels, [t for t in terms if t.kind in ("effect", "value")]
     return Joint(
         base=joined(both[0]),
@@ -167,6 +176,7 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
         mistakes_of_new=(*mistakes, *steps_of(setup, model)),
         squares=mean_squares(second.rows, second.regression, compared, scales(setup.instrument.largest)),
         more_usual=more,
+        form_sd=FORM_SD_OF_READING,
         decide=partial(decide_instrument_changes, sizes=second.evidence.gram.sum(axis=1)),
     )
 
@@ -231,13 +241,18 @@ def decide_instrument_changes(
 ) -> Found:
     """The most probable changes between two sets on the same columns.
 
-    As `problem.decide_changes`, but also from no leftover at all, and with one effect that takes time in place of
-    several where it explains nearly as much. `sizes` (C, K, K) are products that sizes of contributions are taken from.
+    As `problem.decide_changes`, but with one effect that takes time in place of several where it explains nearly as
+    much, and a leftover is learnt, too, from what the most promising of these leaves: `sizes` (C, K, K) are products
+    that sizes of contributions are taken from.
     """
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    starts = [leftover_of(spectra, d) for d in (np.zeros(len(unit)), difference_of(spectra))]
-    best, *others = (settled(new, spectra, v, spread, prior, sizes) for v in (*starts, np.zeros(len(new.channels))))
+    starts = [np.zeros(len(unit)), difference_of(spectra)]
+    white = Posterior(problem_of_changes(new, spectra, np.zeros(len(new.channels)), spread, prior))
+    if of_time := [k for k, effect in white.problem.effects.items() if takes_time(effect)]:
+        best = max(of_time, key=lambda k: white((k,)))
+        starts.append(change_of(Found(white, (best,), white((best,)))))
+    best, *others = (settled(new, spectra, leftover_of(spectra, d), spread, prior, sizes) for d in starts)
     for found in others:
         if joint(spectra, found, spread) - joint(spectra, best, spread) > prior.leftover_nats:
             best = found
@@ -345,59 +360,82 @@ def against_own(rows: list[Rows], reference: InstrumentReference, setup: Setup, 
     return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
-def wander_of(terms: Sequence[Term], own: OnColumns, known: np.ndarray, noise: np.ndarray) -> Wander:
-    """How the zero differs from run to run of the first set, by the estimates of each run given the set's model.
+def wander_of(terms: Sequence[Term], own: OnColumns, known: np.ndarray, model: ReadingModel) -> Wander:
+    """How readings differ from run to run of the first set, by the estimates of each run given the set's model.
 
     The variance between runs is the moment estimate of DerSimonian and Laird (Controlled Clinical Trials 7, 1986). A
     variance of n runs is widened by (n + 1)/(n − 1).
     """
-    every, runs = own.evidence, own.by_run
-    found = [[columns_of_zero(terms, every, *one, int(c)) for one in WANDERS] for c in every.channels]
-    columns = np.array([[of_one[0] if of_one else -1 for of_one in own] for own in found])
-    variance = np.zeros(columns.shape)
-    for place, channel in enumerate(every.channels):
-        at = columns[place][columns[place] >= 0]
-        estimates, weights = [], []
-        for run in runs:
-            gram, cross = run.gram[place].sum(axis=0), run.cross[place].sum(axis=0)
-            inverse = np.linalg.pinv(gram[np.ix_(at, at)], hermitian=True)
-            estimates.append(inverse @ (cross - gram @ known)[at])
-            weights.append(1.0 / np.maximum(np.diag(inverse), TINY))
-        variance[place, columns[place] >= 0] = between(np.array(estimates), np.array(weights))
-        variance[place, 0] = max(variance[place, 0], (TARE_NOISE * noise[channel]) ** 2)
-    return Wander(columns, variance)
+    columns, variances = [], []
+    for place, channel in enumerate(own.evidence.channels):
+        alike = wandering_columns(terms, own.evidence, model.setup.instrument.loaded, int(channel))
+        at = np.array([of_one[0] for of_one in alike])
+        every = own.evidence.gram[place].sum(axis=0)[at, at]
+        found = [estimate_of_run(run, place, at, known, every) for run in own.by_run]
+        variance = between(*(np.array(part) for part in zip(*found, strict=True)))
+        variance[0] = max(variance[0], (TARE_NOISE * model.noise[channel]) ** 2)
+        columns.append(tuple(alike))
+        variances.append(variance)
+    return Wander(tuple(columns), tuple(variances))
+
+
+def estimate_of_run(
+    run: Evidence, place: int, at: np.ndarray, known: np.ndarray, every: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of the columns `at` in one run and channel given those known of all, and their weights, (k,) each.
+
+    A column that a run hardly excites next to all runs, whose squares are `every` (k,), has weight 0.
+    """
+    gram, cross = run.gram[place].sum(axis=0), run.cross[place].sum(axis=0)
+    estimate, weight = np.zeros(len(at)), np.zeros(len(at))
+    shown = np.flatnonzero(gram[at, at] > HARDLY * every)
+    if len(shown):
+        of_shown = at[shown]
+        inverse = ridge_inverse(gram[np.ix_(of_shown, of_shown)])
+        estimate[shown] = inverse @ (cross - gram @ known)[of_shown]
+        weight[shown] = 1.0 / np.maximum(np.diag(inverse), TINY)
+    return estimate, weight
 
 
 def between(estimates: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Variance (k,) between n estimates (n, k) of weights (n, k), widened for their number; 0 of one alone."""
-    number = len(estimates)
-    if number < 2:
-        return np.zeros(estimates.shape[1])
+    number = (weights > 0).sum(axis=0)
     total = np.maximum(weights.sum(axis=0), TINY)
     mean = (weights * estimates).sum(axis=0) / total
     squares = (weights * (estimates - mean) ** 2).sum(axis=0)
     scale = np.maximum(total - (weights**2).sum(axis=0) / total, TINY)
-    return np.maximum(squares - (number - 1), 0.0) / scale * (number + 1) / (number - 1)
+    found = np.maximum(squares - (number - 1), 0.0) / scale * (number + 1) / np.maximum(number - 1, 1)
+    return np.where(number > 1, found, 0.0)
 
 
-def columns_of_zero(terms: Sequence[Term], evidence: Evidence, effect: str, form: str, channel: int) -> list[int]:
-    """Columns of the forms of an effect, named `form` or after it, that act in one channel alone."""
+def wandering_columns(
+    terms: Sequence[Term], evidence: Evidence, loaded: Sequence[int], channel: int
+) -> list[list[int]]:
+    """Columns of a constant, of time, of the channel's own load and of each other load, all forms of each together."""
+    own = AXES[channel]
+    wanted = [("tare_offset", f"b_{own}"), ("zero_drift", f"b_{own}"), ("", f"gain_{'xyz'[channel % 3]}")]
+    wanted += [("crosstalk", f"C_{own},{AXES[source]}") for source in loaded if source != channel]
     out = []
-    for term in terms:
-        if term.effect == effect and term.form.name.startswith(form) and not term.form.nonlinear:
-            names = [term.form.parameters[i].symbol for i in term.form.linear]
-            out += [evidence.start[term.key] + k for k, n in enumerate(names) if n == f"b_{AXES[channel]}"]
+    for effect, symbol in wanted:
+        found = []
+        for term in terms:
+            if term.kind == "value" and not effect and term.key in ("gain", symbol):
+                found.append(evidence.start[term.key])
+            elif term.kind == "effect" and term.effect == effect and term.form.name.startswith(WANDERS[effect]):
+                names = [term.form.parameters[i].symbol for i in term.form.linear]
+                found += [evidence.start[term.key] + k for k, name in enumerate(names) if name == symbol]
+        if found:
+            out.append(found)
     return out
 
 
 def wandering(evidence: Evidence, wander: Wander) -> Evidence:
-    """Evidence in which the zero of each environment is its own, with the variances of `wander`, and integrated out."""
+    """Evidence in which coefficients of each environment, with the variances of `wander`, are integrated out."""
     gram, cross, square = evidence.gram.copy(), evidence.cross.copy(), evidence.square.copy()
-    for place, (columns, variances) in enumerate(zip(wander.columns, wander.variance, strict=True)):
-        at, variance = columns[columns >= 0], variances[columns >= 0]
+    for place, (alike, variance) in enumerate(zip(wander.columns, wander.variance, strict=True)):
+        at, prior = np.array([of_one[0] for of_one in alike]), np.diag(variance)
         for e in range(gram.shape[1]):
             pulls, read = gram[place, e][:, at].copy(), cross[place, e, at].copy()
-            prior = np.diag(variance)
             inverse = np.linalg.solve(np.eye(len(at)) + prior @ pulls[at], prior)
             gram[place, e] -= pulls @ inverse @ pulls.T
             cross[place, e] -= pulls @ (inverse @ read)
@@ -405,14 +443,32 @@ def wandering(evidence: Evidence, wander: Wander) -> Evidence:
     return replace(evidence, gram=gram, cross=cross, square=square)
 
 
-def between_sets(wander: Wander, terms: Sequence[Term], evidence: Evidence, shares: float) -> np.ndarray:
-    """One-sigma (K,) by which the zero's coefficients differ between two sets; `shares` is 1/n + 1/m of their runs."""
-    out = np.zeros(evidence.gram.shape[-1])
-    for place, channel in enumerate(evidence.channels):
-        for which, one in enumerate(WANDERS):
-            for column in columns_of_zero(terms, evidence, *one, int(channel)):
-                out[column] = np.sqrt(wander.variance[place, which] * shares)
+def between_sets(wander: Wander, columns: int, shares: float) -> np.ndarray:
+    """One-sigma (K,) by which coefficients differ between two sets; `shares` is 1/n + 1/m of their runs."""
+    out = np.zeros(columns)
+    for alike, variance in zip(wander.columns, wander.variance, strict=True):
+        for of_one, own in zip(alike, variance, strict=True):
+            out[of_one] = np.maximum(out[of_one], np.sqrt(own * shares / len(of_one)))
     return out
+
+
+def mounted_anew(terms: Sequence[Term], setup: Setup) -> np.ndarray:
+    """One-sigma (K,) by which crosstalk differs between two days, as a load is not put on quite alike.
+
+    The forms in which a coefficient stands have it in equal shares, so that their sum has it once.
+    """
+    scale = dict(zip(AXES, scales(setup.instrument.largest), strict=True))
+    symbols = [
+        [t.form.parameters[i].symbol for i in t.form.linear] if t.effect == "crosstalk" else [""] * t.size
+        for t in terms
+    ]
+    every = [symbol for own in symbols for symbol in own]
+    out = np.zeros(len(every))
+    for k, symbol in enumerate(every):
+        if symbol:
+            target, source = symbol.removeprefix("C_").split(",")
+            out[k] = MOUNTED_RAD * scale[target] / scale[source] / np.sqrt(every.count(symbol))
+    return np.nan_to_num(out)
 
 
 def as_one_environment(evidence: Evidence) -> Evidence:
