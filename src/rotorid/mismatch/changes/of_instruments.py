@@ -57,6 +57,9 @@ WANDERS = {"": "", "tare_offset": "constant", "zero_drift": "linear in time", "c
 """Effects by which readings differ from run to run, with how the names of their forms begin."""
 MOUNTED_RAD = 0.001
 """One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree."""
+WIDE = 20.0
+"""One-sigmas between days in which nothing changed that a change is believed to have at least: narrower, its estimate
+would be drawn to nothing by as much as the two differ."""
 FORM_SD_OF_READING = 0.1
 """Share of what the first set's effects add to a reading that their forms are wrong by: loops and creep hang on what
 was loaded before."""
@@ -245,6 +248,7 @@ def decide_instrument_changes(
     much, and a leftover is learnt, too, from what the most promising of these leaves: `sizes` (C, K, K) are products
     that sizes of contributions are taken from.
     """
+    prior = replace(prior, value_reach=WIDE)
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     starts = [np.zeros(len(unit)), difference_of(spectra)]
