@@ -41,7 +41,7 @@ from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.leftover import TINY, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem
-from rotorid.mismatch.posterior.score import Posterior
+from rotorid.mismatch.posterior.score import Model, Posterior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.regression import Regression, build, ridge_inverse
 from rotorid.mismatch.rows import Rows, Term
@@ -62,7 +62,8 @@ WIDE = 20.0
 would be drawn to nothing by as much as the two differ."""
 FORM_SD_OF_READING = 0.1
 """Share of what the first set's effects add to a reading that their forms are wrong by: loops and creep hang on what
-was loaded before."""
+was loaded before. Also the share of what effects that take time do together up to which the others may be the form of
+one of them."""
 HARDLY = 1e-3
 """Share of all runs' squares of a column below which one run says nothing of it."""
 MOST_REFINED = 4
@@ -268,17 +269,25 @@ def with_one_of_time(found: Found) -> Found:
 
     A filter of the fourth order is one of the second and a delay to the catalogue, at thousands of nats.
     """
-    posterior, problem = found.posterior, found.problem
+    problem, posterior = found.problem, OneOfTime(found.problem)
     of_time = [k for k in found.model if takes_time(problem.terms[k].effect)]
     if len(of_time) < 2:
         return found
     rest = tuple(k for k in found.model if k not in of_time)
-    effects = {problem.effects[k] for k in of_time}
-    plainer = [tuple(sorted((*rest, k))) for k, effect in problem.effects.items() if effect in effects]
+    plainer = [tuple(sorted((*rest, k))) for k, term in problem.terms.items() if takes_time(term.effect)]
     best, none = max(plainer, key=posterior), posterior(rest)
-    if posterior(best) - none < (1.0 - problem.prior.form_error**2) * (found.log_posterior - none):
+    if posterior(best) - none < (1.0 - FORM_SD_OF_READING) * (found.log_posterior - none):
         return found
     return Found(posterior, best, posterior(best))
+
+
+class OneOfTime(Posterior):
+    """The log posterior of models with one effect that takes time at most."""
+
+    def __call__(self, model: Model) -> float:
+        """Log posterior of a model, nats; −∞ of one with several such effects."""
+        of_time = [k for k in model if takes_time(self.problem.terms[k].effect)]
+        return -np.inf if len(of_time) > 1 else super().__call__(model)
 
 
 def takes_time(effect: str) -> bool:
