@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.signal import bessel, sosfilt
 from typer.testing import CliRunner
 
 from rotorid.cli import app
@@ -17,7 +18,7 @@ from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.report.page.changes import make_changes_page
-from tests.unit.mismatch.test_instrument import bench_set
+from tests.unit.mismatch.test_instrument import RATE_HZ, bench_set
 from tests.unit.mismatch.test_stand import C_F, one_rotor, steady_run
 
 TARES_N = (0.05, -0.04, 0.02)
@@ -28,6 +29,11 @@ def crosstalk(load: np.ndarray) -> np.ndarray:
     out = load.copy()
     out[:, 0] += 0.02 * load[:, 2]
     return out
+
+
+def sluggish(load: np.ndarray) -> np.ndarray:
+    """A low-pass of the fourth order; the catalogue has one of the second, and a delay."""
+    return sosfilt(bessel(4, 2.0, fs=RATE_HZ, output="sos", norm="mag"), load, axis=0)
 
 
 def tared(recordings: RecordingSet, offsets_n) -> RecordingSet:
@@ -44,7 +50,9 @@ def tared(recordings: RecordingSet, offsets_n) -> RecordingSet:
 def compared(case: str) -> Changes:
     """A bench after its calibration against the same a year later."""
     base = replace(bench_set(runs=3, seed=3), name="calibrated")
-    change = {"crosstalk": crosstalk, "gain": lambda load: 1.03 * load}.get(case, lambda load: load)
+    change = {"crosstalk": crosstalk, "gain": lambda load: 1.03 * load, "sluggish": sluggish}.get(
+        case, lambda load: load
+    )
     new = replace(bench_set(change, runs=3, seed=4), name="today")
     if case == "another zero in each run":
         base, new = tared(base, TARES_N), tared(new, TARES_N[::-1])
@@ -83,6 +91,11 @@ def test_a_gain_that_changed_is_stated_in_percent():
     assert sure(found) == [{"reading_gain"}]
     (size,) = found.changes[0].parameters
     assert size.low < 0.03 < size.high and "+3" in sentences(found)[0]
+
+
+def test_a_filter_that_no_form_of_the_catalogue_is_is_one_change_and_not_several():
+    (ids,) = sure(compared("sluggish"))
+    assert ids & {"amplifier_filter", "delay"}
 
 
 def test_a_zero_of_its_own_in_each_run_is_no_change_but_one_that_none_of_the_good_runs_had_is():
