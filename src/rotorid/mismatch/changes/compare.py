@@ -17,7 +17,12 @@ from rotorid.mismatch.changes.chain import (
 )
 from rotorid.mismatch.changes.joint import Joint, Reference, joined_at, joints_of, reference_of
 from rotorid.mismatch.changes.notes import notes_of
-from rotorid.mismatch.changes.problem import decide_changes, evidence_for
+from rotorid.mismatch.changes.of_instruments import (
+    InstrumentReference,
+    instrument_reference_of,
+    joint_of_instruments,
+)
+from rotorid.mismatch.changes.problem import NAMES, evidence_for
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
@@ -28,13 +33,13 @@ from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import parameters, statements_of
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, Rows
+from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 
 CHAIN_ROUNDS = 4
 """Times that the chain's columns are taken, at most."""
-KEYS = {name: key for key, name in PARAMETER_NAMES.items()}
+KEYS = {name: key for key, name in NAMES.items()}
 
 
 @dataclass(frozen=True)
@@ -78,20 +83,30 @@ class Changes:
     """Of the longest stretch of each set, by channel."""
     notes: tuple[str, ...] = ()
     """What keeps the two sets from being compared fully, in sentences."""
+    kind: str = "flight"
+    """Of both sets: `flight`, `stand` or `bench`."""
 
 
 def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the first set of flights to the second."""
-    return changes_from(reference_of(base), new, prior)
+    if base.vehicle.kind == "flight":
+        return changes_from(reference_of(base), new, prior)
+    return changes_from(instrument_reference_of(base), new, prior)
 
 
-def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
+def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the flights of a reference to another set of flights."""
     base = reference.recordings
-    options = [decided(reference, own, prior) for own in joints_of(reference, new)]
-    # A mistake in the second set is one change more: with it the two sets must be alike by more than it costs.
-    joint, found, _ = max(options, key=lambda o: o[2] - prior.effect_nats * len(o[0].mistakes_of_new))
-    of_speeds = decided_of_speeds(reference, joint, prior)
+    if new.vehicle.kind != base.vehicle.kind:
+        raise InputError(
+            f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
+        )
+    if isinstance(reference, Reference):
+        joint, found = most_alike(reference, new, prior)
+        of_speeds = decided_of_speeds(reference, joint, prior)
+    else:
+        joint, of_speeds = joint_of_instruments(reference, new), None
+        found, _ = found_in(joint, reference.runs, prior)
     vehicles = base.vehicle, new.vehicle
     both = [found, *([of_speeds[0]] if of_speeds else [])]
     changes = [
@@ -110,29 +125,55 @@ def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
         notes=notes_of(joint, base.name, new.name),
+        kind=new.vehicle.kind,
     )
 
 
-def decided(reference: Reference, joint: Joint, prior: Prior) -> tuple[Joint, Found, float]:
-    """The changes of force, moment and sensors, the joint products in which they were found, and their log posterior.
+def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, Found]:
+    """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
+
+    A mistake is one change more: corrected for it the two sets must be alike by more than it costs.
+    """
+    options = [decided(reference, own, prior) for own in joints_of(reference, new)]
+
+    def log_posterior(joint: Joint, found: Found, spread: np.ndarray) -> float:
+        cost = prior.effect_nats * len(joint.mistakes_of_new)
+        return evidence_for(joint.base, joint.new, found, spread) - cost
+
+    joint, found, _ = options[0] if len(options) == 1 else max(options, key=lambda o: log_posterior(*o))
+    return joint, found
+
+
+def decided(reference: Reference, joint: Joint, prior: Prior) -> tuple[Joint, Found, np.ndarray]:
+    """The changes of force, moment and sensors, the products in which they were found, and the yardstick (K,).
 
     Where the chain changed its columns are taken anew at what was found (Gauss and Newton).
     """
-    usual = np.hypot(usual_spread(joint.base, joint.new, reference.known, joint.inertia), reference.usual_of_chain)
-
-    def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
-        return decide_changes(flights, other, np.hypot(usual, more), prior)
-
-    more = spread_of_flights(reference.runs, decide)
-    found, now = decide(joint.base, joint.new, more), reference.chain
+    found, spread = found_in(joint, reference.runs, prior)
+    now = reference.chain
     for _ in range(CHAIN_ROUNDS if reference.found.commanded else 0):
         chain = reference.chain.at(reference.chain.values + change_of_chain(found, reference.chain))
         if np.all(np.abs(chain.values - now.values) < reference.chain.spread):
             break
         now = chain
         joint = joined_at(reference, joint.recordings, joint.recorded, now, joint.mistakes_of_new)
-        found = decide(joint.base, joint.new, more)
-    return joint, found, evidence_for(joint.base, joint.new, found, np.hypot(usual, more))
+        found = joint.decide(joint.base, joint.new, spread, prior)
+    return joint, found, spread
+
+
+def found_in(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> tuple[Found, np.ndarray]:
+    """What changed between two sets, and by how much (K,) coefficients differ where nothing changed.
+
+    `runs` are those of the first set, by whose differences that is learnt.
+    """
+    usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia, joint.form_sd)
+    usual = np.hypot(usual, joint.more_usual)
+
+    def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
+        return joint.decide(flights, other, np.hypot(usual, more), prior)
+
+    spread = np.hypot(usual, spread_of_flights(runs, decide))
+    return joint.decide(joint.base, joint.new, spread, prior), spread
 
 
 def decided_of_speeds(
@@ -150,7 +191,7 @@ def decided_of_speeds(
         # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second.
         filters = speed_filters([*base, *speed_rows(both[1], found, now, now)])
         products = (speed_evidence(rows, filters, at, first, rate_hz) for rows, at in ((base, first), (new, now)))
-        changed = decide_changes(*products, spread, prior)
+        changed = joint.decide(*products, spread, prior)
         chain = first.at(first.values + change_of_chain(changed, first))
         if np.all(np.abs(chain.values - now.values) < first.spread):
             break
@@ -202,22 +243,25 @@ def in_percent(name: str, changes: tuple[Estimate, ...], base: Vehicle, new: Veh
     key = KEYS.get(name)
     if key is None:
         return changes
-    scale = believed_over(key, base, new)
+    scale, flown = believed_over(key, base, new), new.kind == "flight"
+
+    def relative(coefficient: float) -> float:
+        # Nothing accelerates on a stand: there a coefficient is the change itself.
+        return scale * (relative_change(key, coefficient, 0.0)[0] if flown else coefficient)
+
     ends = ("value", "low", "high")
-    return tuple(
-        replace(p, **{end: scale * relative_change(key, getattr(p, end), 0.0)[0] for end in ends}) for p in changes
-    )
+    return tuple(replace(p, **{end: relative(getattr(p, end)) for end in ends}) for p in changes)
 
 
 def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
     """The first vehicle's number over the second's, of a value whose column is in units of the first.
 
-    The column of a mass or an inertia is the force or moment itself, whatever was believed.
+    The column of a mass or an inertia is in flight the force or moment itself, whatever was believed.
     """
     if key == "arm":
         size = [float(np.linalg.norm(v.rotor_positions_m()[:, :2])) for v in (base, new)]
         return size[0] / size[1] if size[1] > 0 else 1.0
-    if key in ("thrust", "torque"):
+    if key in ("thrust", "torque") or (key == "mass" and new.kind != "flight"):
         return believed_value(base, key) / believed_value(new, key)
     return 1.0
 

@@ -6,7 +6,7 @@ between them. The chain from command to rotor speed is the first set's, too, wit
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,12 +19,15 @@ from rotorid.mismatch.changes.chain import (
     chain_terms,
     turning,
 )
-from rotorid.mismatch.changes.usual import of_environments
+from rotorid.mismatch.changes.problem import decide_changes
+from rotorid.mismatch.changes.usual import FORM_SD, of_environments
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.prepare import Prepared, assemble_rows, prepare, prepare_like
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.regression import Regression, build
@@ -47,6 +50,8 @@ class Joint:
 
     base: Evidence
     new: Evidence
+    known: np.ndarray
+    """(K,) coefficients of the effects that the first set's model holds, 0 of all others."""
     inertia: np.ndarray
     """(C,) mass, or inertia, of the second vehicle.yaml over that of the first, in each channel."""
     flown_by_base: Mapping[str, float]
@@ -55,13 +60,19 @@ class Joint:
     recordings: RecordingSet
     """The second set, corrected for its mistakes."""
     recorded: tuple[Segment, ...]
-    """Its stretches as recorded."""
+    """Its stretches of flight as recorded."""
     rows_of_new: tuple[Rows, ...]
     mistakes_of_new: tuple[Finding, ...]
     """Mistakes in the recordings of the second set, corrected."""
     squares: dict[str, np.ndarray]
     """To the key of each effect and believed value what its columns amount to in the second set
     (`absent.squares_of`)."""
+    more_usual: np.ndarray | float = 0.0
+    """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual.usual_spread`."""
+    form_sd: float = FORM_SD
+    """Share of what effects contribute that their forms are wrong by."""
+    decide: Callable[[Evidence, Evidence, np.ndarray, Prior], Found] = decide_changes
+    """The most probable changes from one set's evidence to another's, given the usual spread (K,)."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +184,8 @@ def joined_at(
     return Joint(
         base=reference.evidence,
         new=chain.named(evidence, reference.chain) if found.commanded else evidence,
+        known=reference.known,
+        more_usual=reference.usual_of_chain,
         inertia=inertia / inertia_of_base,
         flown_by_base=how_far(reference.segments, model.prepared),
         flown_by_new=how_far(segments, model.prepared),
