@@ -7,16 +7,17 @@ set has, and one of every other id at the values that change nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.effects.contract import LIMIT, Parameter
-from rotorid.mismatch.changes.problem import change_of
+from rotorid.mismatch.changes.problem import change_of, decide_changes, evidence_for, held
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence, LinearParameter, evidence_from
+from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.prepare import assemble_rows
 from rotorid.mismatch.regression import autoregression, build
@@ -27,6 +28,8 @@ from rotorid.mismatch.speedpath import Chain, candidate_forms, commanded_path
 SAME_TIME_SD, SAME_SHARE_SD = 0.03, 0.01
 """One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number
 without unit (another charge of the battery)."""
+CHAIN_ROUNDS = 4
+"""Times that the chain's columns are taken, at most."""
 STEP_S, STEP = 0.002, 0.01
 """Changes of a time and of another parameter from which its column is taken."""
 SHIFT = "offset:commands"
@@ -192,3 +195,74 @@ def squares_of_speeds(rows: list[Rows], segments: Sequence[Segment], chain: Chai
         out[term.key] = sum(np.einsum("nci,ncj->ij", x, x) / x.shape[1] for x in own) / count
         at += term.size
     return out
+
+
+@dataclass(frozen=True)
+class Option:
+    """Changes found with the chain's columns taken where they lead to."""
+
+    found: Found
+    chain: ChainTerms
+    log_posterior: float
+    """Nats, less a constant of the first set."""
+
+
+def option_of(
+    first: ChainTerms | None,
+    products_at: Callable[[ChainTerms | None], tuple[Evidence, Evidence]],
+    spread: np.ndarray,
+    prior: Prior,
+    same: Collection[str] = (),
+) -> Option:
+    """The most probable changes with the columns of the chain taken anew at what was found (Gauss and Newton).
+
+    Parameters
+    ----------
+    first
+        The first set's chain; None where its columns are not among those compared.
+    products_at
+        Evidence of both sets with the second one's columns taken at a chain.
+    spread
+        One-sigma (K,) of each coefficient between flights in which nothing changed.
+    same
+        Keys of the chain's forms that did not change, by assumption.
+    """
+    now = first
+    for _ in range(CHAIN_ROUNDS):
+        base, new = products_at(now)
+        found = decide_changes(base, held(new, same), spread, prior)
+        if first is None:
+            break
+        chain = first.at(first.values + change_of_chain(found, first))
+        if np.all(np.abs(chain.values - now.values) < first.spread):
+            break
+        now = chain
+    return Option(found, now, evidence_for(base, new, found, spread))
+
+
+def options_of(
+    first: ChainTerms | None,
+    products_at: Callable[[ChainTerms | None], tuple[Evidence, Evidence]],
+    spread: np.ndarray,
+    prior: Prior,
+) -> list[Option]:
+    """The most probable changes, and those without each form of the chain that changed in them; the best first.
+
+    What takes the place of a lag is not seen from where the lag has led to: a delay has another column there.
+    """
+    plain = option_of(first, products_at, spread, prior)
+    changed = [] if first is None else [t.key for t in first.terms if t.key in plain.found.model]
+    others = [option_of(first, products_at, spread, prior, {key}) for key in changed]
+    return sorted([plain, *others], key=lambda o: -o.log_posterior)
+
+
+def others_in_place(options: Sequence[Option], effect: str, prior: Prior) -> frozenset[str]:
+    """Ids of the chain that changed in an option nearly as probable as the best one, in which `effect` did not."""
+    best = options[0]
+    out = set()
+    for option in options[1:]:
+        ids = {option.found.problem.terms[key].effect for key in option.found.model}
+        if effect not in ids and best.log_posterior - option.log_posterior < prior.open_nats:
+            own = {best.found.problem.terms[key].effect for key in best.found.model}
+            out |= ids - own
+    return frozenset(out)

@@ -9,7 +9,10 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
-    change_of_chain,
+    ChainTerms,
+    Option,
+    options_of,
+    others_in_place,
     speed_evidence,
     speed_filters,
     speed_rows,
@@ -22,7 +25,7 @@ from rotorid.mismatch.changes.of_instruments import (
     instrument_reference_of,
     joint_of_instruments,
 )
-from rotorid.mismatch.changes.problem import NAMES, evidence_for
+from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
@@ -32,13 +35,11 @@ from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import parameters, statements_of
+from rotorid.mismatch.posterior.statements import Statement, parameters, statements_of
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 
-CHAIN_ROUNDS = 4
-"""Times that the chain's columns are taken, at most."""
 KEYS = {name: key for key, name in NAMES.items()}
 
 
@@ -102,21 +103,24 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
         )
     if isinstance(reference, Reference):
-        joint, found = most_alike(reference, new, prior)
-        of_speeds = decided_of_speeds(reference, joint, prior)
+        joint, options = most_alike(reference, new, prior)
+        found, of_speeds = options[0].found, decided_of_speeds(reference, joint, prior)
+        stated = changes_in(options, prior)
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
-        found, _ = found_in(joint, reference.runs, prior)
+        found = joint.decide(joint.base, joint.new, yardstick(joint, reference.runs, prior), prior)
+        stated = statements_of(found)
+    limits = limits_of(found, joint.squares)
+    if of_speeds:
+        stated = (*stated, *changes_in(of_speeds[0], prior))
+        limits = (*limits, *limits_of(of_speeds[0][0].found, of_speeds[1]))
     vehicles = base.vehicle, new.vehicle
-    both = [found, *([of_speeds[0]] if of_speeds else [])]
     changes = [
         Change(s.id, s.status, s.alternatives, s.probability, in_percent(s.id, s.parameters, *vehicles))
-        for own in both
-        for s in statements_of(own)
+        for s in stated
         if s.status != "not_established"
     ]
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
-    limits = [*limits_of(found, joint.squares), *(limits_of(*of_speeds) if of_speeds else [])]
     return Changes(
         base=base.name,
         new=new.name,
@@ -129,74 +133,72 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
     )
 
 
-def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, Found]:
+def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[Option]]:
     """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
 
     A mistake is one change more: corrected for it the two sets must be alike by more than it costs.
     """
-    options = [decided(reference, own, prior) for own in joints_of(reference, new)]
-
-    def log_posterior(joint: Joint, found: Found, spread: np.ndarray) -> float:
-        cost = prior.effect_nats * len(joint.mistakes_of_new)
-        return evidence_for(joint.base, joint.new, found, spread) - cost
-
-    joint, found, _ = options[0] if len(options) == 1 else max(options, key=lambda o: log_posterior(*o))
-    return joint, found
+    both = [(joint, flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
+    return max(both, key=lambda b: b[1][0].log_posterior - prior.effect_nats * len(b[0].mistakes_of_new))
 
 
-def decided(reference: Reference, joint: Joint, prior: Prior) -> tuple[Joint, Found, np.ndarray]:
-    """The changes of force, moment and sensors, the products in which they were found, and the yardstick (K,).
+def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:
+    """The most probable changes of force, moment and sensors, and where the chain changed those without; best first."""
+    first = reference.chain if reference.found.commanded else None
 
-    Where the chain changed its columns are taken anew at what was found (Gauss and Newton).
-    """
-    found, spread = found_in(joint, reference.runs, prior)
-    now = reference.chain
-    for _ in range(CHAIN_ROUNDS if reference.found.commanded else 0):
-        chain = reference.chain.at(reference.chain.values + change_of_chain(found, reference.chain))
-        if np.all(np.abs(chain.values - now.values) < reference.chain.spread):
-            break
-        now = chain
-        joint = joined_at(reference, joint.recordings, joint.recorded, now, joint.mistakes_of_new)
-        found = joint.decide(joint.base, joint.new, spread, prior)
-    return joint, found, spread
+    def products_at(chain: ChainTerms | None) -> tuple[Evidence, Evidence]:
+        if chain is first:
+            return joint.base, joint.new
+        at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new)
+        return at.base, at.new
+
+    return options_of(first, products_at, yardstick(joint, reference.runs, prior), prior)
 
 
-def found_in(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> tuple[Found, np.ndarray]:
-    """What changed between two sets, and by how much (K,) coefficients differ where nothing changed.
-
-    `runs` are those of the first set, by whose differences that is learnt.
-    """
+def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarray:
+    """One-sigma (K,) by which each coefficient differs where nothing changed; `runs` are those of the first set."""
     usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia, joint.form_sd)
     usual = np.hypot(usual, joint.more_usual)
 
-    def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
-        return joint.decide(flights, other, np.hypot(usual, more), prior)
+    def decide(flights: Evidence, other: Evidence) -> Found:
+        return joint.decide(flights, other, usual, prior)
 
-    spread = np.hypot(usual, spread_of_flights(runs, decide))
-    return joint.decide(joint.base, joint.new, spread, prior), spread
+    return np.hypot(usual, spread_of_flights(runs, decide))
 
 
 def decided_of_speeds(
     reference: Reference, joint: Joint, prior: Prior
-) -> tuple[Found, Mapping[str, np.ndarray]] | None:
+) -> tuple[list[Option], Mapping[str, np.ndarray]] | None:
     """The changes between command and measured rotor speed, and what the columns amount to; None without both."""
     found, first = reference.found, reference.chain
     both = reference.recorded, joint.recorded
     if first is None or found.commanded or any(s.command is None for own in both for s in own):
         return None
-    now, rate_hz, spread = first, both[0][0].rate_hz, np.append(first.spread, 0.0)
-    base = speed_rows(both[0], found, first, first)
-    for _ in range(CHAIN_ROUNDS):
-        new = speed_rows(both[1], found, now, first)
+    rate_hz, spread = both[0][0].rate_hz, np.append(first.spread, 0.0)
+    base, now = speed_rows(both[0], found, first, first), first
+    for _ in range(2):
         # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second.
         filters = speed_filters([*base, *speed_rows(both[1], found, now, now)])
-        products = (speed_evidence(rows, filters, at, first, rate_hz) for rows, at in ((base, first), (new, now)))
-        changed = joint.decide(*products, spread, prior)
-        chain = first.at(first.values + change_of_chain(changed, first))
-        if np.all(np.abs(chain.values - now.values) < first.spread):
-            break
-        now = chain
-    return changed, squares_of_speeds(new, both[1], now)
+        own = speed_evidence(base, filters, first, first, rate_hz)
+
+        def products_at(chain: ChainTerms, filters=filters, own=own) -> tuple[Evidence, Evidence]:
+            return own, speed_evidence(speed_rows(both[1], found, chain, first), filters, chain, first, rate_hz)
+
+        options = options_of(first, products_at, spread, prior)
+        now = options[0].chain
+    return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
+
+
+def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]:
+    """What is stated of the best option; a part of the chain in whose place another would do is one of a class."""
+    out = []
+    for stated in statements_of(options[0].found):
+        others = others_in_place(options, stated.id, prior)
+        if others and stated.status != "not_established":
+            members = tuple(sorted({stated.id, *stated.alternatives, *others}))
+            stated = replace(stated, status="ambiguous", alternatives=members)
+        out.append(stated)
+    return tuple(out)
 
 
 def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:

@@ -15,6 +15,7 @@ and a controller's answer are wrong by is in b and cancels.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +35,8 @@ LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 """Relative change of a value up to which it does not matter, and the largest."""
 LEAST_GAIN = 0.005
 """The least one of a reading's gain."""
+UNCHANGED = "unchanged"
+"""Kind of a term that is common to both sets and did not change by assumption."""
 RIDGE = 1e-4
 """Ridge of the fit of all columns from which the leftover is learnt, in units of their length."""
 ROUNDS = 4
@@ -52,6 +55,12 @@ def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pri
     large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
     gain = joint(spectra, small, spread) - joint(spectra, large, spread)
     return small if gain > prior.leftover_nats else large
+
+
+def held(new: Evidence, keys: Collection[str]) -> Evidence:
+    """Evidence of the second set in which the terms `keys` did not change, by assumption."""
+    terms = (replace(t, kind=UNCHANGED) if t.key in keys else t for t in new.terms)
+    return replace(new, terms=tuple(terms))
 
 
 def evidence_for(base: Evidence, new: Evidence, found: Found, spread: np.ndarray) -> float:
@@ -156,7 +165,7 @@ def problem_of_changes(
     free = [columns_of[key] for key, effect in effects.items() if effect not in NAMES.values()]
     free = np.concatenate(free) if free else np.zeros(0, int)
     low[free], high[free] = -np.inf, np.inf
-    always = [columns_of[key] for key, t in terms.items() if t.kind != "effect"]
+    always = [columns_of[key] for key, t in terms.items() if t.kind not in ("effect", UNCHANGED)]
     return Problem(
         terms=terms,
         columns_of=columns_of,
