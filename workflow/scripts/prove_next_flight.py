@@ -1,6 +1,7 @@
 """Prove the next flight on concealed sets: plan, record, judge both together.
 
-- Records sets in which pairs look alike, by code that shares nothing with the library.
+- Records sets in which pairs look alike, by code that shares nothing with the library. The listed ones were looked at
+  while the planner was made: what is proven are others drawn anew from the same list.
 - Plans a flight for what each leaves open; the plan never sees an answer.
 - Has the same simulator record the planned flight, and a standard one of the same length, and judges each with the set.
 - Writes the row of every set as it comes, so that an interrupted proof goes on where it stopped.
@@ -81,10 +82,12 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     return replace(row, predicted_sigma=expected.sigma, predicted_low=low, predicted_high=high)
 
 
-def main(table: str, summary: str, so_far: str, limits: str, code: str = "", most: int | None = None) -> None:
+def main(
+    table: str, summary: str, so_far: str, limits: str, code: str = "", most: int | None = None, draws: int = 2
+) -> None:
     """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
 
-    A row of another `code` stays until the case is judged anew; `most` cases are taken at most.
+    A row of another `code` stays until the case is judged anew; `most` cases are taken at most, `draws` of each listed.
     """
     warnings.simplefilter("ignore")
     from rotorid_proof.concealed import planned as simulator
@@ -95,7 +98,8 @@ def main(table: str, summary: str, so_far: str, limits: str, code: str = "", mos
     kept.parent.mkdir(parents=True, exist_ok=True)
     rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
     # Where speeds are commands alone a set takes minutes: those come last.
-    every = [*simulator.look_alikes(), *simulator.ambiguous()]
+    listed = [*simulator.look_alikes(), *simulator.ambiguous()]
+    every = [simulator.drawn_anew(case, number) for number in range(1, draws + 1) for case in listed]
     cases = sorted(every, key=lambda case: "speed" not in case.settings.groups)[:most]
     done = {r["case"] for r in rows if str(r["judged_by"]) == code}
     for case in cases:

@@ -151,7 +151,7 @@ def a_plan() -> Plan:
     pieces = (piece("drift"), piece("pass 45 at 1"))
     reference = joined(pieces, 0.004)
     flight = fly(World(VEHICLE), reference, 9.0, LIMITS.middle_m)
-    return Plan("set", LIMITS, pieces, reference, flight, (), (), ())
+    return Plan("chosen", pieces, reference, flight, (), (), "set", LIMITS)
 
 
 def test_a_crazyflie_polynomial_goes_where_the_reference_goes_in_its_own_axes(a_plan: Plan) -> None:
@@ -197,7 +197,7 @@ def test_the_page_shows_the_last_plan_once(a_plan: Plan) -> None:
 def mission_of(names: tuple[str, ...], **limits) -> Plan:
     allowed = LIMITS.model_copy(update=limits)
     pieces = tuple(piece(n) for n in names)
-    return Plan("set", allowed, pieces, joined(pieces, 0.01), None, (), (), ())
+    return Plan("chosen", pieces, joined(pieces, 0.01), None, (), (), "set", allowed)
 
 
 def test_a_mission_goes_to_where_the_reference_turns_round() -> None:
