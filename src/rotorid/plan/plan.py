@@ -296,6 +296,16 @@ def forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...],
     return Forecast(name, pieces, reference, flights[0], tuple(questions), tuple(widths(alone, base, after, wishes)))
 
 
+def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes, progress) -> Forecast:
+    """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left."""
+    progress(f"predicting the {name} flight")
+    made = forecast(known, limits, name, tuple(t.piece for t in taken), wishes)
+    times = int((limits.duration_s - BETWEEN_S) / (made.duration_s - BETWEEN_S)) if taken else 1
+    if times > 1 and made.reached(limits.target_sigma) < 1.0:
+        return forecast(known, limits, name, made.pieces * times, wishes)
+    return made
+
+
 def plan(
     known: Known,
     limits: Limits,
@@ -313,22 +323,12 @@ def plan(
     options = tried(quick, limits, progress, wishes)
     progress("choosing")
     taken, judged = chosen_pieces(quick, limits, options, wishes=wishes)
-    flights = {"chosen": tuple(t.piece for t in taken)}
-    if taken:
-        others = [t for t in judged if t.piece is not taken[0].piece]
-        flights["second"] = tuple(t.piece for t in chosen_pieces(quick, limits, others, wishes=wishes)[0])
-    most = sum(t.flown_s for t in taken) - BETWEEN_S if taken else limits.duration_s - 2 * BETWEEN_S
-    if (piece := standard_piece(known, limits, options, most)) is not None:
-        flights["standard"] = (piece,)
-    found = []
-    for name, pieces in flights.items():
-        if pieces or name == "chosen":
-            progress(f"predicting the {name} flight")
-            made = forecast(known, limits, name, pieces, wishes)
-            again = int(limits.duration_s / (made.duration_s + BETWEEN_S)) if pieces and name != "standard" else 1
-            if again > 1 and made.reached(limits.target_sigma) < 1.0:
-                # Not there yet, and time is left.
-                made = forecast(known, limits, name, pieces * again, wishes)
-            found.append(made)
+    others = [t for t in judged if not taken or t.piece is not taken[0].piece]
+    found = [expected(known, limits, "chosen", taken, wishes, progress)]
+    if taken and (second := chosen_pieces(quick, limits, others, wishes=wishes)[0]):
+        found.append(expected(known, limits, "second", second, wishes, progress))
+    longest = found[0].duration_s or limits.duration_s
+    if (piece := standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
+        found.append(forecast(known, limits, "standard", (piece,), wishes))
     found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
     return Plan(**vars(found[0]), **about, others=tuple(found[1:]), tried=tuple(judged), not_testable=reasons)
