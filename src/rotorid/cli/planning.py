@@ -21,7 +21,11 @@ def plan(
     ] = None,
     limits: Annotated[Path | None, typer.Option(help="YAML file of what the flight, or session, may ask for.")] = None,
     want: Annotated[
-        list[str] | None, typer.Option(help="An interval to reach, as torque_coefficient_n_m_s2=1%.")
+        list[str] | None,
+        typer.Option(
+            help="An interval to reach, as torque_coefficient_n_m_s2=1%, or a limit of what is not at work, as "
+            "ground_effect=2% of the weight."
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the plan; default VERDICT/plan.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
@@ -96,7 +100,7 @@ def onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> N
 
 
 def wished(texts: list[str]) -> dict[str, float]:
-    """Wishes as `name=1%` or `name=0.01`."""
+    """Wishes as `name=1%` or `name=0.01`; an effect's share is one of the weight."""
     out = {}
     for text in texts:
         name, _, size = text.partition("=")
@@ -105,7 +109,9 @@ def wished(texts: list[str]) -> dict[str, float]:
         except ValueError:
             value = 0.0
         if not name or not 0 < value < 1:
-            raise InputError(f"--want {text}: expected a value of vehicle.yaml and a share, as mass_kg=1%")
+            raise InputError(
+                f"--want {text}: expected a value of vehicle.yaml, or an effect, and a share, as mass_kg=1%"
+            )
         out[name] = value
     return out
 

@@ -11,6 +11,7 @@ from rotorid.mismatch.posterior.limits import PROBABILITY, drawn
 from rotorid.mismatch.regression import NEVER_EXCITED, ridge_inverse
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.select import VALUE_FLOOR
+from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.plan.questions import Known
 from rotorid.plan.separation import Information
 
@@ -37,17 +38,20 @@ def able(known: Known) -> dict[str, tuple[str, ...]]:
     out = {name: (key,) for key, name in PARAMETER_NAMES.items() if key in search.always}
     at_work = {search.terms[k].effect for k in active}
     for key, term in search.terms.items():
-        if term.kind == "effect" and not term.run and term.effect not in at_work:
+        if term.kind == "effect" and not term.run and term.effect not in (at_work | UNKNOWNS.keys()):
             out[term.effect] = (*out.get(term.effect, ()), key)
     return out
 
 
 def check_wishes(known: Known, wishes: dict[str, float]) -> None:
     """InputError where something is wished for that these recordings do not tell."""
+    names = able(known)
     for name in wishes:
-        if name not in (names := able(known)):
+        if reason := known.prepared.not_testable.get(name):
+            raise InputError(f"--want {name}: not testable on this set: {reason}")
+        if name not in names:
             raise InputError(
-                f"--want {name}: no value that these recordings tell, nor an effect that may be absent; "
+                f"--want {name}: no value that these recordings tell, nor an effect that is not at work; "
                 f"expected one of {', '.join(names)}"
             )
 
