@@ -190,7 +190,7 @@ def text(plan: Plan) -> list[str]:
         out.append(f"Fly for {plan.duration_s:.0f} s (without take-off and landing):")
         out += [f"  {line}" for line in steps(plan)]
     elif plan.questions:
-        out.append("No manoeuvre within the limits separates what is open any further.")
+        out.append(f"No manoeuvre within the limits separates what is open any further: {why_none(plan)}.")
     for _, found in plan.questions:
         out += [outcome(s, plan.limits.target_sigma) for s in found]
     if plan.sigma is not None and not plan.settles:
@@ -213,6 +213,18 @@ def text(plan: Plan) -> list[str]:
     if not out:
         out.append("Nothing is open: no flight is needed to tell effects apart.")
     return out + in_words(plan)
+
+
+def why_none(plan: Plan) -> str:
+    """Why there is nothing to fly: what keeps the manoeuvres out, or that none of those flown helps."""
+    able = [t for t in plan.tried if not t.reason]
+    if not able:
+        return f"none of {len(plan.tried)} keeps them ({plan.tried[0].piece.name}: {plan.tried[0].reason})"
+    best = max(able, key=lambda t: t.progress)
+    return (
+        f"{len(able)} of {len(plan.tried)} keep them, and in each the others can take over what one of them would do "
+        f"with these columns (the best, {best.piece.name}, brings {100 * max(best.progress, 0.0):.1f} % of the way)"
+    )
 
 
 def open_ids(plan: Plan) -> list[tuple[str, ...]]:
