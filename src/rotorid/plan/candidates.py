@@ -16,6 +16,8 @@ from rotorid.plan.limits import Limits
 
 GRAVITY_M_S2 = 9.81
 RAMP_S = 2.0
+SLOW_RAMP_S = 4.0
+"""Of motions over ground: in RAMP_S a fast pass would tilt more to start than to turn round."""
 BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0), (0.3, 8.0))
 """Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
 makes of them turns the vehicle as hard as doublets do."""
@@ -62,31 +64,31 @@ class Piece:
         return Reference(t, position, yaw)
 
 
-def envelope(t: np.ndarray) -> np.ndarray:
-    """From 0 smoothly to 1 and back to 0, twice differentiable; RAMP_S each way."""
-    s = np.clip(np.minimum(t, t[-1] - t) / RAMP_S, 0, 1)
+def envelope(t: np.ndarray, ramp_s: float = RAMP_S) -> np.ndarray:
+    """From 0 smoothly to 1 and back to 0, twice differentiable; `ramp_s` each way."""
+    s = np.clip(np.minimum(t, t[-1] - t) / ramp_s, 0, 1)
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi) -> np.ndarray:
+def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: float = RAMP_S) -> np.ndarray:
     """Phase that speeds up from rest and slows down to it, a whole number of units in all, (n,), rad."""
-    speed = envelope(t)
+    speed = envelope(t, ramp_s)
     raw = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
     units = max(1.0, np.floor(rate_rad_s * raw[-1] / unit_rad + 0.02))
     return unit_rad * units * raw / raw[-1]
 
 
-def swing(t: np.ndarray, amplitude: float, rate_rad_s: float) -> tuple[float, np.ndarray]:
+def swing(t: np.ndarray, amplitude: float, rate_rad_s: float, ramp_s: float = SLOW_RAMP_S) -> tuple[float, np.ndarray]:
     """Amplitude and phase (n,), rad, of a swing there and back; smaller where the time asks for a faster phase."""
-    angle = phase(t, rate_rad_s)
+    angle = phase(t, rate_rad_s, ramp_s=ramp_s)
     fastest = float(np.gradient(angle, t).max())
     return amplitude * min(1.0, (1.05 * rate_rad_s / fastest) ** 2), angle
 
 
-def whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi) -> float:
+def whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi, ramp_s: float = RAMP_S) -> float:
     """Duration near `about_s`, s, in which a phase of that rate goes through a whole number of units."""
-    units = max(1, round(rate_rad_s * (about_s - RAMP_S) / unit_rad))
-    return RAMP_S + units * unit_rad / rate_rad_s
+    units = max(1, round(rate_rad_s * (about_s - ramp_s) / unit_rad))
+    return ramp_s + units * unit_rad / rate_rad_s
 
 
 def multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
@@ -178,24 +180,24 @@ def _passes(limits: Limits) -> list[Piece]:
             amplitude, rate = largest(limits, room, share)
 
             def make(t, amplitude=amplitude, rate=rate, ahead=ahead):
-                return amplitude * np.sin(phase(t, rate))[:, None] * ahead, np.zeros(len(t))
+                return amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))[:, None] * ahead, np.zeros(len(t))
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
-            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 12.0)))
+            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 15.0, ramp_s=SLOW_RAMP_S)))
     for degrees, axis in ((0, 0), (90, 1)):
         amplitude, rate = largest(limits, limits.room_m[axis], 0.8)
         heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / HEAVE_RAD_S, 0.3 * GRAVITY_M_S2 / HEAVE_RAD_S**2)
 
         def make(t, amplitude=amplitude, rate=rate, axis=axis, heave=heave):
             out = np.zeros((len(t), 3))
-            out[:, axis] = amplitude * np.sin(phase(t, rate))
+            out[:, axis] = amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))
             out[:, 2] = heave * np.sin(phase(t, HEAVE_RAD_S))
             return out, np.zeros(len(t))
 
         way = "along the nose" if axis == 0 else "sideways"
         words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
-        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 12.0)))
+        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 15.0, ramp_s=SLOW_RAMP_S)))
     return out
 
 
@@ -224,12 +226,15 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
     def drift(t):
         # To and fro over ground while the nose turns: body axes and world axes part.
         out = np.zeros((len(t), 3))
-        out[:, 0] = amplitude * np.sin(phase(t, rate))
+        out[:, 0] = amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))
         return out, phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
     pieces = [
         Piece(
-            "eight", f"a figure of eight, {amplitude:.1f} m each way, nose held", eight, whole(rate / np.sqrt(2), 15.0)
+            "eight",
+            f"a figure of eight, {amplitude:.1f} m each way, nose held",
+            eight,
+            whole(rate / np.sqrt(2), 15.0, ramp_s=SLOW_RAMP_S),
         )
     ]
     # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
@@ -261,7 +266,7 @@ def _climbs(limits: Limits) -> list[Piece]:
         rate = min(speed / amplitude, np.sqrt(4.0 / amplitude))
 
         def make(t, amplitude=amplitude, rate=rate):
-            size, angle = swing(t, amplitude, rate)
+            size, angle = swing(t, amplitude, rate, RAMP_S)
             out = np.zeros((len(t), 3))
             out[:, 2] = -size * np.sin(angle)
             return out, np.zeros(len(t))

@@ -207,6 +207,7 @@ def text(plan: Plan) -> list[str]:
         f"{w.name}: {size(w.before, w.unit)} now, {size(w.after, w.unit)} with this flight"
         + (f" (wished: {share(w.wished, w.unit)})" if w.wished else "")
         for w in plan.widths
+        if plan.pieces or w.wished
     ]
     for ids, what in plan.unanswerable:
         out.append(f"No flight with these columns tells {' or '.join(words_of(i) for i in ids)}: {what}.")
