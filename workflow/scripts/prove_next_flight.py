@@ -1,7 +1,7 @@
 """Prove the next flight on concealed sets: plan, record, judge both together.
 
 - Records sets in which pairs look alike, by code that shares nothing with the library. The listed ones were looked at
-  while the planner was made, and so was their first new draw: what is proven are further draws of the same list.
+  while the planner was made, and so were their first new draws: what is proven are further draws of the same list.
 - Plans a flight for what each leaves open; the plan never sees an answer.
 - Has the same simulator record the planned flight, and a standard one of the same length, and judges each with the set.
 - Writes the row of every set as it comes, so that an interrupted proof goes on where it stopped.
@@ -90,7 +90,7 @@ def main(
     limits: str,
     code: str = "",
     most: int | None = None,
-    draws: tuple[int, ...] = (2, 3),
+    draws: tuple[int, ...] = (3, 4),
 ) -> None:
     """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.mismatch.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
 from rotorid.plan.candidates import STANDARD, Piece, Reference, candidates, joined, smaller, standard
 from rotorid.plan.intervals import Width, check_wishes, widths
 from rotorid.plan.limits import Limits
@@ -45,6 +46,7 @@ NOTHING = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
 """Of a flight without pieces."""
 BETWEEN_S = 1.0
 """At rest between manoeuvres."""
+LEAST_S = LEAST_ENVIRONMENTS * ENVIRONMENT_S
 MOST_PIECES = 12
 LEAST_PROGRESS = 0.01
 """Share of the way to the goal that a further manoeuvre must bring."""
@@ -297,12 +299,18 @@ def forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...],
 
 
 def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes, progress) -> Forecast:
-    """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left."""
+    """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left.
+
+    They are flown for LEAST_S at least: an effect that one pass shows is none that the engine finds wherever it looks.
+    """
     progress(f"predicting the {name} flight")
-    made = forecast(known, limits, name, tuple(t.piece for t in taken), wishes)
-    times = int((limits.duration_s - BETWEEN_S) / (made.duration_s - BETWEEN_S)) if taken else 1
-    if times > 1 and made.reached(limits.target_sigma) < 1.0:
-        return forecast(known, limits, name, made.pieces * times, wishes)
+    pieces = tuple(t.piece for t in taken)
+    most = int((limits.duration_s - BETWEEN_S) / max(sum(t.flown_s for t in taken), BETWEEN_S)) if taken else 1
+    least = int(np.ceil((LEAST_S - BETWEEN_S) / sum(t.flown_s for t in taken))) if taken else 1
+    times = max(1, min(least, most))
+    made = forecast(known, limits, name, pieces * times, wishes)
+    if most > times and made.reached(limits.target_sigma) < 1.0:
+        return forecast(known, limits, name, pieces * most, wishes)
     return made
 
 
