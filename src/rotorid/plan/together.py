@@ -38,15 +38,20 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
                 )
     split = split_runs(first)
     held = [] if split.held_out == split.training else [f"1-{n}" for n in split.held_out]
+    notes = ["Values and effects are held equal in all sets; thrust may differ from run to run."]
     for number, other in enumerate(others, 2):
         if len(other.runs) >= 3:
             held += [f"{number}-{n}" for n in split_runs(other).held_out]
+        else:
+            notes.append(
+                f"Nothing of set {number} is held out, as it has fewer than three runs: what the runs held out of "
+                "other sets do not excite may stay suggested."
+            )
     columns = [set.intersection(*(present(r) for r in s.runs)) for s in sets]
     shared = set.intersection(*columns)
     name = "+".join(s.name for s in sets)
     if shared <= {"time_s"}:
         raise InputError(f"sets {' and '.join(s.name for s in sets)} have no column in common but the time")
-    notes = ["Values and effects are held equal in all sets; thrust may differ from run to run."]
     for number, own in enumerate(columns, 1):
         if extra := sorted(own - shared):
             notes.append(f"Not all sets have {', '.join(extra[:4])}{' …' if len(extra) > 4 else ''} of set {number}.")

@@ -30,6 +30,8 @@ def test_runs_carry_their_set_and_the_first_keeps_what_it_holds_out() -> None:
     assert [r.name for r in whole.runs] == ["1-run0", "1-run1", "1-run2", "2-run0"]
     assert whole.held_out == ("1-run1",)
     assert whole.name == "first+second"
+    assert len(notes) == 2 and "Nothing of set 2 is held out" in notes[1]
+    _, notes = joined_sets(first, a_set("second", 3))
     assert len(notes) == 1
 
 
