@@ -2,7 +2,8 @@
 
 Values of the vehicle and effects are held equal in all sets; each run keeps what belongs to a run (a scale of its
 thrust where runs differ beyond doubt, gusts, offsets in time). Runs are named by their set, so that `2-hover` is of the
-second. What the first holds out stays held out; of each other a third is held out where it has three runs or more.
+second. What the first holds out stays held out; of each other a third is held out. One of fewer than three runs is cut
+for that: runs held out of calm flights say nothing of what a planned flight excites.
 """
 
 from __future__ import annotations
@@ -10,7 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rotorid.errors import InputError
+from rotorid.mismatch.comparison import ENVIRONMENT_S
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run
@@ -27,6 +31,7 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     InputError
         The sets are not of one vehicle as believed, or share no columns beside the time.
     """
+    others = tuple(in_thirds(s) for s in others)
     sets = (first, *others)
     beliefs = [s.vehicle.model_dump(exclude=set(MAY_DIFFER)) for s in sets]
     for other, belief in zip(others, beliefs[1:], strict=True):
@@ -42,11 +47,6 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     for number, other in enumerate(others, 2):
         if len(other.runs) >= 3:
             held += [f"{number}-{n}" for n in split_runs(other).held_out]
-        else:
-            notes.append(
-                f"Nothing of set {number} is held out, as it has fewer than three runs: what the runs held out of "
-                "other sets do not excite may stay suggested."
-            )
     columns = [set.intersection(*(present(r) for r in s.runs)) for s in sets]
     shared = set.intersection(*columns)
     name = "+".join(s.name for s in sets)
@@ -58,6 +58,19 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     runs = [renamed(r, str(number)) for number, s in enumerate(sets, 1) for r in s.runs]
     runs = [replace(r, table=r.table[[n for n in r.table.columns if n in shared]]) for r in runs]
     return RecordingSet(name, first.vehicle, tuple(runs), tuple(held) or None), tuple(notes)
+
+
+def in_thirds(recordings: RecordingSet) -> RecordingSet:
+    """A set of one or two runs with each in three parts, as far as these are as long as an environment."""
+    if len(recordings.runs) >= 3 or recordings.held_out is not None:
+        return recordings
+    runs = []
+    for run in recordings.runs:
+        edges = np.linspace(0, len(run.table), 4).astype(int)
+        parts = [run.table.iloc[a:b].reset_index(drop=True) for a, b in zip(edges, edges[1:], strict=False)]
+        long = run.time_s[-1] - run.time_s[0] >= 3 * ENVIRONMENT_S
+        runs += [replace(run, name=f"{run.name}-{i}", table=t) for i, t in enumerate(parts, 1)] if long else [run]
+    return replace(recordings, runs=tuple(runs))
 
 
 def brief(value) -> str:

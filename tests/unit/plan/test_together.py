@@ -30,9 +30,16 @@ def test_runs_carry_their_set_and_the_first_keeps_what_it_holds_out() -> None:
     assert [r.name for r in whole.runs] == ["1-run0", "1-run1", "1-run2", "2-run0"]
     assert whole.held_out == ("1-run1",)
     assert whole.name == "first+second"
-    assert len(notes) == 2 and "Nothing of set 2 is held out" in notes[1]
-    _, notes = joined_sets(first, a_set("second", 3))
     assert len(notes) == 1
+
+
+def test_a_later_flight_in_one_run_is_cut_so_that_a_third_is_held_out() -> None:
+    t = np.arange(0, 30, 0.01)
+    table = pd.DataFrame({"time_s": t, "angular_velocity_x_rad_s": np.sin(t)})
+    whole, _ = joined_sets(a_set("first", 2), RecordingSet("second", VEHICLE, (Run("planned", table),), None))
+    assert [r.name for r in whole.runs[2:]] == ["2-planned-1", "2-planned-2", "2-planned-3"]
+    assert [n for n in whole.held_out if n.startswith("2-")] == ["2-planned-2"]
+    assert np.concatenate([r.table["time_s"] for r in whole.runs[2:]]) == pytest.approx(t)
 
 
 def test_columns_that_one_set_lacks_are_named_and_left_out() -> None:
