@@ -269,6 +269,39 @@ def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
 
 
 def mistakes_that_differ(base: tuple[Finding, ...], new: tuple[Finding, ...]) -> tuple[Change, ...]:
-    """Mistakes in the recordings of the second set that the first has not."""
-    known = {f.id for f in base}
-    return tuple(Change(f.id, f.status, f.alternatives, None, f.parameters) for f in new if f.id not in known)
+    """Mistakes in the recordings of the second set that the first has not, or has by another amount.
+
+    Where both have one in the same columns the difference is stated, if their 95 % intervals exclude zero.
+    """
+    known, out = {(f.id, f.channels): f for f in base}, []
+    for found in new:
+        first = known.get((found.id, found.channels))
+        if first is None:
+            out.append(Change(found.id, found.status, found.alternatives, None, found.parameters))
+        elif differs := differences_of(first, found):
+            out.append(Change(found.id, found.status, found.alternatives, None, differs))
+    return tuple(out)
+
+
+def differences_of(first: Finding, second: Finding) -> tuple[Estimate, ...]:
+    """By how much the parameters of a mistake differ in two sets; none where the intervals allow that they do not."""
+    before, out = {p.symbol: p for p in with_sign(first)}, []
+    for p in with_sign(second):
+        old = before.get(p.symbol)
+        if old is None:
+            continue
+        away, reach = p.value - old.value, float(np.hypot(p.high - p.low, old.high - old.low)) / 2.0
+        if abs(away) > reach:
+            out.append(replace(p, value=away, low=away - reach, high=away + reach))
+    return tuple(out)
+
+
+def with_sign(finding: Finding) -> tuple[Estimate, ...]:
+    """Parameters of a mistake, those of which a length alone is stated (late or early) with their sign."""
+    if finding.late_s is None:
+        return finding.parameters
+    away = [finding.late_s - p.value for p in finding.parameters]
+    return tuple(
+        replace(p, value=p.value + a, low=p.low + a, high=p.high + a)
+        for p, a in zip(finding.parameters, away, strict=True)
+    )

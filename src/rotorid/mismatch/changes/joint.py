@@ -151,8 +151,12 @@ def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
     """
     new = replace(new, held_out=())
     corrected, mistakes, _ = find_mistakes(new)
-    known = {m.id for m in reference.mistakes}
-    variants = [(corrected, mistakes)] if all(m.id in known for m in mistakes) else [(corrected, mistakes), (new, ())]
+    known = {(m.id, m.channels) for m in reference.mistakes}
+    variants = (
+        [(corrected, mistakes)]
+        if all((m.id, m.channels) in known for m in mistakes)
+        else [(corrected, mistakes), (new, ())]
+    )
     stretches = [(own, recorded_stretches(reference.found, own), found) for own, found in variants]
     joints = [
         joined_at(reference, own, recorded, reference.chain, found) for own, recorded, found in stretches if recorded
