@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorid.effects.contract import LIMIT, Parameter
+from rotorid.effects.contract import DELAY, LIMIT, Parameter
 from rotorid.mismatch.changes.problem import change_of, decide_changes, evidence_for, held
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.motion import Segment
@@ -30,10 +30,14 @@ SAME_TIME_SD, SAME_SHARE_SD = 0.03, 0.01
 without unit (another charge of the battery)."""
 CHAIN_ROUNDS = 4
 """Times that the chain's columns are taken, at most."""
+SAME_PHASE_SD = 0.29
+"""One-sigma of the instant between two samples at which commands are stamped, in samples: evenly spread over one."""
 STEP_S, STEP = 0.002, 0.01
 """Changes of a time and of another parameter from which its column is taken."""
-SHIFT = "offset:commands"
-"""Nuisance: commands stamped a part of a sample late or early."""
+START_S = 0.025
+"""By how much longer or shorter time constants are from which a change is sought, too."""
+OF_ROTORS = "offset:rotors"
+"""Start of the keys of offsets in time that are a delay of the commands: the chain has it."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ class ChainTerms:
     chain: Chain
     values: np.ndarray
     """(P,) parameters of every form in order."""
+    rate_hz: float
+    """Of the stretches."""
 
     @property
     def parameters(self) -> list[Parameter]:
@@ -63,7 +69,9 @@ class ChainTerms:
         """One-sigma (P,) of each parameter between two flights in which nothing changed, in its unit."""
         times = np.array([p.unit == "s" for p in self.parameters])
         least = np.array([p.negligible for p in self.parameters])
-        return np.hypot(np.where(times, SAME_TIME_SD * np.abs(self.values), SAME_SHARE_SD), least)
+        late = np.array([form.stage == DELAY for _, form in self.chain for _ in form.parameters])
+        usual = np.where(times, SAME_TIME_SD * np.abs(self.values), SAME_SHARE_SD)
+        return np.sqrt(usual**2 + least**2 + np.where(late, SAME_PHASE_SD / self.rate_hz, 0.0) ** 2)
 
     @property
     def steps(self) -> np.ndarray:
@@ -76,6 +84,21 @@ class ChainTerms:
         """The same forms with other parameters (P,), within their bounds."""
         own = self.parameters
         return replace(self, values=np.clip(values, [p.low for p in own], [p.high for p in own]))
+
+    def starts(self) -> list[tuple[str, ChainTerms]]:
+        """Chains to start from, each with the key of the form whose time constants are longer or shorter than here."""
+        out, at = [("", self)], 0
+        for term in self.terms:
+            own = np.arange(at, at + term.size)
+            times = [i for i in own if self.parameters[i].unit == "s"]
+            at += term.size
+            for away in (START_S, -START_S) if times else ():
+                values = self.values.copy()
+                values[times] += away
+                moved = self.at(values)
+                if not np.array_equal(moved.values, self.values):
+                    out.append((term.key, moved))
+        return out
 
     def stepped(self) -> list[ChainTerms]:
         """The chain with each parameter changed by its step."""
@@ -97,7 +120,8 @@ class ChainTerms:
         named = (
             replace(t, form=known[t.key][0], linear=known[t.key][1]) if t.key in known else t for t in evidence.terms
         )
-        return replace(evidence, terms=tuple(named))
+        offsets = {t.key for t in evidence.terms if t.key.startswith(OF_ROTORS)}
+        return held(replace(evidence, terms=tuple(named)), offsets)
 
 
 def key_of(effect: str, form: str) -> str:
@@ -117,7 +141,7 @@ def chain_terms(found: Fitted, segments: Sequence[Segment]) -> ChainTerms | None
             held.add(effect)
             chain.append((effect, form))
             values += form.neutral
-    kept = ChainTerms(tuple(chain), np.array(values))
+    kept = ChainTerms(tuple(chain), np.array(values), segments[0].rate_hz)
     return kept.at(kept.values)
 
 
@@ -150,32 +174,28 @@ def chain_columns(
 
 
 def speed_rows(segments: Sequence[Segment], found: Fitted, chain: ChainTerms, first: ChainTerms) -> list[Rows]:
-    """Rows of measured rotor speeds, rad/s: what the chain leaves of them, and a column for each of its parameters and
-    for commands that are stamped late. `first` is the first set's chain: what the rows leave is that of it."""
+    """Rows of measured rotor speeds, rad/s: what the chain leaves of them, and a column for each of its parameters.
+
+    `first` is the first set's chain: what the rows leave is that of it.
+    """
     result, full_speed, full_voltage = found.chain
-    fit = result.fit
-
-    def speeds(segment: Segment, values: np.ndarray, shift_s: float) -> np.ndarray:
-        return commanded_path(segment, chain.chain, values, shift_s, full_speed, full_voltage, fit.holds)
-
+    shift_s, holds = result.fit.shift_s, result.fit.holds
     out = []
     for segment in segments:
-        now = speeds(segment, chain.values, fit.shift_s)
-        steps = zip(chain.stepped(), chain.steps, strict=True)
-        columns = [(speeds(segment, other.values, fit.shift_s) - now) / step for other, step in steps]
-        late = (speeds(segment, chain.values, fit.shift_s + STEP_S) - now) / STEP_S
-        x = np.stack([*columns, late], axis=2)
-        y = segment.motion.rotor_speed - now + x[:, :, :-1] @ (chain.values - first.values)
+        now, *moved = (
+            commanded_path(segment, own.chain, own.values, shift_s, full_speed, full_voltage, holds)
+            for own in (chain, *chain.stepped())
+        )
+        x = np.stack([(other - now) / step for other, step in zip(moved, chain.steps, strict=True)], axis=2)
+        y = segment.motion.rotor_speed - now + x @ (chain.values - first.values)
         out.append(Rows(segment.run, segment.motion.time_s, y, x))
     return out
 
 
-def speed_evidence(
-    rows: list[Rows], filters: dict[int, np.ndarray], chain: ChainTerms, first: ChainTerms, rate_hz: float
-) -> Evidence:
+def speed_evidence(rows: list[Rows], filters: dict[int, np.ndarray], chain: ChainTerms, first: ChainTerms) -> Evidence:
     """The evidence of measured rotor speeds, one channel a rotor."""
-    shift = Term(SHIFT, "nuisance", prior_sd=(0.5 / rate_hz,))
-    regression = build(rows, [*chain.terms, shift], filters, lambda run, time_s: True, 1.0, rate_hz, by_channel=True)
+    rate_hz = chain.rate_hz
+    regression = build(rows, chain.terms, filters, lambda run, time_s: True, 1.0, rate_hz, by_channel=True)
     return chain.named(evidence_from(regression), first)
 
 
@@ -207,9 +227,14 @@ class Option:
     """Nats, less a constant of the first set."""
 
 
+Products = Callable[[ChainTerms | None], tuple[Evidence, Evidence]]
+"""Evidence of both sets with the second one's columns taken at a chain."""
+
+
 def option_of(
-    first: ChainTerms | None,
-    products_at: Callable[[ChainTerms | None], tuple[Evidence, Evidence]],
+    first: ChainTerms,
+    start: ChainTerms,
+    products_at: Products,
     spread: np.ndarray,
     prior: Prior,
     same: Collection[str] = (),
@@ -218,41 +243,57 @@ def option_of(
 
     Parameters
     ----------
-    first
-        The first set's chain; None where its columns are not among those compared.
+    first, start
+        The first set's chain, and the one at which the columns are taken first.
     products_at
-        Evidence of both sets with the second one's columns taken at a chain.
+        Evidence of both sets.
     spread
         One-sigma (K,) of each coefficient between flights in which nothing changed.
     same
         Keys of the chain's forms that did not change, by assumption.
     """
-    now = first
+    now = start
     for _ in range(CHAIN_ROUNDS):
-        base, new = products_at(now)
-        found = decide_changes(base, held(new, same), spread, prior)
-        if first is None:
-            break
-        chain = first.at(first.values + change_of_chain(found, first))
+        option = decided_at(now, products_at, spread, prior, same)
+        chain = first.at(first.values + change_of_chain(option.found, first))
         if np.all(np.abs(chain.values - now.values) < first.spread):
             break
         now = chain
-    return Option(found, now, evidence_for(base, new, found, spread))
+    return option
 
 
-def options_of(
-    first: ChainTerms | None,
-    products_at: Callable[[ChainTerms | None], tuple[Evidence, Evidence]],
-    spread: np.ndarray,
-    prior: Prior,
-) -> list[Option]:
+def decided_at(
+    chain: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior, same: Collection[str] = ()
+) -> Option:
+    """The most probable changes with the columns taken at a chain."""
+    base, new = products_at(chain)
+    found = decide_changes(base, held(new, same), spread, prior)
+    return Option(found, chain, evidence_for(base, new, found, spread))
+
+
+def options_of(first: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior) -> list[Option]:
     """The most probable changes, and those without each form of the chain that changed in them; the best first.
 
-    What takes the place of a lag is not seen from where the lag has led to: a delay has another column there.
+    `first` is None where the chain's columns are not among those compared. Each is sought from several chains: a delay
+    of some samples is not seen from where there is none, nor from where a lag in its place has led to.
     """
-    plain = option_of(first, products_at, spread, prior)
-    changed = [] if first is None else [t.key for t in first.terms if t.key in plain.found.model]
-    others = [option_of(first, products_at, spread, prior, {key}) for key in changed]
+    if first is None:
+        return [decided_at(None, products_at, spread, prior)]
+    kept: dict[tuple[float, ...], tuple[Evidence, Evidence]] = {}
+
+    def remembered(chain: ChainTerms) -> tuple[Evidence, Evidence]:
+        key = tuple(chain.values)
+        if key not in kept:
+            kept[key] = products_at(chain)
+        return kept[key]
+
+    def best(same: frozenset[str] = frozenset()) -> Option:
+        starts = [chain for key, chain in first.starts() if key not in same]
+        tried = (option_of(first, start, remembered, spread, prior, same) for start in starts)
+        return max(tried, key=lambda o: o.log_posterior)
+
+    plain = best()
+    others = [best(frozenset({t.key})) for t in first.terms if t.key in plain.found.model]
     return sorted([plain, *others], key=lambda o: -o.log_posterior)
 
 

@@ -30,6 +30,8 @@ from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.findings import Estimate, Finding, Status
+from rotorid.mismatch.fitted import Fitted
+from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
@@ -104,7 +106,8 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
         )
     if isinstance(reference, Reference):
         joint, options = most_alike(reference, new, prior)
-        found, of_speeds = options[0].found, decided_of_speeds(reference, joint, prior)
+        stretches = reference.recorded, joint.recorded
+        found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
         stated = changes_in(options, prior)
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
@@ -167,24 +170,24 @@ def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarra
 
 
 def decided_of_speeds(
-    reference: Reference, joint: Joint, prior: Prior
+    found: Fitted, first: ChainTerms | None, both: tuple[Sequence[Segment], Sequence[Segment]], prior: Prior
 ) -> tuple[list[Option], Mapping[str, np.ndarray]] | None:
-    """The changes between command and measured rotor speed, and what the columns amount to; None without both."""
-    found, first = reference.found, reference.chain
-    both = reference.recorded, joint.recorded
+    """The changes between command and measured rotor speed, and what the columns amount to; None without both.
+
+    `first` is the chain of the first set's model, `both` the stretches of each set as recorded.
+    """
     if first is None or found.commanded or any(s.command is None for own in both for s in own):
         return None
-    rate_hz, spread = both[0][0].rate_hz, np.append(first.spread, 0.0)
     base, now = speed_rows(both[0], found, first, first), first
     for _ in range(2):
         # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second.
         filters = speed_filters([*base, *speed_rows(both[1], found, now, now)])
-        own = speed_evidence(base, filters, first, first, rate_hz)
+        own = speed_evidence(base, filters, first, first)
 
         def products_at(chain: ChainTerms, filters=filters, own=own) -> tuple[Evidence, Evidence]:
-            return own, speed_evidence(speed_rows(both[1], found, chain, first), filters, chain, first, rate_hz)
+            return own, speed_evidence(speed_rows(both[1], found, chain, first), filters, chain, first)
 
-        options = options_of(first, products_at, spread, prior)
+        options = options_of(first, products_at, first.spread, prior)
         now = options[0].chain
     return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
 
