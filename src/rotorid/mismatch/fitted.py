@@ -135,7 +135,7 @@ def only_scales(result: SpeedResult) -> bool:
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
     model = with_own_scales(prepared, segments, noisy)
-    if rules.CARRIED(bool(windows := carried_windows(model))):
+    if rules.PAYLOAD_WINDOWS(bool(windows := carried_windows(model))):
         segments, noisy, model = with_payload(prepared, model, windows)
     segments, noisy, model = with_swing(prepared, model)
     terms = list(model.terms)
