@@ -51,7 +51,7 @@ def widths(known: Known, before: Information, after: Information, wishes: dict[s
         key = names.get(name)
         if key is None or key not in keys:
             able = [PARAMETER_NAMES[k] for k in keys if k in PARAMETER_NAMES]
-            raise InputError(f"--want {name}: no value that these recordings tell; expected one of {', '.join(able)}")
+            raise InputError(f"--want {name}: no value that these recordings show; expected one of {', '.join(able)}")
         column = int(regression.columns([key])[0])
         out.append(Width(name, "relative", half(column, 0, VALUE_FLOOR), half(column, 1, VALUE_FLOOR), wished))
     for key in model.selection.active:
