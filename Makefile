@@ -40,7 +40,7 @@ proof: $(READY) ## hide, find, score: about two hours; what is done stays done (
 	@mkdir -p docs/proof && cp results/proof/*.csv results/proof/state.json docs/proof/
 	@echo "The proof: results/proof/summary.csv; its tables are kept in docs/proof for the report"
 
-plantings: $(READY) ## put something exact into real flights and score what is told of it; kept in docs/proof
+plantings: $(READY) ## put something exact into real flights and score what is named of it; kept in docs/proof
 	@$(BIN)/snakemake --cores $(CORES) plantings $(OPTIONS)
 	@mkdir -p docs/proof && cp results/plantings/plantings*.csv docs/proof/
 	@echo "The plantings: results/plantings/plantings_summary.csv; their tables are kept in docs/proof"

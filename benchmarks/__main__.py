@@ -1,6 +1,6 @@
 """Every benchmark of this folder, one after the other, each in a process of its own: python -m benchmarks.
 
-Tables are written beside the scripts; the hour of the mismatch stage is left out (benchmarks/mismatch.py --hour).
+Tables are written next to the scripts; the hour of the mismatch stage is left out (benchmarks/mismatch.py --hour).
 """
 
 import subprocess

@@ -49,10 +49,10 @@ HEADING = [
 def hidden(vehicle: int, day: int) -> list[dict]:
     """What a vehicle does on a day that its file does not say."""
     drag = {"id": "rotor_drag", "form": "at the hubs", "parameters": {"k_d": 6e-5 * (1.0 + 0.05 * day)}}
-    carried = {"id": "payload", "form": "rigid", "parameters": {"m_p": 0.08, "m_p x": 0.002, "m_p y": 0.0}}
+    payload = {"id": "payload", "form": "rigid", "parameters": {"m_p": 0.08, "m_p x": 0.002, "m_p y": 0.0}}
     lag = {"id": "motor_lag", "form": "one constant", "parameters": {"tau": 0.05}}
     off = {"id": "com_offset", "form": "moment", "parameters": {"r_x": 0.004, "r_y": -0.003}}
-    return [[], [drag], [carried], [lag], [drag, lag], [off]][vehicle % 6]
+    return [[], [drag], [payload], [lag], [drag, lag], [off]][vehicle % 6]
 
 
 def make(folder: Path, sets: int) -> None:

@@ -1,4 +1,4 @@
-"""Import of logs beside plain decoding: processor time.
+"""Import of logs compared with decoding alone: processor time.
 
 Run: python benchmarks/importing.py [--out benchmarks/importing.md]
 

@@ -1,4 +1,4 @@
-"""Selection of effects beside PySINDy on the same columns: processor time and what is found.
+"""Selection of effects compared with PySINDy on the same columns: processor time and what is found.
 
 Run: python benchmarks/selection.py [--out benchmarks/selection.md]
 
@@ -47,7 +47,7 @@ def main(out: Path | None) -> None:
     versions = ", ".join(f"{p} {version(p)}" for p in ("numpy", "pysindy", "scikit-learn"))
     text = "\n".join(
         [
-            "# Selection beside PySINDy",
+            "# Selection compared with PySINDy",
             "",
             f"`python benchmarks/selection.py`: Python {platform.python_version()}, {versions}; flights at 100 Hz, "
             "processor time of one core in seconds.",

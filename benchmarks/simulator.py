@@ -1,10 +1,10 @@
-"""Speed of the simulator beside RotorPy, measured side by side in one run.
+"""Speed of the simulator compared with RotorPy, measured side by side in one run.
 
 Run: python benchmarks/simulator.py [--out benchmarks/simulator.md] [--sets 2000]
 
 RotorPy flies as its own simulator does (RK45 of scipy per control step) the thesis's quadrotor with a 30 ms motor lag,
 commands changing every 2 ms, once plain and once with its aerodynamics. Ours flies the same, then with one effect of
-each id of the catalogue that moves a vehicle, then under an attitude controller beside that. MuJoCo flies a plain rigid
+each id of the catalogue that moves a vehicle, then under an attitude controller. MuJoCo flies a plain rigid
 body on four lagged thrusters by the same Runge-Kutta steps, called from Python at each step. Times are of the processor
 (best of several), so that other work on the machine does not count; a batch on two threads is stated as half of what
 both cores spent, which is what the clock shows on a free machine.

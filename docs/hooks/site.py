@@ -1,4 +1,4 @@
-"""What the site is made of beside the pages written by hand: results by the rules, commands, pictures of effects.
+"""Pages of the site that are not written by hand: results by the rules, commands, pictures of effects.
 
 MkDocs calls the functions named `on_*`. Nothing here is part of an analysis.
 """
@@ -20,7 +20,7 @@ RESULT = re.compile(r"\"(results/[^\"]+)\"")
 
 
 def on_files(files: Files, config) -> Files:
-    """Add the pages and pictures that are made of the code, and the measurements kept beside the benchmarks."""
+    """Add the pages and pictures that are made of the code, and the measurements kept next to the benchmarks."""
     made = {"results.md": results_page(), "commands.md": commands_page()}
     made |= {f"benchmarks/{p.name}": p.read_text(encoding="utf-8") for p in sorted((ROOT / "benchmarks").glob("*.md"))}
     for name, text in (made | signatures()).items():
@@ -44,10 +44,10 @@ def rules_of(path: Path) -> list[tuple[str, str, list[str]]]:
         body = re.match(rf"(?:{match[1]} +.*\n|\n)*", text[match.end() :])[0]
         body = textwrap.indent(textwrap.dedent(body), "    ")
         output = re.search(r"^    output:\n((?:        .*\n)+)", body, flags=re.MULTILINE)
-        told = re.search(r'"""(.+?)"""', body, flags=re.DOTALL)
+        docstring = re.search(r'"""(.+?)"""', body, flags=re.DOTALL)
         if "script:" in body and output:
             name = match[2] or re.search(r"name:\s+f?\"(\w+)", body)[1]
-            found.append((name, " ".join(told[1].split()), RESULT.findall(output[1])))
+            found.append((name, " ".join(docstring[1].split()), RESULT.findall(output[1])))
     return found
 
 
@@ -77,11 +77,11 @@ def entry_of(output: str, known: dict[str, dict[str, str]]) -> str | None:
 
 def results_page() -> str:
     """The page of result files: a table a stage, from the rules and their descriptions."""
-    known, told = described(), set()
+    known, listed = described(), set()
     lines = [
         "# Result files",
         "",
-        "Made from the rules. Columns and keys carry their unit in their name or beside it.",
+        "Made from the rules. Columns and keys carry their unit in their name or next to it.",
         "",
     ]
     for stage, rules in results().items():
@@ -103,14 +103,14 @@ def results_page() -> str:
             own = known[entry]
             lines.append(f"| `{entry}` | {own['what']} | {own.get('holds', '')} | `{rule}` |")
         lines.append("")
-        told |= set(rows)
+        listed |= set(rows)
     lines += [
         "## Made under names that the index and the public recordings give",
         "",
         "| file | what | columns or keys |",
         "| --- | --- | --- |",
     ]
-    lines += [f"| `{e}` | {own['what']} | {own.get('holds', '')} |" for e, own in known.items() if e not in told]
+    lines += [f"| `{e}` | {own['what']} | {own.get('holds', '')} |" for e, own in known.items() if e not in listed]
     lines += [
         "",
         "`results/logs/<rule>/` holds the log of each job with its traceback, and the executed notebooks.",
@@ -132,14 +132,14 @@ def commands_page() -> str:
     completion = "`rotorid --install-completion` completes names in your shell."
     lines = ["# Commands", "", f"What `rotorid COMMAND --help` says. {completion}", ""]
     for name, command in group.commands.items():
-        told = textwrap.dedent(command.help or "")
-        lines += [f"## rotorid {name}", "", told, "", "| option | what |", "| --- | --- |"]
+        text = textwrap.dedent(command.help or "")
+        lines += [f"## rotorid {name}", "", text, "", "| option | what |", "| --- | --- |"]
         for parameter in (p for p in command.params if p.name != "help"):
             option = parameter.param_type_name == "option"
-            plain = parameter.metavar or parameter.name.upper()
-            shown = ", ".join(f"`{o}`" for o in parameter.opts) if option else f"`{plain}`"
-            told = " ".join((getattr(parameter, "help", "") or "").split()).replace("|", "\\|")
-            lines.append(f"| {shown} | {told} |")
+            bare = parameter.metavar or parameter.name.upper()
+            shown = ", ".join(f"`{o}`" for o in parameter.opts) if option else f"`{bare}`"
+            meaning = " ".join((getattr(parameter, "help", "") or "").split()).replace("|", "\\|")
+            lines.append(f"| {shown} | {meaning} |")
         lines.append("")
     return "\n".join(lines)
 

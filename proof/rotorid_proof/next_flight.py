@@ -1,8 +1,8 @@
 """The proof of the next flight: an open question, the flight planned for it, and what both sets together say.
 
-A row is one concealed set that the engine left open, or that holds a pair of confusers flown so that little tells them
-apart. The plan knows the set alone; the simulator that made it records the planned flight, and as a yardstick a
-standard flight of the same length; both sets are judged together by the engine.
+A row is one concealed set that the engine left open, or that holds a pair of confusers flown so that little
+distinguishes them. The plan knows the set alone; the simulator that made it records the planned flight, and as a
+yardstick a standard flight of the same length; both sets are judged together by the engine.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Row:
 
 
 def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:
-    """`right`, `wrong` (also where something untrue of the class is established beside) or `open`, and the sentence."""
+    """`right`, `wrong` (also where something untrue of the class is established too) or `open`, and the sentence."""
     (answer,) = answers([ids], findings)
     if not answer.answer:
         return "open", answer.sentence
@@ -68,7 +68,7 @@ def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation |
 
 
 def measured(joint: Known, question: Question | None, true: str) -> float:
-    """√ of the whitened squares that the true model still explains beside its nearest rival, in both sets together.
+    """√ of the whitened squares that the true model still explains given its nearest rival, in both sets together.
 
     This is what the engine asks before it names a class: is the term still needed with the other in its place? Of each
     rival every form of the question as it was asked of the first set is tried; what as many coefficients explain of

@@ -1,4 +1,4 @@
-"""What a study of real recordings found, beside what was published."""
+"""What a study of real recordings found, next to what was published."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def rms_over_axes(verdict: Mapping[str, Any], group: str, stage: str) -> float |
 
 
 def compared(verdict: Mapping[str, Any], wanted: Study, total_speed: float | None) -> list[dict[str, Any]]:
-    """Published numbers beside ours, where the verdict states the same effect with the same parameter.
+    """Published numbers next to ours, where the verdict states the same effect with the same parameter.
 
     A symbol with a suffix (`k_d_x`, `tau_up`) counts as the plain one, one row each.
     """

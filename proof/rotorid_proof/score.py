@@ -6,7 +6,7 @@ Words used here:
 - A claim is *sharp* about a true effect if its class holds the effect and nothing but names that the answer lists as
   indistinguishable from it (`equivalent`).
 - A claim is *false* if its class holds no true effect, nothing that is indistinguishable from one, and nothing that the
-  answer calls `fair` to say beside (a filter's delay, a vibration that is in an autopilot's log).
+  answer calls `fair` to say in addition (a filter's delay, a vibration that is in an autopilot's log).
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def claims_of(verdict: Mapping[str, Any]) -> list[Claim]:
 
 
 def equivalents(answer: Mapping[str, Any]) -> dict[str, frozenset[str]]:
-    """True effect to the names that these data cannot tell from it, itself among them."""
+    """True effect to the names that these data cannot distinguish from it, itself among them."""
     out = {}
     for effect in answer["effects"]:
         names = {effect["id"]}
@@ -129,7 +129,7 @@ def f1_of_times(
 
 
 def parameter_scores(verdict: Mapping[str, Any], answer: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Every true number beside the verdict's estimate and interval, where the verdict names the same symbol."""
+    """Every true number next to the verdict's estimate and interval, where the verdict names the same symbol."""
     out = []
     claimed = {e["id"]: e for e in verdict.get("effects", ()) if e["status"] in CLAIMED}
     for effect in answer["effects"]:

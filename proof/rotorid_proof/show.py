@@ -116,7 +116,7 @@ def _of(score: pd.Series) -> str:
 
 
 PLANTED = {
-    "told": "told",
+    "named": "named",
     "size covered": "covered",
     "ids new or lost a set": "moved",
     "values new or lost a set": "values",
@@ -127,7 +127,7 @@ PLANTED = {
 def of_plantings(now: pd.DataFrame) -> pd.DataFrame:
     """What was planted in real flights at the larger size, as text: by flight, and by family of cause.
 
-    `told`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set. Below the row of all
+    `named`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set. Below the row of all
     stand their targets and whether these hold.
     """
     rows = []
@@ -138,7 +138,7 @@ def of_plantings(now: pd.DataFrame) -> pd.DataFrame:
         row = {"group": words(name) or "all", "kind": kind}
         for what, column in PLANTED.items():
             score = own[own["what"] == what].iloc[0]
-            share = what in ("told", "size covered")
+            share = what in ("named", "size covered")
             row[column] = _of(score) if share else f"{score['value']:.2f}"
         rows.append(row)
     whole = now[(now["size"] == "large") & (now["group"] == "all")].set_index("what")
@@ -428,7 +428,7 @@ def words(ids: object) -> str:
 
 
 def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
-    """Coefficients found beside published ones, as text: small ones in units of a power of ten."""
+    """Coefficients found next to published ones, as text: small ones in units of a power of ten."""
     rows = []
     for row in coefficients.itertuples():
         power = power_of(row.found)

@@ -257,7 +257,7 @@ def rows_of(scores: Sequence[Score]) -> list[dict[str, Any]]:
 
 
 def finished(key: str, what: str, low: float | None, high: float | None, found: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of the summary: what was found, beside its target and whether that holds."""
+    """A row of the summary: what was found, next to its target and whether that holds."""
     word = holds(found["value"], low, high, found["low_95"], found["high_95"])
     return {"id": key, "what": what, "at_least": low, "at_most": high, **found, "holds": word}
 

@@ -21,7 +21,7 @@ def dimension(unit: str) -> dict[str, int]:
 
 
 def same_unit(first: str, second: str) -> bool:
-    """Whether two units have one dimension and scale, as far as their words tell."""
+    """Whether two units have one dimension and scale, as far as their words show."""
     return dimension(first) == dimension(second)
 
 

@@ -76,15 +76,15 @@ def verdict(
     # The effects bring a compiler along, whose start takes seconds.
     from rotorid.report.deliver import analysis_of, write_files
 
-    tell = progress or (lambda text: None)
+    say = progress or (lambda text: None)
     recordings = recording_set(data, vehicle, name=name, held_out=held_out, mass_kg=mass_kg, like=like, mapping=mapping)
-    tell(f"{recordings.name}: analysing {len(recordings.runs)} runs")
+    say(f"{recordings.name}: analysing {len(recordings.runs)} runs")
     # What a module warns of goes to no log here; the verdict itself says what a reader must know.
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
         analysis = analysis_of(recordings)
         paths = [Path(folder) / file for file in FILES]
-        found = write_files(analysis, *paths[:3], progress=tell)
+        found = write_files(analysis, *paths[:3], progress=say)
         there = [path for name in (*FILES, *OTHERS) if (path := Path(folder) / name).exists()]
         texts = {path.name: path.read_text(encoding="utf-8") for path in there}
     return Result(found, texts, analysis)

@@ -288,7 +288,7 @@ class GreyBox(Section):
     draws: int = Field(
         ge=1, le=1000, description="Identification flights, each with its own disturbance and noise [1]."
     )
-    band_hz: Limits = Field(strict=False, description="Band in which real flights tell their inertia [Hz].")
+    band_hz: Limits = Field(strict=False, description="Band in which real flights determine their inertia [Hz].")
     block_s: float = Field(ge=0.1, le=60, description="Blocks of flight that the bootstrap draws [s].")
 
     @model_validator(mode="after")
@@ -379,7 +379,7 @@ class Plantings(Section):
     )
     batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
     kept: Text = Field(
-        description="Table whose rows are kept beside new ones, marked where older code judged them; a file that does "
+        description="Table whose rows are kept next to new ones, marked where older code judged them; a file that does "
         "not exist keeps none [path]."
     )
 
@@ -417,7 +417,7 @@ class Rules(Section):
     @classmethod
     def _known(cls, names):
         if unknown := [name for name in names if name not in RULES]:
-            raise ValueError(f"no rule is named {', '.join(unknown)}; docs/mismatch.md lists the rules")
+            raise ValueError(f"no rule is named {', '.join(unknown)}; docs/decision-reference.md lists the rules")
         return names
 
 

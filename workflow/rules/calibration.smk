@@ -2,7 +2,7 @@
 
 
 rule calibrate_load_cells:
-    """Line of each cell through the thesis's printed readings, beside the coefficients it prints."""
+    """Line of each cell through the thesis's printed readings, next to the coefficients it prints."""
     message:
         "Calibration: load cells of the thesis"
     input:

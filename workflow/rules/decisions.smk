@@ -41,7 +41,7 @@ def hashes_of_evidence():
 
 
 rule collect_evidence:
-    """Gram matrices of many sets as the engine's last search sees them, its verdict beside them."""
+    """Gram matrices of many sets as the engine's last search sees them, its verdict next to them."""
     message:
         f"Decisions: keeping the evidence of {len(KEPT_ITEMS)} sets"
     input:

@@ -85,7 +85,7 @@ rule estimate_inertias:
 
 
 rule estimate_flight_inertias:
-    """Inertias from flights of other laboratories, beside what they publish."""
+    """Inertias from flights of other laboratories, next to what they publish."""
     message:
         "Grey box: inertias from real flights"
     input:

@@ -49,7 +49,7 @@ def plantings_of(wildcards):
 
 
 def mistakes_of(wildcards):
-    """Names of a flight's plantings that the search for mistakes has to tell."""
+    """Names of a flight's plantings that the search for mistakes has to name."""
     return [p.name for p in planted.mistakes(PLANTINGS, wildcards.flight)]
 
 
@@ -130,7 +130,7 @@ rule plantings:
 
 
 rule search_mistakes:
-    """What the search for mistakes alone tells of those planted in one flight."""
+    """What the search for mistakes alone names of those planted in one flight."""
     message:
         "Plantings: the search for mistakes, {wildcards.flight}"
     input:

@@ -33,7 +33,7 @@ except InputError as error:
 BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)
 # Concealed sets whose delivered vehicle is put to the test: as many, evenly over the whole list.
 DELIVERED = plan.batches(plan.spread(CASES, CONFIG.proof.delivered), CONFIG.proof.batch)
-# Recordings come from code outside the library: its hash stands beside that of the script.
+# Recordings come from code outside the library: its hash stands next to that of the script.
 CONCEALING = [
     str(path.relative_to(ROOT)) for path in sorted((ROOT / "proof/rotorid_proof/concealed").rglob("*.py"))
 ]
@@ -152,7 +152,7 @@ rule study_real:
 
 
 rule tabulate_real:
-    """Real recordings in one table, published coefficients beside ours."""
+    """Real recordings in one table, published coefficients next to ours."""
     message:
         "Proof: table of real recordings"
     input:
@@ -190,7 +190,7 @@ rule prove_next_flight:
 
 
 rule draw_proof:
-    """Figures of the proof beside its tables."""
+    """Figures of the proof next to its tables."""
     message:
         "Proof: drawing"
     input:

@@ -1,6 +1,6 @@
 """Static tests of each platform as a recording set of kind bench.
 
-- Reconstructed force beside the load that was put on, all axes of the platform.
+- Reconstructed force next to the load that was put on, all axes of the platform.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Calibrate the load cells from a table of weights and readings.
 
 - A least-squares line for each cell (thesis eqs 2.10 to 2.13) with 95 % intervals.
-- Beside it the coefficients that the thesis prints, and the difference.
+- Next to it the coefficients that the thesis prints, and the difference.
 - The printed weights of the combinations checked against the sum of their elements.
 - Readings that do not match their loads, flagged and named; the lines with and without them.
 - How far the two balances disagree, and what all cells say of the one weight that only one balance weighed.

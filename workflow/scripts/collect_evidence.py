@@ -90,7 +90,7 @@ CHOOSERS = {"search": KEPT, "posterior": POSTERIOR}
 
 
 def main(items: Sequence[Item], folder: str, public: str, hashes: Mapping[str, str], chooser: str, out: str) -> None:
-    """Keep the evidence of `items` in `folder`, those first that tell most, and write the names of its files to `out`.
+    """Keep the evidence of `items` in `folder`, the most informative first, and write the names of its files to `out`.
 
     `hashes` are those of the code that draws (`drawing`), plants (`planting`) and judges (`engine`); the `chooser`
     chooses the effects of a flight.

@@ -1,4 +1,4 @@
-"""Inertias from the flights of other laboratories, beside what they publish.
+"""Inertias from the flights of other laboratories, next to what they publish.
 
 - Rotor moments against angular acceleration in a band, bounds and estimate, for several delays of the rotor speeds.
 """

@@ -1,9 +1,9 @@
 """Steady wrenches of the 48 experiments, the weight under tilt, the rotor's characteristics.
 
 - Plateau (or whole cycles of a sine) of each experiment, the rest reading before and after taken off.
-- The believed vehicle's wrench at the same throttles, by the thrust tests' curve, beside it.
+- The believed vehicle's wrench at the same throttles, by the thrust tests' curve, for comparison.
 - Mass and centre of mass from the readings at rest under all tilts.
-- C_F and C_Q beside the thesis's, and how the speed follows throttle and voltage.
+- C_F and C_Q next to the thesis's, and how the speed follows throttle and voltage.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Tensile tests of printed PLA.
 
 - Stress-strain curve of each specimen, modulus, strength, 0.2 % yield.
-- Mean of each infill density with its interval, beside the thesis's table 2.5.
+- Mean of each infill density with its interval, next to the thesis's table 2.5.
 """
 
 import pandas as pd

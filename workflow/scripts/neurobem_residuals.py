@@ -1,4 +1,4 @@
-"""Rigid-body residuals of the NeuroBEM flights, beside what NeuroBEM itself leaves over.
+"""Rigid-body residuals of the NeuroBEM flights, next to what NeuroBEM itself leaves over.
 
 - Measured wrench minus the believed rotors' wrench, and minus NeuroBEM's own prediction; equal filters.
 - RMS of each flight and channel; RMS against airspeed with block-bootstrap intervals.

@@ -1,4 +1,4 @@
-"""What the search for mistakes alone tells of mistakes planted in a real flight.
+"""What the search for mistakes alone names of mistakes planted in a real flight.
 
 - Reads one public flight, cuts it, plants one mistake after another and searches for mistakes.
 - Writes one row a planted mistake: whether it was named, its size, and in which words.

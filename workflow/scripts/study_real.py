@@ -1,7 +1,7 @@
 """The mismatch stage on one set of real recordings.
 
 - Reads the set with the runs held out that the study asks for.
-- Writes the verdict, a line for the table, and published numbers beside ours.
+- Writes the verdict, a line for the table, and published numbers next to ours.
 """
 
 import json

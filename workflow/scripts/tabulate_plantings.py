@@ -2,7 +2,7 @@
 
 - Scores every verdict on a planted set against the verdict on its flight untouched.
 - Keeps rows of plantings that were judged before and are not asked for now.
-- Writes one row a planted cause, shares with their intervals, and what was new or lost beside which cause.
+- Writes one row a planted cause, shares with their intervals, and what was new or lost with which cause.
 """
 
 import json

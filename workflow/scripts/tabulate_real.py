@@ -1,7 +1,7 @@
 """The table of real recordings.
 
 - One line a study that could be made or on which the stage stopped; published coefficients next to ours.
-- Beside the NeuroBEM flights held out, NeuroBEM's own prediction of the same flight.
+- Next to the NeuroBEM flights held out, NeuroBEM's own prediction of the same flight.
 """
 
 from pathlib import Path

@@ -1,6 +1,6 @@
 """The thesis's black box (section 4.4): 6-20-20-6, 50,000 epochs, tested on 15 samples drawn at random.
 
-- RMSE and R² of each output on those samples, beside how far the samples themselves spread.
+- RMSE and R² of each output on those samples, next to how far the samples themselves spread.
 - Continues from its checkpoint when interrupted; the same seed gives the same network.
 """
 

@@ -5,7 +5,7 @@
 - What the thesis's convergence in 20,000 epochs asks of the torques.
 - Least squares on the same data, where both would end, with intervals.
 - The consistency test of the gyroscopic weights: on these weights, and on those that the thesis prints.
-- How well the manoeuvre can tell each weight at all.
+- How well the manoeuvre can determine each weight at all.
 """
 
 import json

@@ -19,7 +19,7 @@ from .write import write_set
 
 
 def build(case: cases.Case, out: Path, answers: Path, signals: bool = False) -> Path:
-    """Write one set and its answer; with `signals` also the noise-free tables beside the answer."""
+    """Write one set and its answer; with `signals` also the noise-free tables next to the answer."""
     make = {
         "richsim": scene.make,
         "rotorpy": rotorpy_cases.make,
@@ -74,7 +74,7 @@ def main(argv: list[str] | None = None) -> int:
         "--release", metavar="DATE", help="cases drawn for this date (2026-11-30) instead of the listed ones"
     )
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--signals", action="store_true", help="keep the noise-free tables beside the answers")
+    parser.add_argument("--signals", action="store_true", help="keep the noise-free tables next to the answers")
     parser.add_argument("--list", action="store_true", help="only list the cases")
     parser.add_argument("--write-index", action="store_true", help="only write cases.tsv, after a change of the cases")
     args = parser.parse_args(argv)

@@ -328,11 +328,11 @@ def confusable() -> list[Case]:
     out = []
     for p, (first, second, without, with_) in enumerate(PAIRS):
         for effect, form in (first, second):
-            for telling, (groups, purposes) in (("without", without), ("with", with_)):
+            for variant, (groups, purposes) in (("without", without), ("with", with_)):
                 for k in range(2):
-                    name = f"confusable/{p}/{effect}/{telling}/{k}"
+                    name = f"confusable/{p}/{effect}/{variant}/{k}"
                     rng = _draw(name, 0)
-                    size = None if effect in ("motor_lag", "delay") else {"without": 0.7, "with": 2.0}[telling]
+                    size = None if effect in ("motor_lag", "delay") else {"without": 0.7, "with": 2.0}[variant]
                     one_way = purposes[0] == "one_way"
                     plan = _dressed(
                         rng,
@@ -343,7 +343,7 @@ def confusable() -> list[Case]:
                         hidden=(Hidden(effect, size=size, form=form),),
                         late_fraction=0.0,
                         trim_s=5.0 if one_way else 0.0,
-                        equivalent=((first[0], second[0]),) if telling == "without" else (),
+                        equivalent=((first[0], second[0]),) if variant == "without" else (),
                     )
                     out.append(Case(name, 6000 + len(out), "richsim", plan, (effect,)))
     return out

@@ -527,7 +527,7 @@ def make(plan, seed):
     still = simulate(GroundPlan(**{**plan.__dict__, "hidden": ()}), (), seed)
     noises = {name: noise_of(plan, len(r), rng) for name, (_, r) in still.items()}
     channels = channels_of(plan)
-    loud = np.sqrt(np.mean(np.concatenate([filtered(n, plan.rate_hz) for n in noises.values()]) ** 2, axis=0))
+    level = np.sqrt(np.mean(np.concatenate([filtered(n, plan.rate_hz) for n in noises.values()]) ** 2, axis=0))
     factors = [c.amount for c in plan.hidden]
 
     def differs(only):
@@ -535,7 +535,7 @@ def make(plan, seed):
         alone = GroundPlan(**{**plan.__dict__, "hidden": (plan.hidden[only],)})
         shown = simulate(alone, (factors[only],), seed)
         energy = np.concatenate([filtered(shown[n][1] - response(plan, still, shown, n), plan.rate_hz) for n in still])
-        ratio = np.sqrt(np.mean(energy**2, axis=0)) / loud
+        ratio = np.sqrt(np.mean(energy**2, axis=0)) / level
         best = max(channels, key=lambda c: ratio[c])
         return float(ratio[best]), best
 

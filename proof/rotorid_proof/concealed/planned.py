@@ -40,7 +40,7 @@ LOOK_ALIKE = (
     ("delay", "actuation", "motor_lag", ("heave",), COMMAND),
     ("unequal_rotors", "one", "com_offset", ("calm",), COMMAND),
 )
-"""Pairs of the catalogue's confusers, flown so that little tells them apart."""
+"""Pairs of the catalogue's confusers, flown so that little distinguishes them."""
 
 
 def look_alikes() -> list[Case]:

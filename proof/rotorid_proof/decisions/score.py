@@ -29,7 +29,7 @@ class Counts:
     rated: int = 0
     """Sets of which the whole truth is known, or what changed in them."""
     right: int = 0
-    """Of these: everything named, nothing beside it."""
+    """Of these: everything named, nothing else."""
     causes: int = 0
     """Effects that can be seen."""
     named: int = 0
@@ -51,7 +51,7 @@ class Counts:
     values_right: int = 0
     """Of these: called wrong."""
     values_wrong: int = 0
-    """Values called wrong that are right (drawn), or new or lost beside the flight untouched (planted)."""
+    """Values called wrong that are right (drawn), or new or lost against the untouched flight (planted)."""
     intervals: int = 0
     """Stated 95 % intervals of a known number."""
     covered: int = 0
@@ -130,13 +130,13 @@ def score_planted(said: Said, untouched: Said, truths: Sequence[Truth]) -> Score
     if "failed" in said or "failed" in untouched:
         return Scored(Counts(sets=1, failed=1))
     rows = [(t, score_truth(said, untouched, t)) for t in truths]
-    seen = [(t, row, row["told"] in (ALONE, IN_CLASS)) for t, row in rows if row["told"] != UNSEEN]
+    seen = [(t, row, row["named"] in (ALONE, IN_CLASS)) for t, row in rows if row["named"] != UNSEEN]
     covered = [row["covered"] for _, row, _ in seen if row["covered"] is not None]
-    effects = [told for t, _, told in seen if t.ratio is None]
-    values = [told for t, _, told in seen if t.ratio is not None]
+    effects = [named for t, _, named in seen if t.ratio is None]
+    values = [named for t, _, named in seen if t.ratio is not None]
     words = {
-        "missed": [" or ".join(sorted(t.names)) for t, _, told in seen if t.ratio is None and not told],
-        "values_missed": [" or ".join(sorted(t.names)) for t, _, told in seen if t.ratio is not None and not told],
+        "missed": [" or ".join(sorted(t.names)) for t, _, named in seen if t.ratio is None and not named],
+        "values_missed": [" or ".join(sorted(t.names)) for t, _, named in seen if t.ratio is not None and not named],
     }
     counts = Counts(
         sets=1,
@@ -147,7 +147,7 @@ def score_planted(said: Said, untouched: Said, truths: Sequence[Truth]) -> Score
         intervals=len(covered),
         covered=sum(bool(c) for c in covered),
     )
-    # A set in which something cannot be seen may put it down to something else: nothing beside it is held against it.
+    # A set in which something cannot be seen may put it down to something else: nothing else is held against it.
     if len(seen) < len(rows):
         return Scored(counts, words)
     other = beside(said, untouched, truths)
@@ -155,7 +155,7 @@ def score_planted(said: Said, untouched: Said, truths: Sequence[Truth]) -> Score
     words |= {"new": other["new"], "lost": other["lost"], "values_wrong": moved}
     counts += Counts(
         rated=1,
-        right=int(all(told for *_, told in seen) and not (other["new"] or other["lost"] or moved)),
+        right=int(all(named for *_, named in seen) and not (other["new"] or other["lost"] or moved)),
         compared=1,
         new=len(other["new"]),
         lost=len(other["lost"]),

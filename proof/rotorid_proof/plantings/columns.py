@@ -21,7 +21,7 @@ SENSORS = {
 }
 DRIVERS = {"rotors": "rotor_speed", "commands": "rotor_command", "throttle": "throttle"}
 SLOW_HZ = 10.0
-"""Rotor speeds read less often tell no moment: a vehicle's attitude is corrected several times a second."""
+"""Rotor speeds read less often determine no moment: a vehicle's attitude is corrected several times a second."""
 EVEN = 0.35
 """Largest departure of a clock's step from the median step, as a share of it, for columns that are moved in time."""
 

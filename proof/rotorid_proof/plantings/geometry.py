@@ -33,7 +33,7 @@ def centre_of_mass(recordings: RecordingSet, share: float, rng: np.random.Genera
     rotors = tuple(p.model_copy(update={"x_m": p.x_m + r[0], "y_m": p.y_m + r[1]}) for p in vehicle.rotors)
     sensor = tuple(float(a + b) for a, b in zip(vehicle.accelerometer_position_m, r, strict=True))
     sizes = ((Size("com_offset", "r_x", r[0]), Size("com_offset", "r_y", r[1])),)
-    # Of a vehicle whose mass is not known to the gram, a load beside the middle is as good a name.
+    # Of a vehicle whose mass is not known to the gram, a load off the middle is as good a name.
     fair = ("unequal_rotors", "payload")
     truth = named("com_offset", fair=fair, sizes=sizes, unseen=_turns(recordings))
     return with_vehicle(recordings, rotors=rotors, accelerometer_position_m=sensor), truth

@@ -37,12 +37,12 @@ class Ratio:
 
 @dataclass(frozen=True)
 class Truth:
-    """What was planted and what counts as telling it."""
+    """What was planted and what counts as naming it."""
 
     names: frozenset[str]
     """Ids of effects, or names of vehicle.yaml, each of which names the cause by itself."""
     fair: frozenset[str]
-    """Further names that no flight of this kind tells from it: a class of these and `names` is a fair answer."""
+    """Further names that no such flight distinguishes from it: a class of these and `names` is a fair answer."""
     sizes: tuple[tuple[Size, ...], ...] = ()
     """True numbers, one tuple for each form in which the effect may be reported."""
     ratio: Ratio | None = None
@@ -55,11 +55,11 @@ class Truth:
     hidden_by: frozenset[str] = frozenset()
     """Ids that make up for the cause where the untouched flight states one (a curve of the throttle for a mass)."""
     first_only: frozenset[str] = frozenset()
-    """Ids beside which the true form is none of the catalogue's (two lags in series), so that no size is compared."""
+    """Ids given which the true form is none of the catalogue's (two lags in series), so that no size is compared."""
 
 
 def named(*names: str, fair: tuple[str, ...] = (), **more) -> Truth:
-    """A truth by its names and what is fair beside them."""
+    """A truth by its names and what is fair in addition."""
     return Truth(frozenset(names), frozenset(fair), **more)
 
 

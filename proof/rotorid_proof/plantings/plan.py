@@ -15,7 +15,7 @@ from pathlib import Path
 PAIR = "pair"
 MISTAKES = ("clocks", "axes", "units", "stuck")
 MISTAKEN_KINDS = ("rotors_swapped", "spins_reversed")
-"""Families, and kinds of another, that the search for mistakes has to tell before any physics is asked for."""
+"""Families, and kinds of another, that the search for mistakes has to name before any physics is tested."""
 SECONDS = {"neurobem": 40.0, "imrc": 60.0, "arpl-10": 50.0, "arpl-15": 40.0, "crazypad": 25.0, "appius": 5.0}
 """Usual seconds of one core to judge a set of each flight."""
 START_S = 6.0
@@ -73,7 +73,7 @@ def batches(plantings: Sequence[Planting], size: int) -> dict[str, list[Planting
 
 
 def mistakes(plantings: Sequence[Planting], flight: str) -> list[Planting]:
-    """Single plantings of a flight that the search for mistakes has to tell."""
+    """Single plantings of a flight that the search for mistakes has to name."""
     return [
         p for p in plantings if p.flight == flight and (p.family in MISTAKES or set(p.kinds) <= set(MISTAKEN_KINDS))
     ]

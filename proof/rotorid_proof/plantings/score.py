@@ -13,7 +13,7 @@ from rotorid_proof.intervals import Z95
 from rotorid_proof.plantings.kinds import Ratio, Size, Truth
 from rotorid_proof.score import CLAIMED
 
-ALONE, IN_CLASS, NOT_TOLD, UNSEEN = "alone", "in a fair class", "not told", "cannot be seen"
+ALONE, IN_CLASS, NOT_NAMED, UNSEEN = "alone", "in a fair class", "not named", "cannot be seen"
 MOVED = 0.5
 """A cause that the untouched flight states too counts as named where the statement moves by this share of what was
 planted."""
@@ -56,7 +56,7 @@ def log_ratio(verdict: Mapping[str, Any], ratio: Ratio) -> tuple[float, float]:
 
 
 def score_truth(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth: Truth) -> dict[str, Any]:
-    """How one planted cause was reported: `told`, `covered` (None where no size can be compared), and the first
+    """How one planted cause was reported: `named`, `covered` (None where no size can be compared), and the first
     size."""
     unseen = truth.unseen
     before = set().union(*classes(untouched)) if classes(untouched) else set()
@@ -64,11 +64,11 @@ def score_truth(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth:
         unseen = f"the untouched flight shows none of {', '.join(sorted(truth.shown_by))}"
     if not unseen and (beside := truth.hidden_by & before):
         unseen = f"the untouched flight shows {', '.join(sorted(beside))}, which make up for it"
-    row: dict[str, Any] = {"told": NOT_TOLD, "unseen": unseen, "symbol": "", "true": None, "estimate": None}
+    row: dict[str, Any] = {"named": NOT_NAMED, "unseen": unseen, "symbol": "", "true": None, "estimate": None}
     row |= {"low_95": None, "high_95": None, "covered": None}
-    told = _told(verdict, untouched, truth)
-    row["told"] = UNSEEN if unseen else told
-    if unseen or told == NOT_TOLD:
+    named = _named(verdict, untouched, truth)
+    row["named"] = UNSEEN if unseen else named
+    if unseen or named == NOT_NAMED:
         return row
     if truth.ratio is not None:
         return row | _ratio_size(verdict, untouched, truth.ratio)
@@ -77,22 +77,22 @@ def score_truth(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth:
     return row | _effect_size(verdict, untouched, truth)
 
 
-def _told(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth: Truth) -> str:
+def _named(verdict: Mapping[str, Any], untouched: Mapping[str, Any], truth: Truth) -> str:
     if truth.ratio is not None:
-        # Silence on a value that the untouched flight calls wrong tells, too: what was planted put it right.
+        # Silence on a value that the untouched flight calls wrong counts, too: what was planted corrects it.
         stated = set(verdict.get("parameters", {})) | set(untouched.get("parameters", {}))
         if not stated & (truth.names | truth.fair):
-            return NOT_TOLD
+            return NOT_NAMED
         moved = log_ratio(verdict, truth.ratio)[0] - log_ratio(untouched, truth.ratio)[0]
         if moved / truth.ratio.value < MOVED:
-            return NOT_TOLD
+            return NOT_NAMED
         return ALONE if stated & truth.names else IN_CLASS
     found = [c for c in classes(verdict) if c & truth.names]
     fair = [c for c in found if c <= truth.names | truth.fair]
     if not fair:
-        return NOT_TOLD
+        return NOT_NAMED
     if any(c & truth.names for c in classes(untouched)) and not _moved(verdict, untouched, truth):
-        return NOT_TOLD
+        return NOT_NAMED
     return ALONE if any(c <= truth.names for c in fair) else IN_CLASS
 
 
@@ -155,7 +155,7 @@ def _compared(size: Size, found: tuple[float, float, float], then: tuple[float, 
 def beside(
     verdict: Mapping[str, Any], untouched: Mapping[str, Any], truths: Sequence[Truth]
 ) -> dict[str, tuple[str, ...]]:
-    """What differs from the untouched verdict beside the planted causes: ids and values that are new, and lost ones."""
+    """What differs from the untouched verdict but for the planted causes: ids and values that are new, or lost."""
     planted = set().union(*(t.names | t.fair for t in truths))
     now, then = classes(verdict), classes(untouched)
     members_now, members_then = (set().union(*c) if c else set() for c in (now, then))

@@ -16,12 +16,12 @@ from rotorid_proof.plantings.plan import PAIR, Planting
 from rotorid_proof.plantings.score import ALONE, IN_CLASS, UNSEEN, beside, score_truth
 from rotorid_proof.plantings.sow import kind, plant
 
-COLUMNS = ["planting", "flight", "set_of", "family", "kind", "size", "seed", "told", "unseen", "symbol", "true"]
+COLUMNS = ["planting", "flight", "set_of", "family", "kind", "size", "seed", "named", "unseen", "symbol", "true"]
 COLUMNS += ["estimate", "low_95", "high_95", "covered", "new", "lost", "values_new", "values_lost", "failed", "word"]
 COLUMNS += ["seconds", "flown_s", "code"]
 SUMMARY_COLUMNS = ["group", "what", "size", "value", "low_95", "high_95", "count", "at_least", "at_most", "state"]
 SUMMARY_COLUMNS += ["older_rows"]
-TOLD, SIZED, BESIDE = 0.90, 0.90, 0.1
+NAMED, SIZED, BESIDE = 0.90, 0.90, 0.1
 
 
 def rows_of(planting: Planting, recordings: RecordingSet, result: Mapping, untouched: Mapping) -> list[dict[str, Any]]:
@@ -113,11 +113,11 @@ def summary(rows: pd.DataFrame, code: str) -> pd.DataFrame:
 
 
 def _lines(group: str, size: str, rows: pd.DataFrame, code: str) -> list[dict[str, Any]]:
-    seen = rows[rows["told"] != UNSEEN]
+    seen = rows[rows["named"] != UNSEEN]
     sized = seen[seen["covered"].notna()]
     sets = rows.drop_duplicates("planting")
     # A set in which something cannot be seen may put it down to something else: counted apart too.
-    hidden = set(rows.loc[rows["told"] == UNSEEN, "planting"])
+    hidden = set(rows.loc[rows["named"] == UNSEEN, "planting"])
     clear = sets[~sets["planting"].isin(hidden) & (sets["failed"].fillna("") == "")]
     target = size == LARGE
 
@@ -144,8 +144,8 @@ def _lines(group: str, size: str, rows: pd.DataFrame, code: str) -> list[dict[st
     differing = [_count(clear[c]) for c in ("new", "lost")]
     total = sum(int(d.sum()) for d in differing)
     return [
-        share("told", seen, lambda p: p["told"].isin([ALONE, IN_CLASS]), TOLD if target else None),
-        share("told alone", seen, lambda p: p["told"] == ALONE),
+        share("named", seen, lambda p: p["named"].isin([ALONE, IN_CLASS]), NAMED if target else None),
+        share("named alone", seen, lambda p: p["named"] == ALONE),
         share("size covered", sized, lambda p: p["covered"].astype(bool), SIZED if target else None),
         line(
             "ids new or lost a set",
@@ -157,7 +157,7 @@ def _lines(group: str, size: str, rows: pd.DataFrame, code: str) -> list[dict[st
         line("ids new a set", *_mean(differing[0])),
         line("ids lost a set", *_mean(differing[1])),
         line("values new or lost a set", *_mean(_count(clear["values_new"]) + _count(clear["values_lost"]))),
-        share("cannot be seen", rows, lambda p: p["told"] == UNSEEN),
+        share("cannot be seen", rows, lambda p: p["named"] == UNSEEN),
         share("the stage stopped", sets, lambda p: p["failed"].fillna("") != ""),
     ]
 
@@ -180,7 +180,7 @@ def _poisson(total: int, trials: int) -> tuple[float, float]:
 
 
 def differing_names(rows: pd.DataFrame) -> pd.DataFrame:
-    """How often each id or value was new beside a planting, or lost: `kind` planted, `what`, `name`, `sets`."""
+    """How often each id or value was new with a planting, or lost: `kind` planted, `what`, `name`, `sets`."""
     out: dict[tuple[str, str, str], int] = {}
     for _, row in rows.drop_duplicates("planting").iterrows():
         for what in ("new", "lost", "values_new", "values_lost"):

@@ -82,7 +82,7 @@ def _turning(recordings: RecordingSet) -> str:
 
 
 def _open_scale(recordings: RecordingSet) -> frozenset[str]:
-    """Effects beside which only commands say how fast rotors turn, so that a thrust per mass shows no more."""
+    """Effects given which only commands say how fast rotors turn, so that a thrust per mass shows no more."""
     return frozenset() if has(recordings, "rotors") else frozenset({"throttle_curve", "battery_sag"})
 
 

@@ -1,6 +1,6 @@
 """The whole campaign of the thesis, recorded by the recorders from the emulators on a virtual clock.
 
-`python -m rotorid.acquire.campaign` writes `raw/campaign/` (logs packed, metadata beside them), the index
+`python -m rotorid.acquire.campaign` writes `raw/campaign/` (logs packed, metadata next to them), the index
 `raw/sessions.tsv` and, outside `raw/`, the sealed truth. The same seed gives the same bytes.
 """
 
@@ -423,7 +423,7 @@ def tensile(campaign: Campaign) -> None:
 def combined(campaign: Campaign) -> None:
     """Weights that pull along two or three axes of the aluminium bench at once, five repeats.
 
-    The thesis has none; they tell what a reconstruction is worth when loads are not along one axis at a time.
+    The thesis has none; they show how good a reconstruction is when loads are not along one axis at a time.
     """
     for axis in COMBINED_AXES:
         for number in COMBINED_LOADS:

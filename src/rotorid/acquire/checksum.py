@@ -40,7 +40,7 @@ def renew(path: Path) -> bool:
     if path.name == index.NAME:
         return index.renew_checksum(path)
     if not path.exists():
-        raise SessionError(f"{path}: no such file; every log has its metadata beside it")
+        raise SessionError(f"{path}: no such file; every log has its metadata next to it")
     before = read_bytes(path, LARGEST_METADATA)
     after = metadata_checksum.with_checksum(before)
     if after == before:

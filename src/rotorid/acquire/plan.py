@@ -47,7 +47,7 @@ SETTINGS: dict[str, tuple[str, ...]] = {
     "experiment": ("experiment",),
     "tensile": (),
 }
-"""What the procedures read, beside `tolerance` and `wait_s`."""
+"""What the procedures read, except `tolerance` and `wait_s`."""
 
 
 class PlanError(InputError):

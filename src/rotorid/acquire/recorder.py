@@ -2,7 +2,7 @@
 
 A recording is a `with` block around a `Recorder`; what a procedure does with the instrument (tare, throttle,
 programme) stands in its own module and only uses `command`, `start`, `rows` and `stop`. However the block
-ends, the log is closed and the metadata beside it say how it ended.
+ends, the log is closed and the metadata next to it say how it ended.
 """
 
 from __future__ import annotations
@@ -358,7 +358,7 @@ class Recorder:
         self._note("mark", name=name, index=row.index, segment=row.segment)
 
     def say(self, text: str) -> None:
-        """Tell the person at the keyboard."""
+        """Print to the person at the keyboard."""
         self._say(text)
 
     def note(self, what: str, text: str) -> None:
@@ -522,7 +522,7 @@ class Recorder:
             self._reconnect(error)
 
     def _ask_identity(self, patience_s: float | None = None) -> bool:
-        """Ask the device who it is, a few times or for so long; whether it answered. Its start record also tells a
+        """Ask the device who it is, a few times or for so long; whether it answered. Its start record also shows a
         restart; samples, should they come instead, will do as a sign of life."""
         self._answered = False
         samples = self._data_frames()
@@ -593,7 +593,7 @@ class Recorder:
         self._go_on()
 
     def _go_on(self) -> None:
-        self._say(f"telling the {self.instrument.title} to go on")
+        self._say(f"making the {self.instrument.title} go on")
         self.resume()
 
     def _give_up(self) -> None:

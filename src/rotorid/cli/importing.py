@@ -75,7 +75,7 @@ def import_logs(
             return
         word = "run" if len(durations) == 1 else "runs"
         typer.echo(f"{made.folder}: {len(durations)} {word}, {sum(durations.values()):.0f} s, {', '.join(durations)}")
-        tell(made)
+        print_notes(made)
         if refused:
             typer.echo(f"`rotorid verdict {made.folder}` will refuse the set: {refused}")
             if len(durations) == 1 and max(durations.values()) < LEAST_SINGLE_S:
@@ -149,7 +149,7 @@ def make_set(
     return Made(folder, found.remarks, found.sentences, found.kept_vehicle)
 
 
-def tell(made: Made) -> None:
+def print_notes(made: Made) -> None:
     """Print what was found in the logs and what is only proposed."""
     if made.faults:
         typer.echo("Found in the logs:")

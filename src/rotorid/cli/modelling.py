@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, tell
+from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
 from rotorid.errors import InputError
 
 
@@ -52,7 +52,7 @@ def model(
             made = make_set(paths, target / name, mass_kg, like, vehicle, mapping)
             folder = made.folder
             if not quiet:
-                tell(made)
+                print_notes(made)
         written, said = write_model(folder, target, to, quiet)
         for sentence in said:
             typer.echo(sentence)

@@ -28,7 +28,7 @@ def parameters(
     mapping: MappingFile = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON in place of text.")] = False,
 ) -> None:
-    """Say what flights tell of an autopilot's parameters, each with its 95 % interval, and write a file to load.
+    """State what flights determine of an autopilot's parameters, each with its 95 % interval, and write a file to load.
 
     Thrust curve (PX4 THR_MDL_FAC; ArduPilot MOT_THST_EXPO, MOT_SPIN_MIN; Betaflight thrust_linear; the Crazyflie's
     volts a gram), hover, lag of the motors, and for PX4 drag jointly with the wind (EKF2_BCOEF_X, EKF2_BCOEF_Y,

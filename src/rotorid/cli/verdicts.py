@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, tell
+from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
 from rotorid.errors import InputError
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def verdict(
             made = make_set(paths, target / name, mass_kg, like, vehicle, mapping)
             folder = made.folder
             if not quiet and not as_json:
-                tell(made)
+                print_notes(made)
         found = deliver_set(folder, target, quiet, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)

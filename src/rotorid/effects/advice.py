@@ -18,7 +18,7 @@ RECORDABLE: dict[str, tuple[str, Callable[[int], tuple[str, ...]]]] = {
 
 
 def advice(effect: Effect, recordings: RecordingSet | None = None) -> str:
-    """What would tell an effect from its confusers, one clause; it asks for no column that every run has.
+    """What would distinguish an effect from its confusers, one clause; it asks for no column that every run has.
 
     Without recordings it asks for every column that helps.
     """

@@ -77,7 +77,7 @@ EFFECT = Effect(
     ),
     excited_by=("load",),
     confusers=("load_nonlinearity", "crosstalk"),
-    separating_manoeuvre="measure the deflection beside the load, or brace the structure and repeat",
+    separating_manoeuvre="measure the deflection as well as the load, or brace the structure and repeat",
     kind="physics",
     lack_on=lambda instrument: (
         "one channel only is read"

@@ -44,7 +44,7 @@ class Motion:
     accelerometer: np.ndarray | None = None
     """The same as an accelerometer read it, None where none is recorded."""
     gyroscope: np.ndarray | None = None
-    """Body rates as a gyroscope read them beside a recorded attitude, None where there is only one source."""
+    """Body rates as a gyroscope read them where the attitude is recorded too, None where there is only one source."""
     rotation: np.ndarray | None = None
     """Rotation of body vectors into the world, (n, 3, 3)."""
     velocity: np.ndarray | None = None
@@ -57,7 +57,7 @@ class Motion:
     """Height of the centre of mass above ground, (n,), m."""
     voltage: np.ndarray | None = None
     """Battery voltage, (n,), V."""
-    carried: np.ndarray | None = None
+    on_board: np.ndarray | None = None
     """Share of a payload that is on board, (n,), 0 or 1; None where it is on board all the time."""
     hung: np.ndarray | None = None
     """How a slung payload hung at some instants, (k, 7): time in s, direction of the cable downward and its rate in
@@ -178,7 +178,7 @@ class Form:
     far apart to find the right ones. They take the place of those stated; without any, those hold."""
 
     takes_up: tuple[str, ...] = ()
-    """Believed values (keys of the regression) that the form has a part of its own for: beside it their trust is no
+    """Believed values (keys of the regression) that the form has a part of its own for: with it their trust is no
     room to move in, or the two would share one slope."""
 
     linear_drag: Literal["", "times rotor speed", "of airspeed alone"] = ""
@@ -187,7 +187,7 @@ class Form:
     swings: bool = False
     """Whether it swings: how it hung in a run is read from the run (`Motion.hung`)."""
     comes_and_goes: bool = False
-    """Whether it may be there for a part of a run alone (`Motion.carried`)."""
+    """Whether it may be there for a part of a run alone (`Motion.on_board`)."""
     resolution: float = 1.0
     """How many times the size that counts elsewhere its contribution must have."""
 
@@ -269,7 +269,7 @@ class SetForm:
     """One way in which a recording set is not what it says; `apply(recordings, values)` gives the faulty set.
 
     For faults of sensors, logging and of the set's own description, which are no wrench. `neutral` are the
-    parameter values that change nothing, `example` those of a plain fault.
+    parameter values that change nothing, `example` those of a fault of usual size.
     """
 
     name: str
@@ -290,7 +290,7 @@ class Effect:
     name: str
     """What a pilot would call it, fits into "… was left out"."""
     sentence: str
-    """How it shows, one plain clause."""
+    """How it is observed, one clause."""
     forms: FormsFor
     """The forms for a vehicle (their parameters may depend on its number of rotors)."""
     source: str
@@ -303,7 +303,7 @@ class Effect:
     confusers: tuple[str, ...] = ()
     """Ids that imitate it (physics.md); the class is computed from the data, this is for the text."""
     separating_manoeuvre: str = ""
-    """What tells it from its confusers, one clause, without the columns that this takes."""
+    """What distinguishes it from its confusers, one clause, without the columns that this takes."""
     separating_columns: tuple[str, ...] = ()
     """What to record for this (`rotorid.effects.advice.RECORDABLE`)."""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
@@ -332,7 +332,7 @@ class Effect:
     would_change: tuple[str, ...] = ()
     """Believed values (keys of vehicle.yaml) that it would change by itself."""
     like_on_heavier: tuple[str, ...] = ()
-    """Ids that on a vehicle heavier than believed may be this one; those after the first only beside the first."""
+    """Ids that on a vehicle heavier than believed may be this one; those after the first only with the first."""
     same_on_commands: str = ""
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     curves_thrust: bool = False

@@ -45,7 +45,7 @@ EFFECT = Effect(
     sign="positive C_ij: a load along +j reads as one along +i on channel i",
     validity=(
         "linear and without delay; of the cells, or of equations that make forces of their readings: a set of forces "
-        "does not tell which, cell readings under loads of known direction do; a gain error on the load's own axis is "
+        "does not show which, cell readings under loads of known direction do; a gain error on the load's own axis is "
         "no crosstalk, and curvature is left to compliance and load_nonlinearity"
     ),
     excited_by=("load",),

@@ -270,7 +270,7 @@ def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     out += [
         f"- Sign: {effect.sign}.",
         f"- Validity: {effect.validity}.",
-        f"- Imitated by: {confusers}. What tells them apart: {advice(effect)}.",
+        f"- Confused with: {confusers}. What distinguishes them: {advice(effect)}.",
         f"- Source: {effect.source}.\n",
     ]
     return "\n".join(out)

@@ -59,7 +59,7 @@ def slung_starts(parts, vehicle):
 
 def aboard(motion):
     """Share of the payload that is on board, (n, 1), or 1 throughout."""
-    return 1.0 if motion.carried is None else motion.carried[:, None]
+    return 1.0 if motion.on_board is None else motion.on_board[:, None]
 
 
 def rigid(motion, vehicle, values):
@@ -77,8 +77,8 @@ def rigid_with_inertia(motion, vehicle, values):
     extra += extra.T
     rate = motion.angular_velocity
     turning = aboard(motion) * (motion.angular_acceleration @ extra + np.cross(rate, rate @ extra))
-    carried = rigid(motion, vehicle, values[:3])
-    return Contribution(force=carried.force, moment=carried.moment - turning)
+    attached = rigid(motion, vehicle, values[:3])
+    return Contribution(force=attached.force, moment=attached.moment - turning)
 
 
 def kernel_rigid(m, v, p, w):

@@ -18,7 +18,7 @@ PIECE_S = 10.0
 """Pieces that are scanned each by itself, two swings of the longest cable: what swings wildly in one manoeuvre, or hung
 otherwise before, does not drown the others."""
 LENGTHS_TRIED = 180
-"""Steps of two in a hundred: the phase of what rings for a minute tells its length so well."""
+"""Steps of two in a hundred: the phase of a swing of a minute determines the length so well."""
 MOST_LIKELY = 3
 LEAST_EXPLAINED = 0.1
 """Share of the pulls' squares that small swings must explain for a length to be looked at more closely."""
@@ -174,7 +174,7 @@ def in_blocks(time_s, columns, keep):
 
 
 def explained(piece, swings, others):
-    """Share of a piece's pulls that columns (n, 2), each by itself beside `others` (k, axis), explain: (columns,)."""
+    """Share of a piece's pulls that columns (n, 2), each by itself given `others` (k, axis), explain: (columns,)."""
     own, shared = np.zeros(len(swings)), np.zeros((len(piece.pulls), len(swings)))
     for axis in (0, 1):
         for k, swing in enumerate(swings):

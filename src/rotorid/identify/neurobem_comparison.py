@@ -1,4 +1,4 @@
-"""Rigid-body residuals of the NeuroBEM flights, beside what NeuroBEM itself leaves over.
+"""Rigid-body residuals of the NeuroBEM flights, next to what NeuroBEM itself leaves over.
 
 Three differences are taken, each side filtered alike: measured minus the believed rotors (`rigid_body`),
 measured minus NeuroBEM's prediction (`neurobem`), and the latter with the mass that its paper prints

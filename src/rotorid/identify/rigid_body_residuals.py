@@ -38,7 +38,7 @@ def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray
 
 
 def measured_wrench(run: Run, vehicle: Vehicle, angular_acceleration: np.ndarray) -> np.ndarray:
-    """Force (N) and moment (N m) that act on the vehicle beside gravity, body axes, shape (n, 6).
+    """Force (N) and moment (N m) that act on the vehicle except gravity, body axes, shape (n, 6).
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ A frame on the wire is
 
 little-endian. COBS (consistent overhead byte stuffing, Cheshire and Baker 1999) removes every zero from
 the body, so a zero byte always and only ends a frame: after any garbage the next frame is found again.
-The checksum is CRC-16/CCITT-FALSE over everything before it. `docs/wire-formats.md` tells the whole.
+The checksum is CRC-16/CCITT-FALSE over everything before it. `docs/wire-formats.md` has the whole.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`raw/sessions.tsv`: one row per recording, made from the metadata beside the logs.
+"""`raw/sessions.tsv`: one row per recording, made from the metadata next to the logs.
 
 Its last row is no recording: `sessions_sha256` and the SHA-256 of all bytes but that row's, so that a changed bit is
 noticed, as in metadata (`rotorid.io.metadata_checksum`). An index without that row, as earlier versions wrote it, is

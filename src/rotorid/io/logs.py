@@ -2,7 +2,7 @@
 
 A log cut off anywhere is read up to the cut, a damaged one behind the damage as well; `Log.faults` says in
 sentences what is not as it was recorded. The table's time is the device's own clock, unwrapped; the host's time
-stands beside it, so that two instruments can be aligned.
+stands next to it, so that two instruments can be aligned.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ class Log:
 def read_log(path: str | Path) -> Log:
     """Parse a raw log (`.rlog` or `.rlog.gz`), whole, cut or damaged.
 
-    Raises LogError where no start record tells the instrument (and no metadata does either) or where the log and
-    the metadata beside it are of two recordings, NotALog where the file is none or is not there.
+    Raises LogError where no start record names the instrument (and no metadata does either) or where the log and
+    the metadata next to it are of two recordings, NotALog where the file is none or is not there.
     """
     path = Path(path)
     raw = rawlog.read_raw(path)
@@ -165,7 +165,7 @@ def _note(data: bytes) -> dict:
 
 
 def same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> None:
-    """Raises LogError where the log's own name is not that of the metadata beside it."""
+    """Raises LogError where the log's own name is not that of the metadata next to it."""
     if session is None:
         return
     for chunk in raw.chunks:
@@ -173,7 +173,7 @@ def same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> N
             name = _note(chunk.data).get("id")
             if name is not None and name != session.id:
                 raise LogError(
-                    f"{path}: holds the recording {name!r}, and the metadata beside it are those of {session.id!r}; "
+                    f"{path}: holds the recording {name!r}, and the metadata next to it are those of {session.id!r}; "
                     "put the right file back"
                 )
             return
@@ -210,7 +210,7 @@ def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | N
     name = named[-1] if named else session.instrument if session else None
     if name is None:
         raise LogError(
-            f"{path}: no start record in it and no {session_path(path).name} beside it, "
+            f"{path}: no start record in it and no {session_path(path).name} next to it, "
             "so nothing says which instrument wrote it"
         )
     known = f"unknown instrument {name!r}; known are {', '.join(wire.INSTRUMENTS)}"

@@ -1,4 +1,4 @@
-"""What a recorder writes beside the bytes: `<log>.yaml`, one validated model for recorder and pipeline."""
+"""What a recorder writes next to the bytes: `<log>.yaml`, one validated model for recorder and pipeline."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Session(KnownKeys):
     warnings: list[str] = []
     ended: Ended = Ended.RECORDING
     message: str = "the recorder never got to the end: it was killed or the computer stopped"
-    log: str  # file name beside this file
+    log: str  # file name next to this file
     log_sha256: str | None = None  # of the unpacked log
     metadata_sha256: str | None = None  # as read; None: the file has no checksum, a change of it goes unnoticed
 
@@ -170,7 +170,7 @@ class Session(KnownKeys):
     @classmethod
     def _lies_beside(cls, name: str) -> str:
         if name in ("", ".", "..") or "/" in name or "\0" in name:
-            raise ValueError(f"found {name!r}, expected the name of a file beside this one")
+            raise ValueError(f"found {name!r}, expected the name of a file next to this one")
         return name
 
 
@@ -210,7 +210,7 @@ def read_session(path: str | Path) -> Session:
     changed after recording; `metadata_sha256` of the session is None where nothing can say that it was not."""
     path = Path(path)
     if not path.exists() and not path.is_symlink():
-        raise SessionError(f"{path}: no such file; every log has its metadata beside it")
+        raise SessionError(f"{path}: no such file; every log has its metadata next to it")
     try:
         metadata_checksum.check(read_bytes(path, LARGEST_METADATA), path)
     except InputError as error:

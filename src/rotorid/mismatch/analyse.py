@@ -54,8 +54,8 @@ from rotorid.mismatch.values import (
     names_of,
     only_throttle,
     speed_for_coefficients,
+    stated_of_commands,
     throttle_scale,
-    told_of_commands,
     with_square_term,
     with_values_in_question,
 )
@@ -103,27 +103,27 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float, watc
     found = fitted(prepared)
     model, values = found.model, found.values
 
-    told, scale = values, {}
+    to_state, scale = values, {}
     if only_throttle(recordings):
-        told = speed_for_coefficients(values, prepared.vehicle)
+        to_state = speed_for_coefficients(values, prepared.vehicle)
         if prepared.vehicle.rotor_speed_limits_rad_s is None:
-            told, scale = throttle_scale(values, model, full_speed(known.runs, prepared.vehicle))
+            to_state, scale = throttle_scale(values, model, full_speed(known.runs, prepared.vehicle))
     fit, moved = settled(model, values, model.selection.active)
 
     outside = [*mistakes, *findings_outside(found, prepared)]
     findings = [*outside, *findings_inside(found, prepared, fit)]
     findings = payload_or_offset(findings, {**moved, **values})
     findings += absorbed_findings(model, values, findings)
-    findings, told = with_square_term(findings, told, model)
+    findings, to_state = with_square_term(findings, to_state, model)
     if found.commanded:
-        told = told_of_commands(findings, told)
+        to_state = stated_of_commands(findings, to_state)
     findings = together(findings)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
     limits = tuple(limit for limit in absent(model) if limit.id not in stated_ids)
-    choice = Choice(recordings, split, found, told, scale, tuple(findings), limits, tuple(remarks))
+    choice = Choice(recordings, split, found, to_state, scale, tuple(findings), limits, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
-    stated = {**contract_values(prepared.vehicle, told), **scale}
+    stated = {**contract_values(prepared.vehicle, to_state), **scale}
     watch(Decided(found, tuple(outside), tuple(findings), stated))
     seen = on_every_run(found, recordings, split, unseen)
     if len(seen.rows) == len(model.rows):
@@ -166,7 +166,7 @@ def with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Findin
     out = [replace(f, windows=windows) if f.id in blown else f for f in findings]
     if aboard := on_board(seen.segments):
         comes_and_goes = {t.effect for t in loads(seen)}
-        out = [carried_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in out]
+        out = [payload_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in out]
     return tuple(out)
 
 
@@ -224,7 +224,7 @@ def account(
         force_source=model.segments[0].force_source,
         notes=(*choice.remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
         instead=instead_of(model, values),
-        put_right=within_trust.in_words(moved),
+        corrected=within_trust.in_words(moved),
     )
 
 
@@ -324,7 +324,7 @@ def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit) -> list[F
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
-def carried_for_a_time(finding: Finding, windows: tuple[tuple[str, float, float], ...]) -> Finding:
+def payload_for_a_time(finding: Finding, windows: tuple[tuple[str, float, float], ...]) -> Finding:
     """A payload with when it is on board."""
     when = ", ".join(f"in {run} from {start:.1f} to {stop:.1f} s" for run, start, stop in windows)
     return replace(finding, windows=windows, sentence=f"{finding.sentence}: {when}")
@@ -353,13 +353,13 @@ def instead_of(model: WrenchModel, values: Values) -> dict[str, tuple[str, ...]]
 
 
 def lag_alone_notes(chain: Chain | None) -> list[str]:
-    """The lag as others state it, who fit neither a delay nor a throttle curve beside it, where it shares with them."""
+    """The lag as others state it, who fit neither a delay nor a throttle curve jointly, where it shares with them."""
     if chain is None or chain[0].lag_alone is None:
         return []
     fit = chain[0].lag_alone
     tau, reach = float(fit.values[0]), 1.96 * float(np.sqrt(fit.covariance[0, 0]))
     return [
-        "The lateness of the rotors is shared by a lag and what was found beside it; a lag alone would be "
+        "The lateness of the rotors is shared by a lag and what else was found; a lag alone would be "
         f"{1000 * tau:.0f} ms ({1000 * (tau - reach):.0f} to {1000 * (tau + reach):.0f} ms)."
     ]
 
@@ -449,7 +449,7 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
 def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     """A centre of mass off its place on a vehicle that is heavier than believed may be a payload as well.
 
-    The payload would bring products of inertia along: found beside such an offset they belong to the same question.
+    The payload would bring products of inertia along: found with such an offset they belong to the same question.
     """
     sure = {key: change for key, (change, sd) in values.items() if abs(change) > SURELY_HEAVIER * sd}
     heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0

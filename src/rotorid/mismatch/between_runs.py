@@ -1,6 +1,6 @@
 """Whether what is left of a channel has another mean in each run: something was changed between the flights.
 
-A term that is the same in every run cannot explain it, and no input of a flight tells of it. The means are compared by
+A term that is the same in every run cannot explain it, and no input of a flight shows it. The means are compared by
 an analysis of variance over blocks, whose own correlation widens it (a sensor's bias walks).
 """
 

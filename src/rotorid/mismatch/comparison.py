@@ -2,9 +2,9 @@
 
 The fitted part of a set is cut into environments of at least five seconds, never across runs. Both models are fitted on
 all environments but some and scored on those, so that every environment is scored by coefficients that never saw it
-(leave-one-out over folds of environments; whole runs are left out where there are at least three). Beside what A gains
-on an environment stands what its extra part promises there if its coefficients are right; environments that hardly
-excite it do not vote.
+(leave-one-out over folds of environments; whole runs are left out where there are at least three). What A gains
+on an environment is compared with what its extra part predicts there if its coefficients are right; environments that
+hardly excite it do not vote.
 
 An effect that is at work keeps what it promises, and does so in nearly every environment that excites it. One that
 fills a gap left by another cause gains on average only (Pfister, Bauer and Peters, Learning stable and predictive
@@ -26,13 +26,13 @@ MOST_FOLDS = 8
 LEAST_RUNS = 3
 """Fitted runs from which whole runs are left out."""
 VOTES_FROM = 0.05
-"""Promise of an environment, beside the largest of all, from which it votes."""
+"""Predicted gain of an environment, relative to the largest of all, from which it votes."""
 LEAST_EXPECTED = 0.6
 """Share of the promise that a true effect must be expected to keep on blocks left out, for these to judge: what one run
 alone excites cannot be learnt from the others."""
 SEEN_ELSEWHERE = 1.0
-"""What the fitted blocks must hold of the same change, beside what is asked of the blocks left out: no form is so true
-that what slow flights say of it could be held against a fast one."""
+"""What the fitted blocks must hold of the same change, relative to what is asked of the blocks left out: no form is
+so true that what slow flights say of it could be held against a fast one."""
 ANSWERED = 0.5
 """Share of all that is promised on environments that may judge, from which leaving out whole runs is an answer."""
 
@@ -49,7 +49,7 @@ class Comparison:
     """(environments,) squares that the same part explains in all that was fitted when this one was left out."""
     doubt: np.ndarray
     """(environments,) squares by which the coefficients that A has more are expected to be off there, as little as the
-    blocks that they were fitted on tell of them."""
+    blocks that they were fitted on determine them."""
     fold: np.ndarray
     """(environments,) which were left out together."""
 

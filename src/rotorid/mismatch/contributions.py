@@ -1,7 +1,7 @@
 """What a model adds to the channels, less what is only the sensors' noise come in through its regressors.
 
 A true model with a noisy tachometer as its input may leave more than no model at all: the acceleration of rotors that
-turn evenly is all noise. The noise added once more tells how much of a contribution is noise at each frequency; the
+turn evenly is all noise. The noise added once more shows how much of a contribution is noise at each frequency; the
 best that can be said of the contribution itself is what Wiener's filter passes. Where noise is a small part of it the
 contribution stands as it is.
 """

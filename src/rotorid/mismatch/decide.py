@@ -115,7 +115,7 @@ class TermReport(NamedTuple):
         return "ambiguous" if self.alternatives else "established"
 
 
-def findings_of(search: Search, selection: Selection, told: Callable[[str], TermReport]) -> list[Finding]:
+def findings_of(search: Search, selection: Selection, report_of: Callable[[str], TermReport]) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive.
 
     Terms without a name are reported as unexplained instead.
@@ -125,7 +125,7 @@ def findings_of(search: Search, selection: Selection, told: Callable[[str], Term
         term = search.terms[key]
         if term.effect in UNKNOWNS:
             continue
-        own = told(key)
+        own = report_of(key)
         findings.append(
             Finding(
                 id=term.effect,
@@ -166,7 +166,7 @@ def wrench_findings(
     `delivered` the fit whose numbers are stated."""
     beside = search.beside(selection.active)
 
-    def told(key: str) -> TermReport:
+    def report_of(key: str) -> TermReport:
         term = search.terms[key]
         beta, _ = coefficients(regression, delivered, key)
         channels = main_channels(contributions.rows, regression.columns([key]), beta, noise)
@@ -189,7 +189,7 @@ def wrench_findings(
         others = search.alternatives(key, selection.active) if stated is None else stated.alternatives
         return TermReport(values, parameters, names, others, stated)
 
-    return findings_of(search, selection, told)
+    return findings_of(search, selection, report_of)
 
 
 def fails_elsewhere(
@@ -212,7 +212,7 @@ def wrong_values(
     """The fewest believed values that must change: relative change and one-sigma.
 
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
-    counts, but only up to MOST_DISTRUST per value: a number may be plainly wrong, and a wrong mass must not be
+    counts, but only up to MOST_DISTRUST per value: a number may be far off, and a wrong mass must not be
     sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other side
     (`reverse`, with `measured_moment` that with measured moments as regressors) agrees, where it survives on the
     held-out part, and where it matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative
@@ -264,7 +264,7 @@ def wrong_values(
             # Two values that run away together say nothing against either of them alone.
             at_limits.append(named)
         elif certainty:
-            # Without it the others are chosen anew: one in doubt must not hide one that is plainly wrong.
+            # Without it the others are chosen anew: one in doubt must not hide one that is far off.
             doubtful.add(min(certainty, key=certainty.get))
         else:
             break
@@ -292,7 +292,7 @@ def exchangeable(
     """To each value called wrong what would explain as much in its place: relative changes and one-sigmas.
 
     Often a recording knows a ratio alone (thrust over mass, torque over inertia); which of two is called wrong rests
-    then on what the user trusts. As much: beside the others it explains less than a further value must, or than any
+    then on what the user trusts. As much: given the others it explains less than a further value must, or than any
     form is wrong by. Where no other value does so alone, the two that leave it least (an arm is both inertias as well).
     """
     named = list(values)
@@ -305,7 +305,7 @@ def exchangeable(
         return regression.fit([*always, *keys], loose=loose)
 
     def replaced(key: str, others: tuple[str, ...]) -> tuple[float, dict[str, tuple[float, float]]]:
-        """What a value still explains beside others (infinite where one is at its limit), and their changes."""
+        """What a value still explains given others (infinite where one is at its limit), and their changes."""
         fit = fitted([*(k for k in named if k != key), *others])
         changes = {}
         for other in others:

@@ -42,7 +42,7 @@ class FittedModel(Protocol):
         """Keys of the terms that are delivered with those of `keys`."""
 
     def values_beside(self, active: Sequence[str]) -> list[str]:
-        """Keys of the believed values that are free beside the terms at work."""
+        """Keys of the believed values that are free given the terms at work."""
 
     def change(self, key: str, coefficient: float, sd: float) -> tuple[float, float]:
         """Relative change of a believed value and its one-sigma from its coefficient."""
@@ -60,10 +60,10 @@ def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tu
     """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values at their stated numbers.
 
     What the whole balance would make of those values is another number where slow moments of the air bias it, and
-    effects fitted beside that would be those of a vehicle that nobody states.
+    effects fitted given that number would be those of a vehicle that nobody states.
     """
     delivered = model.delivered_with(keys, widely(values))
-    known, cols, beta = at_told_numbers(model, delivered, values)
+    known, cols, beta = at_stated_numbers(model, delivered, values)
     fit = known.fit([k for k in delivered if k not in values])
     size = len(fit.beta)
     covariance = np.zeros((size + len(cols), size + len(cols)))
@@ -73,14 +73,14 @@ def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tu
     )
 
 
-def at_told_numbers(
+def at_stated_numbers(
     model: FittedModel, keys: Sequence[str], values: Values
 ) -> tuple[Regression, np.ndarray, np.ndarray]:
     """The regression in which the wrong values among `keys` are known, their columns and their coefficients."""
-    told = [k for k in keys if k in values]
-    cols = model.regression.columns(told)
-    beta = np.array([model.coefficient(k, values[k][0]) for k in told])
-    return (model.regression.given(cols, beta) if told else model.regression), cols, beta
+    stated = [k for k in keys if k in values]
+    cols = model.regression.columns(stated)
+    beta = np.array([model.coefficient(k, values[k][0]) for k in stated])
+    return (model.regression.given(cols, beta) if stated else model.regression), cols, beta
 
 
 def left_out_residuals(model: FittedModel, keys: Sequence[str], values: Values) -> list[np.ndarray]:
@@ -89,9 +89,9 @@ def left_out_residuals(model: FittedModel, keys: Sequence[str], values: Values) 
     Each environment of the fitted runs is judged by coefficients found without it.
     """
     regression = model.regression
-    known, told, beta = at_told_numbers(model, keys, values)
+    known, stated, beta = at_stated_numbers(model, keys, values)
     cols, betas = known.left_out(tuple(k for k in keys if k not in values), False)
-    cols, betas = np.append(cols, told), np.column_stack([betas, np.tile(beta, (len(betas), 1))])
+    cols, betas = np.append(cols, stated), np.column_stack([betas, np.tile(beta, (len(betas), 1))])
     betas = np.where(model.unnamed(cols), 0.0, betas)
     fold = np.append(regression.folds(False), -1)  # the last stands for rows that are in no block
     added = model.contributions.left_out(cols, betas, [fold[b] for b in regression.blocks_of_rows])

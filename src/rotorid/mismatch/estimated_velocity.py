@@ -1,7 +1,7 @@
-"""Whether a recorded velocity is an estimate made from the accelerometer beside it.
+"""Whether a recorded velocity is an estimate made from the recorded accelerometer.
 
 An autopilot's filter integrates its accelerometer between the fixes of a slower sensor: the accelerometer's errors,
-its noise and the vibrations that it feels are then in the velocity, too, and comparing the two tells nothing of them.
+its noise and the vibrations that it feels are then in the velocity, too, and comparing the two shows nothing of them.
 It shows at frequencies above those at which a vehicle moves: the change of an independent velocity is that sensor's
 own noise there and has nothing in common with the accelerometer.
 """

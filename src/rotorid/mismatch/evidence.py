@@ -21,7 +21,7 @@ from rotorid.mismatch.sizes import effect_sizes, scales
 from rotorid.mismatch.words import channel_words
 
 ACTS = 1 / 3
-"""Contribution to a channel, in units of its noise and beside the strongest, from which an effect acts there."""
+"""Contribution to a channel, in units of its noise and relative to the strongest, from which an effect acts there."""
 BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
 """Lengths of the blocks that the bootstrap draws, the first that gives LEAST_BLOCKS: residuals are alike for less."""
 LEAST_BLOCKS = 6
@@ -29,13 +29,13 @@ BOOTSTRAPS = 400
 LEAST_SHARE = 0.01
 """Part of the error that goes on the runs held out below which an effect is only suggested: names that fill a gap left
 by another cause hold less than 0.7 % of what a model explains. All of ten hidden effects that hold less than 1 % are
-plain in some channel (ratio 0.16 to 0.77)."""
+clearly better in some channel (ratio 0.16 to 0.77)."""
 PLAIN_RATIO = 0.9
-"""Error with an effect over that without up to which it is plain in some channel, however small its share of all."""
+"""Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
 WORSE_RATIO = 1.01
 """Error with an effect over that without from which a channel is worse."""
 LEAST_EXCITED = 0.1
-"""Size of a contribution on the runs held out, beside that on the fitted ones, below which they are silent."""
+"""Size of a contribution on the runs held out, relative to that on the fitted ones, below which they are silent."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Evidence:
 
     @property
     def contradiction(self) -> str:
-        """What the runs held out say against it; empty where they bear it out, or say nothing."""
+        """What the runs held out say against it; empty where they confirm it, or say nothing."""
         worse = next((r for r in self.ratios if r.low > WORSE_RATIO), None)
         if rules.WORSE(worse is not None):
             percent = f"{100 * (worse.value - 1):.0f} %"
@@ -82,7 +82,7 @@ class Evidence:
     def undone_by(self, whole: Evidence) -> str:
         """Why a gain says nothing: with all that was found a channel is worse than as believed; empty else.
 
-        An effect may gain only by mending what a wrong value beside it spoils.
+        An effect may gain only by correcting the error of a wrong value.
         """
         worse = {r.channel: r for r in whole.ratios if r.low > WORSE_RATIO}
         own = next((worse[r.channel] for r in self.ratios if r.channel in worse), None)

@@ -20,7 +20,7 @@ NOISE_BAND = (0.5, 0.85)
 MOSTLY_NOISE = 0.3
 """Share of a side's power in the band that must be noise before it says how much noise there is."""
 SHORTEST_ROWS = 32
-LEAST_LOUDER, MOST_LOUDER = 1.2, 10.0
+LEAST_FACTOR, MOST_FACTOR = 1.2, 10.0
 """A sensor with more noise than that was filtered before it was recorded: what is left in the band may be the model's
 own."""
 
@@ -31,7 +31,7 @@ def noise_factors(
     """Sensor (`rotors`, `gyroscope`) to the factors by which its noise in the band exceeds that of the `noisy` copies.
 
     The gyroscope's are of its axes, (3,); of the rotors, which are alike, one, (1,). Sensors without a word here are
-    as loud as assumed, or move too much in the band to tell.
+    as noisy as assumed, or their noise is hidden by motion in the band.
     """
     squares = {"rotors": np.full(3, np.nan), "gyroscope": np.full(3, np.nan)}
     sides = [(_sides(a, vehicle, thinner), _sides(b, vehicle, thinner)) for a, b in zip(segments, noisy, strict=True)]
@@ -49,10 +49,10 @@ def noise_factors(
             found = min(sign * band_power(left, rate_hz, band, own), whole)
             if assumed > 0 and found > MOSTLY_NOISE * power:
                 squares[sensor][c] = found / assumed
-    told = {"gyroscope": squares["gyroscope"], "rotors": squares["rotors"][np.isfinite(squares["rotors"])]}
-    told["rotors"] = np.median(told["rotors"], keepdims=True) if len(told["rotors"]) else np.ones(1)
-    factors = {sensor: np.sqrt(found) for sensor, found in told.items()}
-    plain = {s: np.where((f > LEAST_LOUDER) & (f < MOST_LOUDER), f, 1.0) for s, f in factors.items()}
+    ratios = {"gyroscope": squares["gyroscope"], "rotors": squares["rotors"][np.isfinite(squares["rotors"])]}
+    ratios["rotors"] = np.median(ratios["rotors"], keepdims=True) if len(ratios["rotors"]) else np.ones(1)
+    factors = {sensor: np.sqrt(found) for sensor, found in ratios.items()}
+    plain = {s: np.where((f > LEAST_FACTOR) & (f < MOST_FACTOR), f, 1.0) for s, f in factors.items()}
     return {sensor: factor for sensor, factor in plain.items() if (factor > 1.0).any()}
 
 

@@ -159,7 +159,7 @@ class Analysis:
     without_values: Mapping[tuple[str, ...], tuple[np.ndarray, ...]] = field(default_factory=dict)
     """To the names of a wrong value, and of every two, the same with them as believed."""
     suggested_values: Mapping[str, tuple[tuple[float, float, float, float], str]] = field(default_factory=dict)
-    """Values that the runs held out do not bear out: as in `values`, and why."""
+    """Values that the held-out runs do not confirm: as in `values`, and why."""
     shares: Mapping[str, float] = field(default_factory=dict)
     """To the id of a stated effect the part of the error that goes on the runs held out which goes without it."""
     effect_sizes: Mapping[str, Size] = field(default_factory=dict)
@@ -184,7 +184,7 @@ class Analysis:
     """Wrong value to others, in words, that would explain as much in its place: `yaw inertia −9.8 ± 0.4 %`."""
     fired: Mapping[str, int] = field(default_factory=dict)
     """How often each rule's condition held during the analysis (`rules`)."""
-    put_right: tuple[str, ...] = ()
+    corrected: tuple[str, ...] = ()
     """Values corrected within their trust, in words: `thrust coefficient −0.7 %`."""
     doubts: tuple[Doubt, ...] = ()
     """What `check` doubts in the set, and values that are only proposed."""

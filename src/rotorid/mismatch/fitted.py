@@ -20,7 +20,7 @@ from rotorid.mismatch.decide import coefficients, wrong_values
 from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.gusts import with_gusts
-from rotorid.mismatch.payload_windows import Windows, carried_windows, changes, laden, loads
+from rotorid.mismatch.payload_windows import Windows, changes, loads, payload_windows_of, with_payload_on_board
 from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
@@ -135,7 +135,7 @@ def only_scales(result: SpeedResult) -> bool:
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
     model = with_own_scales(prepared, segments, noisy)
-    if rules.CARRIED(bool(windows := carried_windows(model))):
+    if rules.PAYLOAD_WINDOWS(bool(windows := payload_windows_of(model))):
         segments, noisy, model = with_payload(prepared, model, windows)
     segments, noisy, model = with_swing(prepared, model)
     terms = list(model.terms)
@@ -181,7 +181,7 @@ def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows])
     Each taking up and dropping costs as much as an effect; without a payload in the model everything is as it was.
     """
     segments, noisy = model.segments, model.noisy_segments
-    both = laden(segments, windows), laden(noisy, windows) if noisy else noisy
+    both = with_payload_on_board(segments, windows), with_payload_on_board(noisy, windows) if noisy else noisy
     with_it = with_own_scales(prepared, *both)
     carries = any(t.key in with_it.selection.active for t in loads(with_it))
     filters, price = model.regression.filters, COST_PER_EFFECT * changes(both[0])

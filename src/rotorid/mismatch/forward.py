@@ -167,11 +167,11 @@ def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], 
         turning = replace(motion, rotor_speed=speed, wind=wind)
         force, moment = _wrench_along(slow, [turning] * len(slow), model.vehicle)
         aboard = [
-            replace(turning, carried=model.conditions.present(condition, segment.run, motion.time_s))
+            replace(turning, on_board=model.conditions.present(condition, segment.run, motion.time_s))
             for condition, _, _ in model.loads
         ]
-        carried = _wrench_along([pair for _, *pair in model.loads], aboard, model.vehicle)
-        force, moment = _added(force, carried[0]), _added(moment, carried[1])
+        payload = _wrench_along([pair for _, *pair in model.loads], aboard, model.vehicle)
+        force, moment = _added(force, payload[0]), _added(moment, payload[1])
         inputs.append(Inputs(speed, acceleration, motion.height, motion.voltage, wind, force, moment))
         states.append(_states(segment, model))
     return inputs, states

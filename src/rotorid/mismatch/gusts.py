@@ -43,7 +43,7 @@ RESTLESS_SHARE = 0.5
 LASTING_S = 12.0
 """A wind that changes for longer has no one height: its root mean square is stated."""
 MOST_EXTRAPOLATION = 1.05
-"""Speed in a window, beside the fastest that is fitted, up to which the drag is known."""
+"""Speed in a window, relative to the fastest that is fitted, up to which the drag is known."""
 GUST_P = 1e-6
 BESIDE_A_BURST = 1.0
 """Size, in units of the noise, of a gust that is believed where a stronger one blew: left out, it would be noise to the
@@ -72,7 +72,7 @@ class Gust:
     def height(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean wind from the first to the last knot with half of its strength, and its one-sigma, (2,).
 
-        A gust flutters: how far its mean over so few knots tells its height is in the one-sigma too.
+        A gust flutters: how far its mean over so few knots determines its height is in the one-sigma too.
         """
         strength = np.linalg.norm(self.wind_m_s, axis=1)
         strong = np.flatnonzero(strength >= 0.5 * strength.max())
@@ -131,7 +131,7 @@ def blowing(knots_s: np.ndarray, wind_m_s: np.ndarray, time_s: np.ndarray) -> np
 def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> WrenchModel:
     """The model with the gusts that its residual shows; the same model where there are none.
 
-    Without a drag there is no telling how much wind a force means: a gust is then a force in world axes.
+    Without a drag nothing shows how much wind a force means: a gust is then a force in world axes.
     """
     segments = model.segments
     if "force" not in prepared.groups or any(s.motion.rotation is None for s in segments):
@@ -305,7 +305,7 @@ def gust_of(term: Term, wind: np.ndarray, covariance: np.ndarray) -> Gust:
 
 
 def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
-    """Those beyond chance that are strong, and the weaker ones beside them; nothing where none is strong."""
+    """Those beyond chance that are strong, and with them the weaker ones; nothing where none is strong."""
     sizes = [(g, size_of(g, model)) for g in gusts if g.p_value < GUST_P]
     if max((size for _, size in sizes), default=0.0) <= rules.OVERSHADOWED["times_for_burst"]:
         return []

@@ -74,7 +74,7 @@ def without_values(
 ) -> dict[tuple[str, ...], tuple[np.ndarray, ...]]:
     """To the names of every wrong value, and of every two, the residual (n,) of every trace with them as believed.
 
-    Two that make up for each other (a torque and the inertia that it turns) each look needed beside the other.
+    Two that make up for each other (a torque and the inertia that it turns) each look needed given the other.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The ledger of a verdict: every rule that decided something, on what, with its numbers and its sentence.
 
-It lies beside the verdict (`ledger.json`), for whoever wants to know why an effect is not in the model or a word is not
-stronger than it is.
+It lies next to the verdict (`ledger.json`), for whoever wants to know why an effect is not in the model, or why its
+status is no higher.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def ledger(analysis: Analysis, verdict: Verdict) -> list[dict]:
     for name, (believed, refitted, low, high) in analysis.wrong_values.items():
         numbers = {"believed": believed, "refitted": refitted, "low_95": low, "high_95": high}
         out.append(entry("wrong_value", name, numbers, "the fitted runs contradict what is believed"))
-    out += [entry("within_trust", "values", sentence=text) for text in analysis.put_right]
+    out += [entry("within_trust", "values", sentence=text) for text in analysis.corrected]
     left = {"share_left": verdict.unexplained.share}
     out.append(entry("word_from_numbers", verdict.verdict, left, verdict.unexplained.description))
     out += [entry(name, "search", {"fired": n}, RULES[name].decides) for name, n in sorted(analysis.fired.items())]
@@ -45,8 +45,8 @@ def of_finding(finding: Finding, analysis: Analysis) -> dict:
     if finding.id not in analysis.without:
         return entry("mistakes_first", finding.id, numbers, finding.sentence)
     if finding.status == "ambiguous":
-        return entry("class", finding.id, numbers, f"these data cannot tell {', '.join(finding.alternatives)} apart")
-    return entry("established", finding.id, numbers, "it passed every rule, and the runs held out bear it out")
+        return entry("class", finding.id, numbers, f"these data cannot distinguish {', '.join(finding.alternatives)}")
+    return entry("established", finding.id, numbers, "it passed every rule and is confirmed on the held-out runs")
 
 
 def entry(rule: str, on: str, numbers: dict | None = None, sentence: str = "") -> dict:

@@ -12,12 +12,12 @@ from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, left_b
 from rotorid.mismatch.rows import CHANNELS
 from rotorid.mismatch.slow_changes import slow_excess
 from rotorid.mismatch.unknowns import DEPENDS_ON, UNKNOWNS
-from rotorid.mismatch.wrench import WORTH_TELLING, channel_floor
+from rotorid.mismatch.wrench import WORTH_STATING, channel_floor
 
 MOST_BY_VALUES = 0.8
 """Share up to which mismatch that some believed value would explain counts as left over: its kind is known."""
 UNCLAIMED = 3.0
-"""Energy beside the noise's from which what only free values explain speaks by itself, without any claim beside it."""
+"""Energy relative to the noise's from which what only free values explain counts by itself, without any claim."""
 LEAST_NOISE = 0.1
 """Share of what a flexible regression leaves that is noise, whatever else moves in it."""
 
@@ -124,7 +124,7 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
     gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
     weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
     runs = [r.run for r in model.rows]
-    least_noise = WORTH_TELLING * channel_floor(segments, prepared.vehicle)
+    least_noise = WORTH_STATING * channel_floor(segments, prepared.vehicle)
     out = []
     for c, name in enumerate(CHANNELS[:6]):
         if name not in p_after:
@@ -145,7 +145,7 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
         # The runs held out may be like each other: all runs are judged by their means.
         shifted = 0.0 if between is None else count * between.mean_square(runs, [len(x) for x in left])
         moving = count * slow[name][0] ** 2 if name in slow else 0.0
-        told = energy if delivered is None else _energy(delivered[i][:, c] for i in judged)
+        delivered_energy = energy if delivered is None else _energy(delivered[i][:, c] for i in judged)
         # What moves slowly, or between runs, is no noise: shares are of what the named effects could have explained.
         noise = max(flexible - moving - shifted, LEAST_NOISE * flexible, 1e-300)
         out.append(
@@ -159,7 +159,7 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
                 slow=moving,
                 between=between,
                 shifted=shifted,
-                by_values=kept_by_values(told, energy + outside, flexible, least),
+                by_values=kept_by_values(delivered_energy, energy + outside, flexible, least),
             )
         )
     return out

@@ -4,7 +4,7 @@ Three sources, in this order of trust:
 
 1. Findings that state their own windows (a gust, a sensor that drops out) are taken as they are; on their channels
    nothing else is listed that findings explain.
-2. What a finding adds to a channel carries almost no noise. An interval is where its local size matters beside
+2. What a finding adds to a channel carries almost no noise. An interval is where its local size matters relative to
    the channel's noise; it is kept if the energy of the residual `before` is above what the coloured noise of
    `after` allows. Findings at work for most of the flight are listed only where nothing is confined in time:
    their place is a regime, not a time.
@@ -43,7 +43,7 @@ SCAN_ERROR = 1e-4
 LOCAL_S = 0.1
 """Length over which the local size of an explained mismatch is taken."""
 MATTERS = 0.3
-"""Local size beside the channel's noise from which an explained mismatch matters at all."""
+"""Local size relative to the channel's noise from which an explained mismatch matters at all."""
 ON_SHARE_OF_PEAK = 0.2
 ON_SHARE_OF_NOISE = 0.15
 LOST_AT_ENDS_S = 1.0
@@ -58,9 +58,9 @@ THROUGHOUT = 0.7
 CONFINED = 0.4
 """Being at work for less than this share of the flight counts as acting in part of it."""
 AT_WORK = 0.03
-"""Local size beside its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
+"""Local size relative to its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
 SCAN_S = (0.5, 1.0, 2.0, 4.0)
-LOUDER = 4.0
+LARGER = 4.0
 """Energy of a window over the usual, below which noise of higher variance is not called a mismatch."""
 MOVES_S = 0.2
 """Lags over which larger residuals may follow each other."""
@@ -72,7 +72,7 @@ MOVES_Z = 4.0
 WILD = 4.0
 """Whitened residual beyond which a single sample counts no more."""
 SHIFTED = 0.4
-"""Mean of a window beside the residual's usual size, below which a shift does not matter."""
+"""Mean of a window relative to the residual's usual size, below which a shift does not matter."""
 HELD_BACK = 3.0
 """Energy of a block over the noise expected there, beyond which it does not count as noise in full."""
 REGIME_BLOCK_S = 0.5
@@ -256,7 +256,7 @@ def _share_at_work(contributions: Mapping[str, tuple[Sequence[Trace], Sequence[n
 
 
 def _acting(traces: Sequence[Trace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
-    """Masks of where a contribution to a channel matters beside its noise; None where it never does."""
+    """Masks of where a contribution to a channel matters relative to its noise; None where it never does."""
     noise = channel_noise(traces)
     levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
     peak = float(np.quantile(np.concatenate(levels), 0.99))
@@ -440,7 +440,7 @@ def _louder(traces, white, limit) -> list[Interval]:
         degrees = max(min(2 * (usual / spread) ** 2, float(length)), 1.0)
         for k, mean in enumerate(means):
             p = chi2.sf(degrees * mean / usual, degrees)
-            for j in np.flatnonzero((p < limit) & (mean > LOUDER * usual)):
+            for j in np.flatnonzero((p < limit) & (mean > LARGER * usual)):
                 start = _window_starts(len(white[k]), length)[j]
                 flagged[k][start : start + length] = True
                 lowest[k] = min(lowest[k], float(p[j]))
@@ -449,8 +449,8 @@ def _louder(traces, white, limit) -> list[Interval]:
         for start, stop in _spans(mask):
             reach = int(round(1.0 / _period(trace)))
             a, b = max(start - reach, 0), min(stop + reach, len(w))
-            loud = max(float(np.mean(w[start:stop] ** 2)), 1.2)
-            likelihood = -0.5 * np.log(loud) + 0.5 * w[a:b] ** 2 * (1.0 - 1.0 / loud)
+            variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
+            likelihood = -0.5 * np.log(variance) + 0.5 * w[a:b] ** 2 * (1.0 - 1.0 / variance)
             first, last = _best_segment(likelihood)
             if _moves(w[a + first : a + last], w, int(MOVES_S / _period(trace))):
                 out.append(Interval(trace, a + first, a + last, p, False))

@@ -43,7 +43,7 @@ def next_flight(findings: Sequence[Finding], recordings: RecordingSet, found: Fi
 
 
 def beyond_flying(found: Fitted, ids: Sequence[str]) -> str:
-    """What it takes to tell a class apart that no flight with the columns of its set can; empty where one may."""
+    """What it takes to settle a class that no flight with the columns of its set can settle; empty where one may."""
     if not (found.commanded and set(CURVES) <= set(ids)):
         return ""
     throttle, thrust = speeds_in_hover(found)

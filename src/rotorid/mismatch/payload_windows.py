@@ -1,7 +1,7 @@
 """When a payload is on board, where it is picked up or dropped in flight.
 
 Added mass is seen in every half second by itself: by it the thrust exceeds what the accelerometer accounts for, and
-beside the centre it turns the vehicle. Where these loads are two plateaus with a sudden change between them in the
+off the centre it turns the vehicle. Where these loads are two plateaus with a sudden change between them in the
 midst of a run, the higher one is a payload on board for so long. What drifts is none (a battery, ice), and what
 differs between whole runs alone may be anything (other propellers, denser air). As for a gust, the instants are found
 in held-out runs too; what is on board is learnt from the others.
@@ -38,7 +38,7 @@ Windows = tuple[tuple[float, float], ...]
 """(start_s, stop_s) of what is on board in a stretch, without end where it is on board from or to its end."""
 
 
-def carried_windows(model: WrenchModel) -> list[Windows]:
+def payload_windows_of(model: WrenchModel) -> list[Windows]:
     """When a payload seems to be on board in every stretch; empty where none is picked up or dropped in one's midst."""
     if not loads(model) or not np.isfinite(model.rows[0].y[:, SEEN_IN[0][0]]).all():
         return []
@@ -122,7 +122,7 @@ def slow_variance(parts: Sequence[np.ndarray]) -> float:
 
 
 def cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
-    """States (blocks,) of least squares beside two plateaus (2, k), each change at SWITCH_COST (Viterbi)."""
+    """States (blocks,) of least squares from two plateaus (2, k), each change at SWITCH_COST (Viterbi)."""
     costs = ((loads[:, None, :] - plateaus[None]) ** 2).sum(axis=2)
     total, came = np.zeros(2), np.zeros((len(costs), 2), int)
     for i, cost in enumerate(costs):
@@ -152,27 +152,27 @@ def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: i
     return edges
 
 
-def laden(segments: Sequence[Segment], windows: Sequence[Windows]) -> list[Segment]:
+def with_payload_on_board(segments: Sequence[Segment], windows: Sequence[Windows]) -> list[Segment]:
     """Segments that say when a payload is on board, from the windows of each."""
     out = []
     for s, own in zip(segments, windows, strict=True):
         aboard = np.zeros(s.motion.size)
         for start, stop in own:
             aboard[(s.motion.time_s >= start) & (s.motion.time_s < stop)] = 1.0
-        out.append(replace(s, motion=replace(s.motion, carried=aboard)))
+        out.append(replace(s, motion=replace(s.motion, on_board=aboard)))
     return out
 
 
 def changes(segments: Sequence[Segment]) -> int:
     """How often a payload is picked up or dropped inside a segment."""
-    return sum(int(np.abs(np.diff(s.motion.carried)).sum()) for s in segments)
+    return sum(int(np.abs(np.diff(s.motion.on_board)).sum()) for s in segments)
 
 
 def on_board(segments: Sequence[Segment]) -> tuple[tuple[str, float, float], ...]:
     """(run, start_s, stop_s) of a payload as segments say it; empty where they say nothing (on board throughout)."""
     found = []
     for s in segments:
-        if s.motion.carried is not None:
-            for start, stop in stretches(s.motion.carried > 0.5):
+        if s.motion.on_board is not None:
+            for start, stop in stretches(s.motion.on_board > 0.5):
                 found.append((s.run, float(s.motion.time_s[start]), float(s.motion.time_s[stop - 1])))
     return tuple(found)

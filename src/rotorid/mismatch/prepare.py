@@ -332,7 +332,7 @@ def with_predictions(
     `reading` is what the accelerometer's own errors multiply (the model where None): without a second source a
     scale error of readings that an effect makes would be that effect's exact copy.
 
-    The measured ones are the response itself: a column s·a beside a response m·a fits anything perfectly, and
+    The measured ones are the response itself: a column s·a with a response m·a fits anything perfectly, and
     the noise of a differentiated body rate would bias every coefficient that multiplies it.
     """
     motion, changed = segment.motion, {}

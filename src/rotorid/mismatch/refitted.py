@@ -24,7 +24,7 @@ def refitted(model: WrenchModel) -> tuple[Fit, Values]:
 def values_alone(model: WrenchModel) -> Values:
     """The believed values that the recordings contradict where no effect is at work.
 
-    Beside a wind no value is called wrong: it acts through the drag.
+    Given a wind no value is called wrong: it acts through the drag.
     """
     if model.wind is not None:
         return {}

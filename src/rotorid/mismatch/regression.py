@@ -760,8 +760,8 @@ def spread_of(scores: np.ndarray, runs: np.ndarray, memory: int) -> np.ndarray:
 
 
 def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
-    """A covariance that is in no direction smaller than the plain one."""
-    # Coefficients differ by many powers of ten (kg m2 beside relative changes): compare in units of their own.
+    """A covariance that is in no direction smaller than the classical one."""
+    # Coefficients differ by many powers of ten (kg m2 and relative changes): compare in units of their own.
     unit = np.sqrt(np.maximum(np.diag(plain), 0.0))
     scale = np.where(unit > 0, 1.0 / np.where(unit > 0, unit, 1.0), 0.0)
     values, vectors = np.linalg.eigh((plain + plain.T) / 2 * np.outer(scale, scale))
@@ -793,8 +793,8 @@ def full_fit_residuals(
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """Residuals (n, 12) of every term fitted at once, channels weighted by their own spread (two rounds).
 
-    `colours` are whitening filters of channels whose columns are plain only through them: weighed evenly over all
-    frequencies, their noise would be fitted and what they explain be left, to be taken for the channel's own noise.
+    `colours` are whitening filters of channels whose columns exceed the noise only through them: weighed evenly over
+    all frequencies, their noise would be fitted and what they explain be left, to be taken for the channel's own noise.
     """
     colours = colours or {}
     channels = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
@@ -826,14 +826,14 @@ def build(
     block_s: float,
     rate_hz: float,
     noisy: list[Rows] | None = None,
-    told_by: Collection[int] = (),
+    estimated_by: Collection[int] = (),
     apart: Iterable[str] = (),
     by_channel: bool = False,
 ) -> Regression:
     """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
 
     `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap. The channels
-    `told_by` alone estimate the terms `apart` (`Apart`). `by_channel` keeps the products channel by channel, too.
+    `estimated_by` alone estimate the terms `apart` (`Apart`). `by_channel` keeps the products channel by channel, too.
     """
     start, at = {}, 0
     for term in terms:
@@ -862,7 +862,7 @@ def build(
             used = np.flatnonzero(x.any(axis=0) | (False if again is None else again[1].any(axis=0)))
             x, grid = x[:, used], np.ix_(used, used)
             # Of the columns used those that this channel estimates apart: where they stand among them, and in `own`.
-            ours = np.flatnonzero(np.isin(used, own)) if channel in told_by else np.zeros(0, int)
+            ours = np.flatnonzero(np.isin(used, own)) if channel in estimated_by else np.zeros(0, int)
             ours_at = np.searchsorted(own, used[ours])
             ours_grid = np.ix_(ours_at, used)
             if again is not None:
@@ -903,7 +903,7 @@ def build(
         names,
         block_s=per_block / rate_hz,
         blocks_of_rows=tuple(blocks_of_rows),
-        apart=Apart(own, own_gram, own_cross, own_bias, own_bias_cross, np.array(sorted(told_by), int))
+        apart=Apart(own, own_gram, own_cross, own_bias, own_bias_cross, np.array(sorted(estimated_by), int))
         if len(own)
         else None,
         by_channel=kept,

@@ -15,7 +15,7 @@ from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.gusts import with_gusts_of_new_runs
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.payload_windows import carried_windows, laden
+from rotorid.mismatch.payload_windows import payload_windows_of, with_payload_on_board
 from rotorid.mismatch.prepare import assemble_rows, prepare_like
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import RUN_SCALE, Rows, Term
@@ -46,7 +46,7 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
     pairs = [(s, n) for s, n in zip(own, noisy or own, strict=True) if comparable(s, model)]
     own = as_flown([s for s, _ in pairs], found)
     noisy = as_flown([n for _, n in pairs], found) if noisy else []
-    if model.segments and model.segments[0].motion.carried is not None:
+    if model.segments and model.segments[0].motion.on_board is not None:
         own, noisy = carrying(model, own, noisy)
     if model.segments and model.segments[0].motion.hung is not None:
         own = hung(model, own, rows_of(model, own), swinging_term(model)) or own
@@ -96,10 +96,10 @@ def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:
 def carrying(model: WrenchModel, segments: list[Segment], noisy: list[Segment]):
     """Stretches that say when a payload is on board, found in their own loads."""
     every = [*model.segments, *segments]
-    rows = rows_of(model, laden(every, [((-np.inf, np.inf),)] * len(every)))
-    windows = carried_windows(replace(model, rows=rows))[len(model.segments) :]
+    rows = rows_of(model, with_payload_on_board(every, [((-np.inf, np.inf),)] * len(every)))
+    windows = payload_windows_of(replace(model, rows=rows))[len(model.segments) :]
     windows = windows or [()] * len(segments)
-    return laden(segments, windows), laden(noisy, windows) if noisy else noisy
+    return with_payload_on_board(segments, windows), with_payload_on_board(noisy, windows) if noisy else noisy
 
 
 def rows_of(model: WrenchModel, segments: list[Segment]) -> list[Rows]:

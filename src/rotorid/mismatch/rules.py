@@ -94,60 +94,61 @@ def asking(off: Iterable[str] = ()) -> Iterator[Asked]:
 
 SIZE = rule(
     "size",
-    "An effect whose strongest tenth of the seconds is small beside the channel's noise does not matter.",
+    "An effect is not kept if its strongest tenth of the seconds is small compared with the channel's noise.",
     least=(0.15, "an effect of a seventh of the noise changes the error by one percent"),
 )
 OVERSHADOWED = rule(
     "overshadowed",
-    "A contribution counts only in channels where no other effect is far larger: no form is known better than that.",
+    "A contribution counts only in channels without a far larger effect, whose form would not be exact enough.",
     share=(0.04, "forms of the catalogue and blade-element rotors differ by 2 to 4 %"),
-    share_of_burst=(0.15, "what a strong effect's form leaves over comes in bursts, too"),
-    times_for_burst=(3.0, "of hundreds of windows the loudest is three times as loud as usual by chance"),
+    share_of_burst=(0.15, "the error of a strong effect's form comes in bursts, too"),
+    times_for_burst=(3.0, "of hundreds of windows the largest is by chance three times as large as usual"),
 )
 BOUNDS = rule(
-    "bounds", "Coefficients lie within the bounds of their form, or outside by less than 1.5 of their errors."
+    "bounds", "Coefficients lie within the bounds of their form, or outside by less than 1.5 standard errors."
 )
 MUST_SHOW = rule(
-    "must_show", "A form's parameters without which it is another form are two standard errors from nothing."
+    "must_show",
+    "The parameters that distinguish a form from another one differ from zero by two standard errors.",
 )
-NEGLIGIBLE = rule("negligible", "Some parameter is larger than what the effect's file calls negligible.")
+NEGLIGIBLE = rule("negligible", "At least one parameter is larger than the effect's file calls negligible.")
 OWN_PART = rule(
     "own_part",
-    "A contribution is neither taken over by the other terms all but a form's error, nor mostly its regressors' noise.",
+    "A contribution is neither collinear with other terms up to a form's error, nor mostly noise of its regressors.",
 )
 STRAIN = rule(
     "strain",
-    "A term does not push a believed value that the model without it leaves near its belief.",
+    "A term does not push a believed value far beyond its trust that stays near its belief without the term.",
     deviations=(4.0, "standard deviations of trust: beyond, the user's number would have to be a mistake"),
 )
 TRANSFER = rule(
     "transfer",
-    "A term keeps what it promises on environments that it was not fitted on.",
-    share=(0.6, "effects at work kept 0.88 to 1.18 of it, names that fill a gap 0.3 to 0.55"),
-    won=(0.7, "beside the share of environments expected of its strength: effects at work gained in 0.88 to 1.00"),
-    promise=(25.0, "whitened squares: less may fail by chance"),
+    "The gain that a term predicts is realised on environments to which it was not fitted.",
+    share=(0.6, "effects at work realised 0.88 to 1.18 of it, terms that fit unmodelled residual 0.3 to 0.55"),
+    won=(0.7, "times the share of environments expected of its strength: effects at work gained in 0.88 to 1.00"),
+    promise=(25.0, "whitened squares: a smaller predicted gain may fail by chance"),
 )
 STEADY = rule(
     "steady",
     "A coefficient of a flight is the same in every run.",
-    p_value=(1e-6, "some fifty terms in some ten runs are looked at"),
-    spread=(0.4, "share of itself: forms that are nearly right vary by less between manoeuvres"),
+    p_value=(1e-6, "some fifty terms in some ten runs are tested"),
+    spread=(0.4, "share of itself: coefficients of slightly wrong forms vary by less between manoeuvres"),
 )
 CANCELS = rule(
     "cancels",
     "A term is not cancelled by another in its strongest channel.",
-    share=(0.1, "what is left of either: noise in another channel, magnified, is bought with a pair that cancels"),
+    share=(0.1, "what remains of either: such a pair fits amplified noise of another channel"),
 )
 
 # Moves of the search
 
 SIMPLER = rule("simpler", "A model with one id less and other forms of the rest is taken where it explains as much.")
-EXCHANGE = rule("exchange", "An id gives way to another that explains more in its place.")
+EXCHANGE = rule("exchange", "An id is replaced by another that explains more in its place.")
 VALUES_FIRST = rule(
-    "values_first", "Believed values alone are taken where with more room they explain as much as effects."
+    "values_first", "Believed values alone are taken where with wider priors they explain as much as effects."
 )
-FREE_VALUES = rule("free_values", "An effect is significant beside believed values that are free.")
-COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters where no plainer one is left to.")
+FREE_VALUES = rule("free_values", "An effect is significant given believed values that are free.")
+COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters only where no simpler one is left to.")
 
 # Classes
 
@@ -156,23 +157,24 @@ THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a
 
 # Believed values
 
-VALUE_AGREES = rule("value_agrees", "A wrong value shows with either side of the balance as the regressor.")
-VALUE_TRANSFER = rule("value_transfer", "A wrong value keeps what it promises where it was not fitted.")
+VALUE_AGREES = rule("value_agrees", "A wrong value is found by the forward and by the inverse regression.")
+VALUE_TRANSFER = rule("value_transfer", "The gain that a wrong value predicts is realised where it was not fitted.")
 VALUE_IN_QUESTION = rule(
     "value_in_question", "A value that a member of an open class would change is not called wrong."
 )
-SETTLED = rule("settled", "Values not called wrong move within their trust where that pays on runs that were left out.")
+SETTLED = rule("settled", "Values not called wrong move within their trust where the error on left-out runs falls.")
 
 # Flights
 
 OWN_SCALES = rule("own_scales", "Where thrust differs between runs each run has its own scale.")
-CARRIED = rule("carried", "A load of two plateaus is a payload on board for so long.")
+PAYLOAD_WINDOWS = rule("payload_windows", "A load with two plateaus is a payload that is on board for a part of a run.")
 MERE_SCALE = rule(
     "mere_scale",
-    "Without measured rotor speeds a throttle curve of which the slope alone is sure is a thrust coefficient.",
+    "Without measured rotor speeds a throttle curve is a thrust coefficient if only its slope is significant.",
 )
 CLOSED_LOOP_BIAS = rule(
-    "closed_loop_bias", "A delay no later than a loop that answers the gyroscope's noise makes it look is none."
+    "closed_loop_bias",
+    "A delay is not stated if a controller that answers the gyroscope's noise would make commands look as late.",
 )
 COLOURED_NOISE = rule(
     "coloured_noise", "Noise of speeds and gyroscope in the band analysed may be more than its white part."
@@ -180,30 +182,38 @@ COLOURED_NOISE = rule(
 
 # Stands and benches
 
-APPROXIMATE = rule("approximate", "An effect is still needed where a stronger one's gain may vary smoothly.")
-NEEDLESS_VALUE = rule("needless_value", "A wrong value is still needed where an effect's form is free or richer.")
-CURVED_GAIN = rule("curved_gain", "A gain beside a curved characteristic is wrong at small loads and over all of them.")
+APPROXIMATE = rule("approximate", "An effect is still significant where a stronger one's gain may vary smoothly.")
+NEEDLESS_VALUE = rule(
+    "needless_value", "A wrong value is still significant where an effect's form is free or has more parameters."
+)
+CURVED_GAIN = rule(
+    "curved_gain", "A gain given a curved characteristic is wrong at small loads and over all loads together."
+)
 ELSEWHERE = rule(
     "elsewhere",
-    "Another effect that does far worse on runs that were left out is no alternative.",
-    squares=(12.0, "whitened squares: an id's price and half"),
+    "Another effect that predicts left-out runs far worse is no alternative.",
+    squares=(12.0, "whitened squares: one and a half times an id's cost"),
 )
-PLAINER_FORM = rule("plainer_form", "A form of which every number may be nothing gives way to one of fewer parameters.")
+PLAINER_FORM = rule("plainer_form", "A form without a significant parameter is replaced by a form of fewer parameters.")
 ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading are curves of one load.")
 
-# Words
+# Statuses
 
-WORSE = rule("worse_on_report_runs", "A channel that is worse with an effect on the report runs leaves it suggested.")
+WORSE = rule("worse_on_report_runs", "An effect with which a channel is worse on the held-out runs is suggested.")
 NOT_BETTER = rule(
-    "not_better_on_report_runs", "Without a channel that is surely better on the report runs it is suggested."
+    "not_better_on_report_runs",
+    "An effect with which no channel is significantly better on held-out runs is suggested.",
 )
-BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than what the model leaves over is suggested.")
-SLIGHT = rule("slight", "An effect that carries next to nothing of the error and is plain in no channel is suggested.")
-MAY_BE_NOTHING = rule("may_be_nothing", "An effect of which every number may be nothing is suggested.")
+BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than the unmodelled residual is suggested.")
+SLIGHT = rule(
+    "slight",
+    "An effect with next to no share of the explained error and no large gain in any channel is suggested.",
+)
+MAY_BE_NOTHING = rule("may_be_nothing", "An effect without a significant parameter is suggested.")
 
 
 def markdown() -> str:
-    """The rules as a table, for docs/mismatch.md."""
+    """The rules as a table, for docs/decision-reference.md."""
     lines = ["| rule | decides | limits |", "| --- | --- | --- |"]
     for one in RULES.values():
         limits = "; ".join(f"`{name}` {limit.value:g}: {limit.why}" for name, limit in one.limits.items())

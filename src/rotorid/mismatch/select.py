@@ -31,7 +31,7 @@ COST_OF_UNKNOWN = 40.0
 """Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
 SHARE_OF_UNKNOWN = 0.1
 ALTERNATIVE_P = 0.01
-"""A term that beside an alternative is less significant than this could be that alternative instead."""
+"""A term that given an alternative is less significant than this could be that alternative instead."""
 INSTEAD_P = 1e-3
 """It must itself be as significant as this in the other's place."""
 MOST_EXTRA_PARAMETERS = 3
@@ -50,7 +50,7 @@ NEAR_LIMIT = 0.98
 
 @dataclass(frozen=True)
 class Candidate:
-    """A term judged beside the present model."""
+    """A term judged given the present model."""
 
     key: str
     beta: np.ndarray
@@ -217,7 +217,7 @@ class Search:
     def simpler(self, active: list[str]) -> list[str] | None:
         """A model with one id less and other forms of those that stay, if it explains nearly as much.
 
-        Drag and inflow at the hubs, for example, are the same as at the centre of mass with a damping beside them.
+        Drag and inflow at the hubs, for example, are the same as at the centre of mass with a damping in addition.
         """
         if len(active) < 2 or not rules.SIMPLER.on:
             return None
@@ -246,7 +246,7 @@ class Search:
         return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
-        """A model with one id in another's place, if it is plainly worth more: the first to enter may be an imitation.
+        """A model with one id in another's place, if it explains clearly more: the first to enter may be wrong.
 
         The newcomer must hold by itself: what it displaces is not looked at again, and would be lost with it.
         """
@@ -291,7 +291,7 @@ class Search:
         return wide if rules.VALUES_FIRST(enough) else None
 
     def beside(self, active: list[str]) -> Fit | None:
-        """The model with the strongest effect beside it that explains more than it costs and is still not stated.
+        """The model with the strongest further effect that explains more than it costs and is still not stated.
 
         It may be too small, too unsure or too much like the others; as long as it may be there, what is stated may be
         off by what it would change.
@@ -303,12 +303,12 @@ class Search:
         return all(self.judge(key, active, self.without(key, active)).physical for key in active)
 
     def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
-        """Why a term of the model does not hold beside the others (None where it does), and its score."""
+        """Why a term of the model does not hold given the others (None where it does), and its score."""
         judged = self.judge(key, active, self.without(key, active))
         size = self.weight(key, judged.beta, active)
         reason = None
         if judged.p_value > KEEP_P:
-            reason = Reason("significance", f"p = {judged.p_value:.2g} beside the others")
+            reason = Reason("significance", f"p = {judged.p_value:.2g} given the others")
         elif not judged.physical:
             reason = Reason("physical_bounds", "its coefficients are outside physical bounds")
         elif rules.SIZE(size < SMALLEST_SIZE):
@@ -406,7 +406,7 @@ class Search:
         if rules.CANCELS((cancelling := self.cancelling(active)) is not None):
             return cancelling, Reason("cancels", "where it is strongest it only cancels another")
         if rules.FREE_VALUES((imitating := self.imitates_values(active)) is not None):
-            return imitating, Reason("free_values", "beside believed values that are free it is not significant")
+            return imitating, Reason("free_values", "given believed values that are free it is not significant")
         return None
 
     def imitates_values(self, active: list[str]) -> str | None:
@@ -500,12 +500,12 @@ class Search:
                 continue
             if term.effect in found or term.effect in UNKNOWNS:
                 continue
-            if self._stands_in(term.key, own, rest, base):
+            if self._replaces(term.key, own, rest, base):
                 found.append(term.effect)
         return found
 
-    def _stands_in(self, other: str, own: Candidate, rest: list[str], base: Fit) -> bool:
-        """Whether beside another term alone one of the model is no longer needed."""
+    def _replaces(self, other: str, own: Candidate, rest: list[str], base: Fit) -> bool:
+        """Whether given another term alone one of the model is no longer needed."""
         instead = self.judge(other, rest, base)
         if not instead.physical or instead.p_value > INSTEAD_P or instead.gain < 0.5 * own.gain:
             return False

@@ -80,27 +80,27 @@ def first_words(text: str, most: int = MOST_WORDS) -> str:
     return f"{short}." if text.endswith(".") else short
 
 
-def headline(told: Contents) -> str:
+def headline(contents: Contents) -> str:
     """What a pilot reads in at most MOST_WORDS words: where and how much, what was left out, how much better."""
-    analysis = told.analysis
-    if told.word == "not_judged":
+    analysis = contents.analysis
+    if contents.word == "not_judged":
         first = next(d for d in analysis.doubts if d.stops)
         return first_words(f"Not judged. {first.sentence}")
-    if told.word == "no_mismatch":
-        return _agreement(analysis, told.channels)
+    if contents.word == "no_mismatch":
+        return _agreement(analysis, contents.channels)
     stated = with_status(analysis, *CLAIMED)
     if stated and all(_concerns_the_recording(f) for f in stated) and not analysis.wrong_values:
-        rest = "" if told.word == "explained" else f" {_rest(told)}"
-        return first_words(f"{_put_right(stated)}{rest}")
-    main = main_channel(analysis, told.locations, told.channels)
-    places = _places(main, told.locations, told.channels, analysis)
-    causes = _causes(told)
+        rest = "" if contents.word == "explained" else f" {_rest(contents)}"
+        return first_words(f"{_corrected_mistakes(stated)}{rest}")
+    main = main_channel(analysis, contents.locations, contents.channels)
+    places = _places(main, contents.locations, contents.channels, analysis)
+    causes = _causes(contents)
     if not causes:
-        texts = [capital(f"{where}; {_rest(told)}") for where in places]
+        texts = [capital(f"{where}; {_rest(contents)}") for where in places]
         return next((text for text in texts if len(text.split()) <= MOST_WORDS), first_words(texts[-1]))
-    better = _better_in_short(main, told.channels)
-    rest = "" if told.word == "explained" else f"; {unexplained_words(told.left)}"
-    still, short = _still_off(told, main), _still_off(told, main, metres=False)
+    better = _better_in_short(main, contents.channels)
+    rest = "" if contents.word == "explained" else f"; {unexplained_words(contents.left)}"
+    still, short = _still_off(contents, main), _still_off(contents, main, metres=False)
     surely, where, in_metres, off, off_in_metres, plain = places
     for parts in (
         (surely, causes, better, rest, still),
@@ -132,47 +132,47 @@ def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) ->
     return None if before is None else channel_size(analysis, main, before, "before")
 
 
-def _still_off(told: Contents, main: str, metres: bool = True) -> str:
+def _still_off(contents: Contents, main: str, metres: bool = True) -> str:
     """The channel that stays off most with what was found, as a clause, with or without the metres that it leads off.
 
     Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
     """
-    known = scales(told.analysis)
+    known = scales(contents.analysis)
     left = {}
-    for channel, own in told.channels.items():
+    for channel, own in contents.channels.items():
         after = quoted(own).after
         if channel in known and after is not None:
             left[channel] = math.sqrt(max(after**2 - (own.noise_floor or 0.0) ** 2, 0.0))
     most = max(left, key=lambda c: left[c] / known[c].value, default=None)
     if most in (None, main) or left[most] < WORTH_A_WORD * known[most].value:
         return ""
-    size = channel_size(told.analysis, most, left[most], "after")
-    off = f"{number(left[most])} {told.channels[most].unit}"
+    size = channel_size(contents.analysis, most, left[most], "after")
+    off = f"{number(left[most])} {contents.channels[most].unit}"
     return f"; the {channel_words(most)} stays {off} off ({size_words(size, 'both' if metres else 'share')})"
 
 
-def details(told: Contents) -> list[str]:
+def details(contents: Contents) -> list[str]:
     """What the sentence has no room for: each effect with its numbers and share, values, what is left, what is run
     forward."""
-    analysis, out = told.analysis, []
-    for finding in by_share(with_status(analysis, "established"), told.shares):
-        out.append(_left_out(finding, told.shares.get(finding.id)))
-    out += [_either(f, analysis) for f in by_share(one_per_class(with_status(analysis, "ambiguous")), told.shares)]
+    analysis, out = contents.analysis, []
+    for finding in by_share(with_status(analysis, "established"), contents.shares):
+        out.append(_left_out(finding, contents.shares.get(finding.id)))
+    out += [_either(f, analysis) for f in by_share(one_per_class(with_status(analysis, "ambiguous")), contents.shares)]
     out += [_wrong(name, values, analysis.instead.get(name, ())) for name, values in analysis.values.items()]
-    if told.word != "no_mismatch" and (with_status(analysis, *CLAIMED) or analysis.wrong_values):
-        main = main_channel(analysis, told.locations, told.channels)
-        out.append(_better(main, told.channels, analysis.put_right))
-    for finding in by_share(with_status(analysis, "suggested"), told.shares):
+    if contents.word != "no_mismatch" and (with_status(analysis, *CLAIMED) or analysis.wrong_values):
+        main = main_channel(analysis, contents.locations, contents.channels)
+        out.append(_better(main, contents.channels, analysis.corrected))
+    for finding in by_share(with_status(analysis, "suggested"), contents.shares):
         name, numbers = capital(effect_words(finding.id)), _parameters(finding)
         out.append(f"{name} is suggested{f' ({numbers})' if numbers else ''}, not established: {finding.objection}.")
     for name, (values, why) in analysis.suggested_values.items():
         out.append(_wrong(name, values, why=why))
-    if told.word in ("partly_explained", "unexplained"):
+    if contents.word in ("partly_explained", "unexplained"):
         out.append(
-            capital(_rest(told))
+            capital(_rest(contents))
             + (f" {capital(analysis.unexplained_description)}." if analysis.unexplained_description else "")
         )
-    out += [_not_found(analysis.absent), *_run_forward(told.forward)]
+    out += [_not_found(analysis.absent), *_run_forward(contents.forward)]
     return [text for text in out if text]
 
 
@@ -188,12 +188,12 @@ def _not_found(limits: Sequence[UpperLimit]) -> str:
     return f"Not found: {listed(named)}."
 
 
-def _causes(told: Contents) -> str:
+def _causes(contents: Contents) -> str:
     """Effects and values that carry nine tenths of the error, in a clause."""
-    analysis = told.analysis
+    analysis = contents.analysis
     stated = [f for f in one_per_class(with_status(analysis, *CLAIMED)) if not _concerns_the_recording(f)]
     names = []
-    for finding in carrying(stated, told.shares):
+    for finding in carrying(stated, contents.shares):
         either = dict.fromkeys((finding.id, *(finding.alternatives if finding.status == "ambiguous" else ())))
         names.append(listed([effect_words(i) for i in either], "or"))
     clauses = []
@@ -211,7 +211,7 @@ def _causes(told: Contents) -> str:
     return listed(clauses)
 
 
-def _put_right(stated: Sequence[Finding]) -> str:
+def _corrected_mistakes(stated: Sequence[Finding]) -> str:
     """Faults of the recording, corrected before any physics was looked at."""
     texts = [capital(f.sentence.rstrip(".")) for f in stated]
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
@@ -361,7 +361,7 @@ def _parameters(finding: Finding) -> str:
 
 
 def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
-    """The parameters that are furthest from zero beside their intervals, in their order."""
+    """The parameters that are furthest from zero relative to their intervals, in their order."""
 
     def beyond(e: Estimate) -> float:
         width = e.high - e.low
@@ -385,14 +385,14 @@ def _left_out(finding: Finding, share: float | None) -> str:
 def _either(finding: Finding, analysis: Analysis) -> str:
     names = [effect_words(i) for i in dict.fromkeys((finding.id, *finding.alternatives))]
     text = f"{capital('either ' if len(names) > 1 else '')}{listed(names, 'or')} was left out"
-    text += "; this recording cannot tell which" if len(names) > 1 else "; this recording cannot settle it"
+    text += "; this recording cannot show which" if len(names) > 1 else "; this recording cannot settle it"
     # The next experiment is made for one class; it need not help with another.
     helps = analysis.next_manoeuvre and (not analysis.next_separates or finding.id in analysis.next_separates)
     return f"{text}, but this may: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
 
 
 def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = (), why: str = "") -> str:
-    """A wrong value, or with `why` one that the runs held out do not bear out."""
+    """A wrong value, or with `why` one that the held-out runs do not confirm."""
     believed, refitted, low, high = values
     words, unit = parameter_words(name)
     space = f" {unit}" if unit else ""
@@ -407,7 +407,7 @@ def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequen
     return f"The {words} is {value}{space}, not the {number(believed, 4)}{space} believed{other}."
 
 
-def _better(main: str, channels: Mapping[str, Channel], put_right: Sequence[str] = ()) -> str:
+def _better(main: str, channels: Mapping[str, Channel], corrected: Sequence[str] = ()) -> str:
     if not main:
         return ""
     channel = channels[main]
@@ -418,7 +418,7 @@ def _better(main: str, channels: Mapping[str, Channel], put_right: Sequence[str]
             f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
             f"{number(errors.after)} {channel.unit} after."
         )
-    also = f", and believed values corrected within their trust ({listed(list(put_right))})," if put_right else ""
+    also = f", and believed values corrected within their trust ({listed(list(corrected))})," if corrected else ""
     return (
         f"With this{also} the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
         f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."
@@ -430,11 +430,11 @@ def _said_of(channel: Channel) -> str:
     return "on flights not used for fitting" if held else "on the flight it was fitted to"
 
 
-def _rest(told: Contents) -> str:
-    analysis = told.analysis
+def _rest(contents: Contents) -> str:
+    analysis = contents.analysis
     depends = [regime_words(v)[0] for v in analysis.unexplained_depends_on]
     if with_status(analysis, *CLAIMED) or analysis.wrong_values:
-        text = f"{100 * told.left:.0f} % of the mismatch stays unexplained"
+        text = f"{100 * contents.left:.0f} % of the mismatch stays unexplained"
     else:
         text = "none of the known effects explains it"
     if depends:
@@ -450,7 +450,7 @@ def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
         f"(noise {number(channels[c].noise_floor)})"
         for c in chosen
     ]
-    moved = f", values corrected within their trust ({listed(list(analysis.put_right))})" if analysis.put_right else ""
+    moved = f", values corrected within their trust ({listed(list(analysis.corrected))})" if analysis.corrected else ""
     where = _said_of(channels[chosen[0]])
     text = f"The believed vehicle describes these recordings{moved}: {where}, {listed(errors)}."
     return text if len(text.split()) <= MOST_WORDS else text.replace(moved, "")

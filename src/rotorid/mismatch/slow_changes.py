@@ -10,7 +10,7 @@ from rotorid.mismatch.rows import CHANNELS
 
 SLOW_BANDS_HZ = ((0.15, 0.7), (0.7, 2.5))
 FAST_BAND = (0.3, 0.75)
-"""Band, as shares of the cutoff, that tells by how much the sensors' noise is more than its white part."""
+"""Band, as shares of the cutoff, that shows by how much the sensors' noise is more than its white part."""
 SLOW_EXCESS = 16.0
 """Times more power than the sensors' noise, relative to the fast band, that slow changes must have to be noise no
 more: coloured noise of the sensors stays below four, see benchmarks/mismatch.md."""

@@ -1,6 +1,6 @@
 """What lies between command and rotor speed: lag, delay, throttle curve, sag, saturation.
 
-Where speeds are measured beside the commands they are the response; where only commands (or throttle) are
+Where speeds are measured in addition to the commands they are the response; where only commands (or throttle) are
 recorded the response is the wrench, and the believed values are free throughout. In both cases a chain of speed
 forms is fitted by nonlinear least squares on whitened residuals, grown one id at a time.
 """
@@ -89,7 +89,7 @@ class SpeedResult:
     noise_rad_s: float | None = None
     """One-sigma of the rotor speed residual, where speeds are measured."""
     lag_alone: SpeedFit | None = None
-    """Where a lag shares its lateness with a delay or a curve: the lag as it would be with neither beside it."""
+    """Where a lag shares its lateness with a delay or a curve: the lag as it would be without these."""
     without: dict[str, SpeedFit] = field(default_factory=dict)
     """The chain fitted with one id less."""
 
@@ -487,7 +487,7 @@ class SpeedSearch:
         return self.problem.with_covariance(self.problem.fit(fit.chain, fit.values, fit.shift_s))
 
     def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
-        """A lag of one constant and nothing beside it: what most publications fit."""
+        """A lag of one constant and nothing else: what most publications fit."""
         lag = next((k for k, f in fit.chain if f.stage == LAG), None)
         if lag is None or not any(f.stage in (CURVE, DELAY) for _, f in fit.chain):
             return None
@@ -568,7 +568,7 @@ class SpeedSearch:
                 p, score, _ = self.judge(base, fit, key)
                 if p > ENTER_P or score <= 0 or self.negligible(fit, key):
                     dropped[key] = (
-                        "it is too slight to matter" if self.negligible(fit, key) else f"p = {p:.2g} beside the others"
+                        "it is too slight to matter" if self.negligible(fit, key) else f"p = {p:.2g} given the others"
                     )
                     fit, changed = self.problem.with_covariance(base) if base.chain else base, True
                     break

@@ -21,7 +21,7 @@ from rotorid.recordings import columns as c
 HELD_OUT_SHARE = 1 / 3
 MOST_CHOICES = 500
 WORTH_MOVING = 0.05
-"""Gain of a choice over the even one, beside the best possible score of 1, from which it is taken."""
+"""Gain of a choice over the even one, relative to the best possible score of 1, from which it is taken."""
 LEAST_SHARE = 0.5
 """Of its even share: with less of some kind held out, or fitted, up to half of the runs are held out instead."""
 NEAR_GROUND_M = 0.3
@@ -95,7 +95,7 @@ def kinds_of_activity(recordings: RecordingSet) -> list[tuple[str, ...]]:
 def activity(recordings: RecordingSet) -> list[np.ndarray]:
     """How much of what is done each run holds, (runs,) of each kind: energies about the mean of all runs.
 
-    Beside `kinds_of_activity` nearness of the ground.
+    In addition to `kinds_of_activity` nearness of the ground.
     """
     vehicle, kinds = recordings.vehicle, kinds_of_activity(recordings)
     out = []

@@ -29,7 +29,7 @@ LEAST_SHARE = 0.3
 MOST_STEPS = 40
 LENGTHS_APART, LENGTH_TO = 0.08, 0.002
 """Logarithm of how far from its start the length is looked for with the states free, and how finely."""
-LOUDEST = 3
+LARGEST = 3
 """Pieces that are looked at first: most flights have nothing that swings."""
 
 
@@ -128,7 +128,7 @@ def with_likely_length(model: WrenchModel, term: Term) -> Term | None:
     """A term with the length near its own that explains most, the states free; None where nothing seems to swing."""
     cable = cable_of(model, term)
     stretches = stretches_of(model, model.segments, model.rows)
-    if not shows(loudest(stretches, cable), cable):
+    if not shows(largest_pieces(stretches, cable), cable):
         return None
 
     def left(change: float) -> float:
@@ -148,7 +148,7 @@ def like(segments: Sequence[Segment], noisy: Sequence[Segment]) -> list[Segment]
 
 
 def price(segments: Sequence[Segment]) -> float:
-    """What the states of a payload cost beside the model."""
+    """What the states of a payload cost in addition to the model."""
     return COST_PER_EFFECT + COST_PER_PARAMETER * UNKNOWNS_OF_A_STATE * sum(len(s.motion.hung) for s in segments)
 
 
@@ -172,14 +172,14 @@ def stretches_of(model: WrenchModel, segments: Sequence[Segment], rows: Sequence
     return out
 
 
-def loudest(stretches: Sequence[HangingStretch], cable: Cable) -> list[HangingStretch]:
-    """The LOUDEST pieces of stretches with the largest force."""
+def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[HangingStretch]:
+    """The LARGEST pieces of stretches with the largest force."""
     pieces = [
         s.part(start, start + cable.piece_s)
         for s in stretches
         for start in np.arange(s.time_s[0], s.time_s[-1] - cable.piece_s, cable.piece_s)
     ]
-    return sorted(pieces, key=lambda p: -p.squares)[:LOUDEST]
+    return sorted(pieces, key=lambda p: -p.squares)[:LARGEST]
 
 
 def shows(pieces: Sequence[HangingStretch], cable: Cable) -> bool:

@@ -57,7 +57,7 @@ def _name(effect: EffectVerdict) -> str:
 
 
 def tiles(verdict: Verdict, main: str) -> list[Tile]:
-    """What, where, and how large the error was before and after beside the noise."""
+    """What, where, and how large the error was before and after relative to the noise."""
     return [_what(verdict), _where(verdict, main), _how_much(verdict, main)]
 
 

@@ -179,7 +179,7 @@ DEPENDS_ON = {
 }
 """Regime variables that each depends on, for the verdict."""
 LEAST_CLIMB = 0.25
-"""Spread of the height (one sigma) beside its mean from which a force that follows it differs from a weight: six
+"""Spread of the height (one sigma) relative to its mean from which a force that follows it differs from a weight: six
 percent of its energy are its own."""
 LEAST_TURN_RAD = 0.25
 """Spread of the heading (one sigma) from which a moment that keeps its direction in the world differs from one that
@@ -187,10 +187,10 @@ turns with the vehicle: 14 degrees move a quarter of it elsewhere."""
 
 
 def empirical_effects(motions: Sequence[Motion]) -> list[Effect]:
-    """The empirical effects that these flights could tell from named ones.
+    """The empirical effects that these flights could distinguish from named ones.
 
-    Places are counted from the mean place where the height hardly varies beside its mean: a force that follows such a
-    height is a second weight.
+    Places are counted from the mean place where the height hardly varies relative to its mean: a force that follows
+    such a height is a second weight.
     """
     kept = [e for e in UNKNOWNS.values() if can_show(e.id, [m.rotation for m in motions])]
     if any(m.position is None for m in motions):
@@ -208,7 +208,7 @@ def empirical_effects(motions: Sequence[Motion]) -> list[Effect]:
 
 
 def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:
-    """Whether flights with these attitudes, (n, 3, 3) each, could tell an empirical effect from a named one.
+    """Whether flights with these attitudes, (n, 3, 3) each, could distinguish an empirical effect from a named one.
 
     On a vehicle that keeps its heading a moment fixed in the world is one fixed in the body: it would take the place
     of a centre of mass or a rotor that is off.

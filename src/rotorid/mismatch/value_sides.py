@@ -1,4 +1,4 @@
-"""Which frequencies tell what is believed of a vehicle wrongly, and which regression must agree.
+"""Which frequencies decide on wrong believed values, and which regression must agree.
 
 A moment of the air that nobody modelled is slow, and the controller answers it: at low frequencies the rotors' moment
 makes up for something else and turns nothing, so that an inertia or an arm regressed on it is biased (closed-loop
@@ -43,8 +43,8 @@ class Sides(NamedTuple):
 def sides_of_values(model: WrenchModel) -> Sides:
     """The regression by which believed values are judged, and the one that must agree with it.
 
-    All frequencies where they tell of the same gain between the rotors' moments and the motion as those of VALUE_BAND
-    do (Hausman's test: an efficient estimate beside one that no slow disturbance biases), else that band alone. What
+    All frequencies where they show the same gain between the rotors' moments and the motion as those of VALUE_BAND
+    do (Hausman's test: an efficient estimate against one that no slow disturbance biases), else that band alone. What
     must agree has the measured moments as regressors. Where commands alone say how fast rotors turn there is no noise
     in their speeds, but a lag that is not quite theirs changes what is quick: a band alone must agree with all.
     """
@@ -57,7 +57,7 @@ def sides_of_values(model: WrenchModel) -> Sides:
 
 
 def same_gains(model: WrenchModel, every: Regression, band: Regression) -> bool:
-    """Whether both tell of the same gain between moment and angular acceleration, about each axis."""
+    """Whether both show the same gain between moment and angular acceleration, about each axis."""
     inertias = [k for k in every.keys_of("value") if k.startswith("inertia")]
     loose = dict.fromkeys(inertias, WIDEST_TRUST)
     found = []
@@ -107,7 +107,7 @@ def regression_of_values(
 def band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np.ndarray]:
     """To each moment's channel the band-pass that makes its residual noise of one sigma; none for short stretches.
 
-    Not whitened beside: a filter learnt where a slow disturbance is by far the largest is hardly one for the band.
+    Not whitened in addition: a filter learnt where a slow disturbance is by far the largest is hardly one for the band.
     """
     thinner = model.prepared.thinner
     slow, quick = (low_pass(thinner.rate_hz, share * thinner.cutoff_hz) for share in band)

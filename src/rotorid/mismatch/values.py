@@ -1,5 +1,5 @@
 """Believed values as the contract states them: their numbers, a vehicle with them changed, and what throttle alone or a
-curve beside them leaves of what is said about them."""
+curve leaves of what is said about them."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def without_common_scale(values: Values) -> Values:
     return kept
 
 
-def told_of_commands(findings: list[Finding], values: Values) -> Values:
+def stated_of_commands(findings: list[Finding], values: Values) -> Values:
     """Wrong values to state where rotor speeds are known from commands alone: none that only says their scale.
 
     At which voltage the believed values hold is not stated (the largest in the set is only a guess), and a curve of the
@@ -137,7 +137,7 @@ def told_of_commands(findings: list[Finding], values: Values) -> Values:
 
 
 def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
-    """Values without a thrust per mass beside a throttle curve that has a scale of its own.
+    """Values without a thrust per mass given a throttle curve that has a scale of its own.
 
     Where rotor speeds are known from commands alone, a thrust coefficient larger by x is a scale larger by x/2.
     """
@@ -147,7 +147,7 @@ def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
 
 
 def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:
-    """Beside a thrust curve the coefficient of its square is the curve's own parameter c_2, and no wrong value.
+    """Given a thrust curve the coefficient of its square is the curve's own parameter c_2, and no wrong value.
 
     C_F and what the curve adds to it trade off against each other; their sum is what the recording knows.
     """
@@ -166,8 +166,8 @@ def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) 
         return findings, values
     value, sd = coefficient + share @ fit.beta, np.sqrt(share @ fit.covariance @ share)
     square = Estimate("c_2", float(value), "N s2/rad2", float(value - 1.96 * sd), float(value + 1.96 * sd))
-    told = replace(curve, parameters=(*(p for p in curve.parameters if p.symbol != SQUARE), square))
-    return [told if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
+    with_square = replace(curve, parameters=(*(p for p in curve.parameters if p.symbol != SQUARE), square))
+    return [with_square if f is curve else f for f in findings], {k: v for k, v in values.items() if k != "thrust"}
 
 
 def with_values_in_question(analysis: Analysis) -> Analysis:

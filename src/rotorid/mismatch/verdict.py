@@ -96,7 +96,7 @@ class PValues(Part):
 
 
 class Channel(Part):
-    """One channel's errors beside its noise, in its unit."""
+    """One channel's errors relative to its noise, in its unit."""
 
     unit: str
     noise_floor: Magnitude
@@ -248,7 +248,7 @@ class Unexplained(Part):
 
 
 class NextExperiment(Part):
-    """What to fly to tell the alternatives apart; empty where nothing is open.
+    """What to fly to distinguish the alternatives; empty where nothing is open.
 
     The separation, in standard errors, is None: `rotorid plan` alone computes it, for what can be flown.
     """
@@ -303,7 +303,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     left = share_left(inverse, located)
     shares = analysis.shares
     word = "not_judged" if stopping(analysis) else verdict_word(analysis, locations, left)
-    told = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
+    contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,
         kind=analysis.recordings.vehicle.kind,
@@ -311,9 +311,9 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         verdict=word,
         basis=basis_of_verdict(analysis),
         doubts=tuple(DoubtOfSet(what=d.what, sentence=d.sentence, stops=d.stops) for d in analysis.doubts),
-        sentence=spoken(headline(told), analysis),
+        sentence=spoken(headline(contents), analysis),
         size=size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
-        details=tuple(spoken(text, analysis) for text in details(told)),
+        details=tuple(spoken(text, analysis) for text in details(contents)),
         warnings=tuple(spoken(text, analysis) for text in warnings_of({**inverse, **forward})),
         channels=inverse | dict(forward),
         locations=tuple(locations),
@@ -333,7 +333,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         correlations=tuple(Correlated(values=pair, correlation=r) for pair, r in analysis.value_correlations.items()),
         not_testable=tuple(NotTestable(id=i, reason=r) for i, r in sorted(analysis.not_testable.items())),
         unexplained=Unexplained(
-            share=float(np.clip(told.left, 0.0, 1.0)),
+            share=float(np.clip(contents.left, 0.0, 1.0)),
             channels=analysis.unexplained_channels,
             depends_on=analysis.unexplained_depends_on,
             description=analysis.unexplained_description,

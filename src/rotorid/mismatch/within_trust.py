@@ -24,7 +24,7 @@ from rotorid.mismatch.words import parameter_words
 BEYOND_TRUST = 2.0
 """Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it."""
 BETTER_RATIO = 0.95
-"""Held-out error beside that with the values as believed which some channel must reach for the values to move."""
+"""Held-out error over that with the values as believed which some channel must reach for the values to move."""
 WORSE_RATIO = 1.01
 LEAST_Z = 2.0
 """Standard errors over blocks of a second by which squares must have changed, either way."""
@@ -33,7 +33,7 @@ WORTH_A_WORD = 0.002
 
 def beyond_trust(model: FittedModel, values: Values, active: Sequence[str]) -> bool:
     """Whether the recordings ask a value not called wrong to move further than its trust allows."""
-    return strained(model, changes(model, values, active, all_free(model, values, active)[1]))
+    return pushed_beyond_trust(model, changes(model, values, active, all_free(model, values, active)[1]))
 
 
 def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[list[str], Fit]:
@@ -41,7 +41,7 @@ def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple
     return delivered_fit(model, [*model.values_beside(active), *active], values)
 
 
-def strained(model: FittedModel, moved: Values) -> bool:
+def pushed_beyond_trust(model: FittedModel, moved: Values) -> bool:
     """Whether one of the changes of values not called wrong is beyond its trust."""
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
     return any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items())
@@ -84,7 +84,7 @@ def ways(model: FittedModel, values: Values, active: Sequence[str]) -> list[Way]
     held = Way(model, plain, values, as_believed, {})
     free, fit = all_free(model, values, active)
     moved = changes(model, values, active, fit)
-    if strained(model, moved):
+    if pushed_beyond_trust(model, moved):
         return [held]
     loose = Way(model, free, values, fit, moved)
     better = pays(held.left, loose.left, judged_rows(model), model.rows_per_block)

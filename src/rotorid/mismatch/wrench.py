@@ -55,7 +55,7 @@ MOST_NOISE = 0.3
 SAME_WRENCH = 0.004
 """Share of the spread of the rotors' force or moment to which no model and no recording of them are known."""
 SIDEWAYS = 0.25
-WORTH_TELLING = 3.0
+WORTH_STATING = 3.0
 """Times that share which counts as noise where it is asked whether something matters."""
 STEADY_ARM = 0.1
 """One-sigma of a steady moment over thrust, as a share of the longest arm, while what lies between command and speed is
@@ -117,7 +117,7 @@ class WrenchModel:
         return max(2, int(self.prepared.thinner.rate_hz))
 
     def delivered_with(self, keys: Sequence[str], loose: dict[str, float]) -> list[str]:
-        """Keys of winds, of the nuisances that are sure beside the terms `keys`, and of these.
+        """Keys of winds, of the nuisances that are significant given the terms `keys`, and of these.
 
         A calm flight does not know the offset between two sensors, and one that is nothing but noise where it was
         fitted is a mismatch in the first turn held out.
@@ -250,8 +250,8 @@ def searched(
     per = max(2, int(rate))
 
     values = [t.key for t in terms if t.kind == "value"]
-    told = np.concatenate([WORTH_TELLING * floor[:6], floor[6:]])
-    seconds = Seconds(rows, np.maximum(noise, told), per)
+    least_noise = np.concatenate([WORTH_STATING * floor[:6], floor[6:]])
+    seconds = Seconds(rows, np.maximum(noise, least_noise), per)
 
     def sizes_of(key: str, beta: np.ndarray) -> np.ndarray:
         # What refitted values would absorb of a term does not count as its size.
@@ -277,13 +277,13 @@ def searched(
 def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float) -> dict[int, np.ndarray]:
     """Make columns say nothing in channels where they are mostly noise, in rows and noisy copies (in place).
 
-    Returns the whitening filters of the noise in channels where some column is plain through them alone.
+    Returns the whitening filters of the noise in channels where some column exceeds the noise only through them.
 
     In a calm flight, say, the rotors' moment is noise that the residual has with the other sign: a free believed
     value (or a scale error) would take it away and call itself wrong. How much noise there is, is measured where
     little else is: near the cutoff. A column passes as it is or weighed by the colour of the channel's own noise:
     the acceleration of a rotor with a noisy tachometer is all noise at 20 Hz, where the channel is too, and still
-    plain below 2 Hz.
+    above the noise below 2 Hz.
     """
     band = tuple(share * cutoff_hz for share in NOISE_BAND)
     seen = np.zeros(rows[0].x.shape[1:], bool)
@@ -370,7 +370,7 @@ def speed_path(
     trusted: bool = False,
 ):
     """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
-    nothing can show it. Where only commands are recorded believed values are free beside it unless `trusted`."""
+    nothing can show it. Where only commands are recorded believed values are free with it unless `trusted`."""
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
     if not segments or any(s.command is None for s in segments):
         return None
@@ -633,7 +633,7 @@ def blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: lis
     """The model with its steady wind fitted through every effect that feels the air, and the search repeated in it.
 
     A linear wind column would leave part of the drag and lift to other names. The same model where the wind does not
-    show through them, or no drag is left beside it.
+    show through them, or no drag is left with it.
     """
     active = model.selection.active
     wind_key = next(k for k in active if model.search.terms[k].effect == wind_term().effect)
@@ -669,7 +669,7 @@ def wind_regression(prepared: Prepared, terms: list[Term], effects, wind: np.nda
 
 
 def fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters):
-    """A steady wind (north, east), m/s, its one-sigma, and `effects` with their linear values beside it.
+    """A steady wind (north, east), m/s, its one-sigma, and `effects` with their linear values jointly.
 
     By Gauss-Newton from `wind`; None for a wind that the fit through the drag does not see. `terms` end with those of
     `effects` and the wind's own.
@@ -699,7 +699,7 @@ def with_linear(effect: tuple[Form, np.ndarray], regression: Regression, fit: Fi
 
 
 def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
-    """Wind (north, east), m/s, from a linear wind column and the drag beside it; None without a drag to divide by."""
+    """Wind (north, east), m/s, from a linear wind column and the drag found with it; None without a drag."""
     values = dict(zip(model.selection.active, chosen(model), strict=True))
     form, force = values[wind_key]
     drag = linear_drag(model)

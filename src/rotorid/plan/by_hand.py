@@ -1,4 +1,4 @@
-"""Steps that no trajectory and no schedule can hold: what a person does between two recordings, and what it tells."""
+"""Steps that no trajectory and no schedule can hold: what a person does between two recordings, and what it shows."""
 
 from __future__ import annotations
 

@@ -44,14 +44,14 @@ def able(known: Known) -> dict[str, tuple[str, ...]]:
 
 
 def check_wishes(known: Known, wishes: dict[str, float]) -> None:
-    """InputError where something is wished for that these recordings do not tell."""
+    """InputError where something is wished for that these recordings do not show."""
     names = able(known)
     for name in wishes:
         if reason := known.prepared.not_testable.get(name):
             raise InputError(f"--want {name}: not testable on this set: {reason}")
         if name not in names:
             raise InputError(
-                f"--want {name}: no value that these recordings tell, nor an effect that is not at work; "
+                f"--want {name}: no value that these recordings show, nor an effect that is not at work; "
                 f"expected one of {', '.join(names)}"
             )
 
@@ -59,7 +59,7 @@ def check_wishes(known: Known, wishes: dict[str, float]) -> None:
 def widths(known: Known, before: Information, after: Information, wishes: dict[str, float]) -> list[Width]:
     """Half widths and limits that are wished for, and half widths of the parameters of the effects in the model.
 
-    A doubt that the engine found beyond the plain one (blocks that differ more than their noise) is taken to stay. Of
+    A doubt that the engine found beyond the usual one (blocks that differ more than their noise) is taken to stay. Of
     the loops that the flight may be flown with the worse counts.
     """
     model, regression, names = known.fitted.model, known.regression, able(known)

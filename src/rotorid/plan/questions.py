@@ -60,7 +60,7 @@ class Known:
     chains: tuple[ChainQuestion, ...]
     """The same of what lies between command and rotor speed."""
     unanswerable: tuple[tuple[tuple[str, ...], str], ...]
-    """Classes that no flight with these columns can tell apart, with what it takes."""
+    """Classes that no flight with these columns can settle, with what it takes."""
     whitened: Regression | None = None
     """The set's normal equations through the filters that the engine would learn from it and a flight together."""
 

@@ -202,8 +202,8 @@ def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) 
             for _, form in true.chain:
                 chain.append((form, true.values[at : at + len(form.parameters)]))
                 at += len(form.parameters)
-            told = commands(replace(world, chain=tuple(chain)), flight.motion)
-            apart.append(squares(known.fitted, segments_of(replace(flight, command_rad_s=told)), true, rival))
+            asked = commands(replace(world, chain=tuple(chain)), flight.motion)
+            apart.append(squares(known.fitted, segments_of(replace(flight, command_rad_s=asked)), true, rival))
     if known.fitted.commanded:
         segments = path_segments(segments, *known.fitted.chain, prepared.thinner.cutoff_hz)
     effects = model.effects if model.effects is not None else chosen(model)
@@ -224,7 +224,7 @@ def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
     The engine learns its filters from what the whole catalogue leaves; of a calm set that is next to nothing in a
     channel where the noise of the regressors explains the noise of the reading, and such filters would promise too
     much of a quick flight, in which it cannot. What the model leaves of the set is what it will leave of the flight,
-    but no less than the share of the flight's own forces and moments below which the engine tells nothing apart.
+    but no less than the share of the flight's own forces and moments below which the engine distinguishes nothing.
     """
     model, prepared = known.fitted.model, known.prepared
     rate, regression = own_rate_hz(known), model.search.regression

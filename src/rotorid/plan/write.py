@@ -210,9 +210,9 @@ def text(plan: Plan) -> list[str]:
         if plan.pieces or w.wished
     ]
     for ids, what in plan.unanswerable:
-        out.append(f"No flight with these columns tells {' or '.join(words_of(i) for i in ids)}: {what}.")
+        out.append(f"No flight with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
-        out.append("Nothing is open: no flight is needed to tell effects apart.")
+        out.append("Nothing is open: no flight is needed to distinguish effects.")
     return out + in_words(plan)
 
 

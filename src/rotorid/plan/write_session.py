@@ -31,9 +31,9 @@ def text(plan: SessionPlan) -> list[str]:
             f"{plan.limits.target_sigma:g}. More time, load or tilt in the limits may do it."
         )
     for ids, what in plan.unanswerable:
-        out.append(f"No schedule with these columns tells {' or '.join(words_of(i) for i in ids)}: {what}.")
+        out.append(f"No schedule with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
-        out.append("Nothing is open: no further measurement is needed to tell effects apart.")
+        out.append("Nothing is open: no further measurement is needed to distinguish effects.")
     return out + in_words(plan)
 
 

@@ -57,7 +57,7 @@ def vehicle_of(content: dict, where: str) -> Vehicle:
 
 
 def _misnamed(path: Path) -> str | None:
-    """A file beside this one whose name differs in its case or in `.yml`."""
+    """A file next to this one whose name differs in its case or in `.yml`."""
     wanted = (path.name.lower(), path.with_suffix(".yml").name.lower())
     return next(
         (p.name for p in sorted(path.parent.iterdir()) if p.name.lower() in wanted and p.name != path.name), None

@@ -90,7 +90,7 @@ def noise_gain(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -
 
 
 def is_read(run: Run, names: tuple[str, ...]) -> bool:
-    """Whether each column of a sensor has enough readings to tell how they come."""
+    """Whether each column of a sensor has enough readings to show how they come."""
     return bool(names) and all(np.isfinite(run.column(name)).sum() > LEAST_READINGS for name in names)
 
 

@@ -341,7 +341,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
                     )
                 scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
                 if r > AGREES and not SAME_UNIT[0] < scale < SAME_UNIT[1]:
-                    # Units that are used beside metres are smaller: the column with the larger numbers is the one.
+                    # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
                     yield Doubt(
                         f"velocity_{axis}_m_s" if scale > 1 else f"position_{axis}_m",
                         f"velocity_{axis}_m_s is {scale:.3g} times the derivative of position_{axis}_m, expected 1: "

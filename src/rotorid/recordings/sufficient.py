@@ -315,12 +315,12 @@ def still_rotors(run: Run, vehicle: Vehicle) -> str | None:
         # Rotors may truly stand still: what is read is then the weight, or what tilting the mount changes of it.
         weight = (vehicle.mass_kg or 0.0) * vehicle.gravity_m_s2
         tilt = float(np.nanmax(np.abs(run.array(c.MOUNT)).sum(axis=1))) if run.has(*c.MOUNT) else 0.0
-        carried = 2 * weight * np.sin(min(tilt, np.pi) / 2) if vehicle.tared else weight
+        supported = 2 * weight * np.sin(min(tilt, np.pi) / 2) if vehicle.tared else weight
         force = np.linalg.norm(np.nan_to_num(run.array(c.FORCE)), axis=1)
         largest = float(np.quantile(force, 0.9))
         ordered = [n for k, g in rotor_groups(vehicle).items() if k != "rotor_speed" and run.has(*g) for n in g]
         commanded = bool(ordered) and np.nanmax(np.abs(run.array(tuple(ordered)))) > 0
-        if largest <= carried + max(LIFTING * weight, LEAST_LIFT_N) and not commanded:
+        if largest <= supported + max(LIFTING * weight, LEAST_LIFT_N) and not commanded:
             return None
         because = f" although the sensor reads {largest:.3g} N" + (" and commands are given" if commanded else "")
     return (

@@ -86,7 +86,7 @@ class Code:
         return sorted(found)
 
     def _read_by(self, modules: list[Path]) -> list[Path]:
-        """Files that are no code but shipped beside a module that reads such files (`importlib.resources`), sorted."""
+        """Files that are no code but shipped next to a module that reads such files (`importlib.resources`), sorted."""
         folders = {m.parent for m in modules if RESOURCES in self._facts_of(m).names}
         beside = (p for folder in folders for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
         return sorted(p for p in beside if p.suffix not in (".py", ".pyc"))
@@ -141,7 +141,7 @@ class _Facts:
 
 
 def _made_by() -> list[str]:
-    """What a memory depends on beside the files: Python's syntax trees and this module."""
+    """What a memory depends on in addition to the files: Python's syntax trees and this module."""
     return [sys.version, hashlib.sha256(Path(__file__).read_bytes()).hexdigest()]
 
 

@@ -69,8 +69,8 @@ def _solved(m, v, own, wrench):
 
 
 @compiled(error_model="numpy")
-def _tell(m, v, w, x):
-    """Tell the effects that read accelerations those of `x.at`; what they add is to be collected from nothing."""
+def _hand_over(m, v, w, x):
+    """Give the effects that read accelerations those of `x.at`; what they add is to be collected from nothing."""
     for j in range(3):
         m.angular_acceleration[j] = x.at[j]
         m.specific_force[j] = x.at[3 + j]
@@ -89,7 +89,7 @@ def _follow(m, v, w, x):
 @compiled(error_model="numpy")
 def _implicit(m, v, w, x, addresses, explicit, offsets, values, shift):
     """Accelerations `x.own` that follow where the effects that read accelerations are given `x.at`."""
-    _tell(m, v, w, x)
+    _hand_over(m, v, w, x)
     for e in range(explicit, addresses.shape[0]):
         call_kernel(addresses[e], m, v, values, offsets[e] + shift, w)
     _follow(m, v, w, x)
@@ -212,7 +212,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
             if x.open:
                 for i in range(6):
                     x.at[i] = x.now[i]
-                _tell(instant[c], body[(first + c) * alone], added[c], x)
+                _hand_over(instant[c], body[(first + c) * alone], added[c], x)
         for e in range(explicit, effects):
             for c in range(count):
                 n = first + c
@@ -544,8 +544,8 @@ def fly_windows(
                     for i in range(k):
                         m.rotor_speed[i] = speed_between[n, j, i] if between else speed[n, at, i]
                         if acceleration.shape[0] > 0:
-                            told = acceleration_between[n, j, i] if between else acceleration[n, at, i]
-                            m.rotor_acceleration[i] = told
+                            present = acceleration_between[n, j, i] if between else acceleration[n, at, i]
+                            m.rotor_acceleration[i] = present
                     if wind.shape[0] == 0:
                         _enter(m, v, x, size, effects, still, 0, 0, height_offset[n])
                     elif between:

@@ -119,7 +119,7 @@ def fly(
     else:
         series = np.ascontiguousarray(commands, float)
         series = series[None] if series.ndim == 2 else series
-    told = np.zeros((0, 1, k)) if following is None else np.ascontiguousarray(following, float)
+    fixed_times = np.zeros((0, 1, k)) if following is None else np.ascontiguousarray(following, float)
     wind = np.zeros(3) if wind_m_s is None else wind_m_s
     fixed = dict(
         first_s=first_s,
@@ -139,7 +139,7 @@ def fly(
         lags=lags,
         limits=np.ascontiguousarray(limits),
         commands=series,
-        following=told[None] if told.ndim == 2 else told,
+        following=fixed_times[None] if fixed_times.ndim == 2 else fixed_times,
         loops=loops,
         references=references,
         reading_errors=np.zeros((1, 1, 3)) if reading_errors is None else np.ascontiguousarray(reading_errors),

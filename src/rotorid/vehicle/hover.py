@@ -39,8 +39,8 @@ class Hover:
     """About roll, pitch and yaw."""
     gain: float
     """Force, N, that a further newton of thrust makes."""
-    carried: float = 1.0
-    """Upward force over what hover needs; below 1 where all that the rotors can do does not carry the vehicle."""
+    supported: float = 1.0
+    """Upward force over what hover needs; below 1 where all that the rotors can do does not support the vehicle."""
 
 
 def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> Hover:

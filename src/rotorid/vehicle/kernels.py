@@ -2,7 +2,7 @@
 
 A form of an effect states the force and moment that it adds twice: as array code over many instants, which the
 analysis fits, and as a plain function of one instant, its kernel, which the simulator calls. A kernel is compiled by
-itself when it is first used (0.1 s, then kept on disk beside its file) and called through its address, so that a new
+itself when it is first used (0.1 s, then kept on disk next to its file) and called through its address, so that a new
 effect needs no change here and no other code to be compiled again. A test holds that both say the same.
 """
 

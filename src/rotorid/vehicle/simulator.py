@@ -214,7 +214,7 @@ def _fresh(controller: Controller) -> Controller:
 
 
 def _known_commands(controller: Controller, time_s: np.ndarray) -> np.ndarray | fast.AttitudeLoop | None:
-    """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call can tell."""
+    """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call gives them."""
     if isinstance(controller, Commands):
         return controller.rotor_speed[controller._index(time_s)]
     # The plan is that of the class that commands; who puts another command in its place is called.

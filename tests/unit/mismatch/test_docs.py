@@ -1,4 +1,4 @@
-"""The page on the mismatch stage quotes the numbers that the code uses, and modules that exist."""
+"""The reference of the decision quotes the numbers that the code uses, and modules that exist."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rotorid.mismatch.rules import markdown
 
-PAGE = (Path(__file__).parents[3] / "docs" / "mismatch.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs" / "decision-reference.md").read_text()
 
 
 def test_the_numbers_that_decide_are_those_of_the_code():
@@ -19,7 +19,7 @@ def test_the_numbers_that_decide_are_those_of_the_code():
 
 
 def test_the_modules_named_exist():
-    table = PAGE.split("## How it goes")[1].split("###")[0]
+    table = PAGE.split("## Steps and modules")[1].split("##")[0]
     names = [
         n for line in re.findall(r"^\|[^|]+\|([^|]+)\|", table, flags=re.M)[2:] for n in re.findall(r"`([\w/]+)`", line)
     ]

@@ -5,7 +5,7 @@ import pytest
 
 from rotorid.effects.pendulum import cable_pull, swing
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.swinging import Cable, HangingStretch, loudest, moved, shows, swing_in
+from rotorid.mismatch.swinging import Cable, HangingStretch, largest_pieces, moved, shows, swing_in
 
 from .flights import recorded
 
@@ -50,7 +50,7 @@ def test_noise_swings_not():
     hanging, time_s = shaken(3)
     at_s = time_s[10::20]
     force = 0.2 * np.random.default_rng(4).standard_normal((len(at_s), 2))
-    pieces = loudest([HangingStretch(hanging, time_s, at_s, force)], CABLE)
+    pieces = largest_pieces([HangingStretch(hanging, time_s, at_s, force)], CABLE)
     assert len(pieces) == 3 and not shows(pieces, CABLE)
     assert not shows([], CABLE)
 

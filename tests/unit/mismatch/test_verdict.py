@@ -135,7 +135,7 @@ def test_a_wrong_value_is_told_with_what_was_believed():
 def test_an_ambiguous_class_is_named_in_full_with_what_would_settle_it():
     finding = drag_finding(status="ambiguous", alternatives=("frame_drag", "rotor_drag"))
     told = " ".join(verdict_of(analysis(findings=[finding], next_manoeuvre="fly faster")).details)
-    assert "Either rotor drag or" in told and "cannot tell which" in told and "fly faster" in told
+    assert "Either rotor drag or" in told and "cannot show which" in told and "fly faster" in told
 
 
 def test_the_simulation_run_forward_is_told_as_it_is():

@@ -1,4 +1,4 @@
-"""Believed values move within their trust, without a word, where environments not used for fitting bear them out."""
+"""Believed values move within their trust, without a word, where environments not used for fitting confirm it."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
     return model
 
 
-def test_a_thrust_within_its_trust_is_put_right(monkeypatch):
+def test_a_thrust_within_its_trust_is_corrected(monkeypatch):
     """By −3 % of a trust of 5 %: both values move together, and one of them is worth a word."""
     model = model_of(monkeypatch, -0.03)
     fit, moved = settled(model, {}, ())

@@ -36,7 +36,7 @@ def test_what_leaving_a_rule_out_changes(tmp_path):
     row = ablation.row("size", base, without, tmp_path)
     assert (row["fired"], row["judged"], row["righted"], row["wronged"]) == (3, 3, 1, 1)
     assert row["words_righted"] == row["words_wronged"] == 0 and row["seconds_saved"] == 0.67
-    assert ablation.table([row]).decides[0].startswith("An effect whose strongest tenth")
+    assert ablation.table([row]).decides[0].startswith("An effect is not kept if its strongest tenth")
 
 
 def test_the_share_righted_has_an_interval():

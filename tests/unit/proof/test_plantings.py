@@ -220,7 +220,7 @@ def test_every_kind_leaves_a_set_that_can_be_read_and_says_what_it_did(recorded:
 def test_mistakes_planted_in_a_made_up_set_are_told_by_the_search_for_them(recorded: RecordingSet) -> None:
     known = [plan.Planting("made-up", "units", (k,), "large", 0) for k in ("rotors_in_rpm", "voltage_in_millivolt")]
     rows = tables.mistake_rows(recorded, known, "now")
-    assert [r["told"] for r in rows] == [score.ALONE] * 2
+    assert [r["named"] for r in rows] == [score.ALONE] * 2
     assert "rpm" in rows[0]["said"] and rows[0]["code"] == "now"
     assert plan.mistakes([*known, plan.Planting("made-up", "values", ("mass",), "large", 0)], "made-up") == known
 
@@ -293,23 +293,23 @@ def test_a_cause_is_told_alone_in_a_fair_class_or_not() -> None:
     of = {
         score.ALONE: effect("com_offset", [("r_x", 0.0102, 0.001)]),
         score.IN_CLASS: effect("unequal_rotors", (), "ambiguous", ("com_offset", "unequal_rotors")),
-        score.NOT_TOLD: effect("com_offset", (), "ambiguous", ("com_offset", "payload")),
+        score.NOT_NAMED: effect("com_offset", (), "ambiguous", ("com_offset", "payload")),
     }
     for word, claim in of.items():
-        assert score.score_truth(verdict(claim), untouched, OFFSET)["told"] == word
+        assert score.score_truth(verdict(claim), untouched, OFFSET)["named"] == word
     row = score.score_truth(verdict(of[score.ALONE]), untouched, OFFSET)
     assert row["covered"] is True and row["true"] == 0.01
-    assert score.score_truth({"failed": "x"}, untouched, OFFSET)["told"] == score.NOT_TOLD
+    assert score.score_truth({"failed": "x"}, untouched, OFFSET)["named"] == score.NOT_NAMED
     suggested = effect("com_offset", [("r_x", 0.0102, 0.001)], "not_established")
-    assert score.score_truth(verdict(suggested), untouched, OFFSET)["told"] == score.NOT_TOLD
+    assert score.score_truth(verdict(suggested), untouched, OFFSET)["named"] == score.NOT_NAMED
 
 
 def test_what_the_flight_held_before_must_move_and_adds_to_the_size() -> None:
     untouched = verdict(effect("com_offset", [("r_x", 0.02, 0.001)]))
     same = verdict(effect("com_offset", [("r_x", 0.021, 0.001)]))
-    assert score.score_truth(same, untouched, OFFSET)["told"] == score.NOT_TOLD
+    assert score.score_truth(same, untouched, OFFSET)["named"] == score.NOT_NAMED
     moved = score.score_truth(verdict(effect("com_offset", [("r_x", 0.0305, 0.001)])), untouched, OFFSET)
-    assert (moved["told"], moved["covered"], moved["true"]) == (score.ALONE, True, pytest.approx(0.03))
+    assert (moved["named"], moved["covered"], moved["true"]) == (score.ALONE, True, pytest.approx(0.03))
 
 
 def test_of_mass_and_thrust_only_their_ratio_is_held_against_the_verdict() -> None:
@@ -317,13 +317,13 @@ def test_of_mass_and_thrust_only_their_ratio_is_held_against_the_verdict() -> No
     truth = named("mass_kg", fair=("thrust_coefficient_n_s2",), ratio=ratio)
     heavy = verdict(mass_kg=(1.2, 1.0, 0.02))
     row = score.score_truth(heavy, verdict(), truth)
-    assert (row["told"], row["covered"]) == (score.ALONE, True)
+    assert (row["named"], row["covered"]) == (score.ALONE, True)
     strong = verdict(thrust_coefficient_n_s2=(1.0, 1.2, 0.02))
-    assert score.score_truth(strong, verdict(), truth)["told"] == score.IN_CLASS
+    assert score.score_truth(strong, verdict(), truth)["named"] == score.IN_CLASS
     wrong = verdict(mass_kg=(1.2, 1.44, 0.02))
-    assert score.score_truth(wrong, verdict(), truth)["told"] == score.NOT_TOLD
+    assert score.score_truth(wrong, verdict(), truth)["named"] == score.NOT_NAMED
     # What was planted corrects what the untouched flight calls wrong: silence is the answer.
-    assert score.score_truth(verdict(), verdict(mass_kg=(1.0, 1.2, 0.02)), truth)["told"] == score.ALONE
+    assert score.score_truth(verdict(), verdict(mass_kg=(1.0, 1.2, 0.02)), truth)["named"] == score.ALONE
     little = verdict(mass_kg=(1.2, 1.05, 0.02))
     assert score.score_truth(little, verdict(), truth)["covered"] is False
 
@@ -331,19 +331,19 @@ def test_of_mass_and_thrust_only_their_ratio_is_held_against_the_verdict() -> No
 def test_a_size_in_a_form_that_has_it_not_is_wrong() -> None:
     truth = named("gyro_error", sizes=((Size("gyro_error", "theta_x", 0.05),),), form_bound=True)
     row = score.score_truth(verdict(effect("gyro_error", [("s_x", 0.03, 0.01)])), verdict(), truth)
-    assert (row["told"], row["covered"]) == (score.ALONE, False)
+    assert (row["named"], row["covered"]) == (score.ALONE, False)
 
 
 def test_what_cannot_show_is_counted_apart_even_where_it_is_named() -> None:
     hidden = replace(OFFSET, unseen="no body rates")
     named_it = verdict(effect("com_offset", [("r_x", 0.01, 0.001)]))
-    assert score.score_truth(named_it, verdict(), hidden)["told"] == score.UNSEEN
+    assert score.score_truth(named_it, verdict(), hidden)["named"] == score.UNSEEN
     windy = named("steady_wind", shown_by=frozenset({"rotor_drag"}))
-    assert score.score_truth(verdict(), verdict(), windy)["told"] == score.UNSEEN
-    assert score.score_truth(verdict(), verdict(effect("rotor_drag")), windy)["told"] == score.NOT_TOLD
+    assert score.score_truth(verdict(), verdict(), windy)["named"] == score.UNSEEN
+    assert score.score_truth(verdict(), verdict(effect("rotor_drag")), windy)["named"] == score.NOT_NAMED
     heavier = named("mass_kg", hidden_by=frozenset({"throttle_curve"}))
-    assert score.score_truth(verdict(), verdict(effect("throttle_curve")), heavier)["told"] == score.UNSEEN
-    assert score.score_truth(verdict(), verdict(effect("rotor_drag")), heavier)["told"] == score.NOT_TOLD
+    assert score.score_truth(verdict(), verdict(effect("throttle_curve")), heavier)["named"] == score.UNSEEN
+    assert score.score_truth(verdict(), verdict(effect("rotor_drag")), heavier)["named"] == score.NOT_NAMED
 
 
 def test_what_is_new_and_what_is_lost_beside_it() -> None:
@@ -363,25 +363,25 @@ def test_what_is_new_and_what_is_lost_beside_it() -> None:
     }
 
 
-def row(planting: str, told: str = score.ALONE, covered=True, new: str = "", code: str = "now"):
+def row(planting: str, named: str = score.ALONE, covered=True, new: str = "", code: str = "now"):
     p = plan.parsed(planting)
     base = dict.fromkeys(tables.COLUMNS, "")
     base |= {"planting": planting, "flight": p.flight, "family": p.family, "kind": p.kinds[0], "size": p.size}
-    return {**base, "set_of": "single", "told": told, "covered": covered, "new": new, "code": code}
+    return {**base, "set_of": "single", "named": named, "covered": covered, "new": new, "code": code}
 
 
 def test_the_summary_counts_sets_and_causes_and_marks_older_rows() -> None:
     rows = pd.DataFrame(
         [
             row("a/values/mass/large/0"),
-            row("a/values/arm/large/0", score.NOT_TOLD, None, "payload; gust", "older"),
+            row("a/values/arm/large/0", score.NOT_NAMED, None, "payload; gust", "older"),
             row("b/values/arm/large/0", score.UNSEEN, None, "vortex_ring"),
         ],
         columns=tables.COLUMNS,
     )
     found = tables.summary(rows, "now").set_index(["group", "size", "what"])
-    told = found.loc[("all", "large", "told")]
-    assert (told["value"], told["count"], told["older_rows"]) == (0.5, 2, 1)
+    named = found.loc[("all", "large", "named")]
+    assert (named["value"], named["count"], named["older_rows"]) == (0.5, 2, 1)
     assert found.loc[("all", "large", "ids new or lost a set"), "value"] == 1.0
     assert found.loc[("all", "large", "cannot be seen"), "value"] == pytest.approx(1 / 3)
     assert found.loc[("all", "large", "size covered"), "count"] == 1

@@ -138,15 +138,15 @@ def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> 
 
 
 def test_plantings_are_counted_by_flight_and_family():
-    def scores(group: str, told: float, count: int) -> list[dict]:
-        values = {"told": told, "size covered": 0.5, "ids new or lost a set": 0.68, "values new or lost a set": 0.0}
+    def scores(group: str, named: float, count: int) -> list[dict]:
+        values = {"named": named, "size covered": 0.5, "ids new or lost a set": 0.68, "values new or lost a set": 0.0}
         rated = {"size": "large", "count": count, "at_least": float("nan"), "at_most": 0.1, "state": "fails"}
         return [{"group": group, "what": w, "value": v, **rated} for w, v in values.items()]
 
     now = pd.DataFrame([*scores("family air", 1.0, 2), *scores("all", 0.56, 25), *scores("kind mass", 0.0, 2)])
     shown = show.of_plantings(now)
     assert list(shown["group"]) == ["all", "target", "verdict", "air"]
-    assert list(shown["told"]) == ["14 of 25", "≤ 0.1", "fails", "2 of 2"]
+    assert list(shown["named"]) == ["14 of 25", "≤ 0.1", "fails", "2 of 2"]
     assert shown.iloc[0]["moved"] == "0.68"
 
 

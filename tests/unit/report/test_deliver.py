@@ -62,7 +62,7 @@ def test_a_vehicle_that_is_not_the_model_is_refused():
     [
         ((), "no mismatch"),
         ((drag_finding(),), "mismatch, explained"),
-        ((drag_finding(status="ambiguous", alternatives=("frame_drag", "rotor_drag")),), "cannot tell them apart"),
+        ((drag_finding(status="ambiguous", alternatives=("frame_drag", "rotor_drag")),), "cannot distinguish them"),
     ],
 )
 def test_the_page_is_whole_and_the_same_twice(tmp_path, findings, shown):

@@ -1,4 +1,4 @@
-"""Exports fly like ours: the same rotor speeds in other engines beside our simulation; what is lost is named.
+"""Exports fly like ours: the same rotor speeds in other engines next to our simulation; what is lost is named.
 
 Drake and pybullet are large and no dependency: `pip install drake pybullet` into the environment runs their tests.
 """
@@ -288,7 +288,7 @@ def test_the_trial_flight_is_made_for_any_chain(tmp_path, monkeypatch, form: str
     pytest.importorskip(module)
     done = exported_by_command(tmp_path, with_effects(*CHAIN, NEAR_GROUND, DRAG), form, "vehicle")
     assert done.exit_code == 0, done.output
-    assert "beside ours, with what the file expresses" in done.output and (tmp_path / "out" / "vehicle").is_file()
+    assert "next to ours, with what the file expresses" in done.output and (tmp_path / "out" / "vehicle").is_file()
     fly = {"rotorpy": in_rotorpy, "mjcf": in_mujoco}[form]
     vehicle = with_effects(*CHAIN)
     exported = export_vehicle(vehicle, form)

@@ -43,7 +43,7 @@ def test_a_curve_and_a_payload_by_hand():
 
 def test_a_vehicle_that_its_rotors_do_not_carry():
     weak = found(stated(("command_saturation", "upper limit", {"w_high": 0.4})))
-    assert weak.carried == pytest.approx(4 * 1.3877e-6 * 800.0**2 / WEIGHT)
+    assert weak.supported == pytest.approx(4 * 1.3877e-6 * 800.0**2 / WEIGHT)
 
 
 EFFECTS = (

@@ -228,8 +228,8 @@ def wake(s: Sheet):
     """Thrust overshoots until the wake has formed (Pitt and Peters): a lead that no id describes."""
     s.nature.wake, s.nature.wake_s = s.size(0.1, 0.5), s.rng.uniform(0.06, 0.2)
     acceptable = ["motor_lag", "delay", "rotor_acceleration_torque", "axial_inflow"]
-    told = (("share", s.nature.wake, "-"), ("memory", s.nature.wake_s, "s"))
-    listed = [{"symbol": a, "value": v, "unit": u} for a, v, u in told]
+    stated = (("share", s.nature.wake, "-"), ("memory", s.nature.wake_s, "s"))
+    listed = [{"symbol": a, "value": v, "unit": u} for a, v, u in stated]
     s.outside.append({"id": "wake_memory", "acceptable": acceptable, "parameters": listed})
     s.styles, s.log = ("stir", "bob", "stir", "survey"), False
 
@@ -249,18 +249,20 @@ def drafted(family: str, seed: int) -> tuple[Sheet, Kit]:
     sheet = Sheet(crafts.drawn(rng), rng)
     FAMILIES[family](sheet)
     logged = sheet.log and rng.random() < 0.4
-    loud = sheet.size(0.6, 1.6)
+    noise = sheet.size(0.6, 1.6)
     if logged:
         groups = ("command", *POSE)
-        kit = Kit("log", 100, groups, 0.01 * loud, 0.05 * loud, 0.0, 0.004 * loud, 0.06 * loud, vibration=1.2 * loud)
+        kit = Kit(
+            "log", 100, groups, 0.01 * noise, 0.05 * noise, 0.0, 0.004 * noise, 0.06 * noise, vibration=1.2 * noise
+        )
         sheet.fair.append("vibration")
     else:
         command = "command" in sheet.needs or rng.random() < 0.15
         speed = not command or "speed" in sheet.needs or (sheet.nature.lag > 0 and rng.random() < 0.5)
         groups = (*(("speed",) if speed else ()), *(("command",) if command else ()), *POSE)
         rate = int(rng.choice([100, 200, 250, 500]))
-        kit = Kit("capture", max(rate, sheet.least_hz), groups, 0.0005 * loud, 0.015 * loud, 0.0012 * loud,
-                  0.008 * loud, 0.12 * loud, 0.003 * loud)  # fmt: skip
+        kit = Kit("capture", max(rate, sheet.least_hz), groups, 0.0005 * noise, 0.015 * noise, 0.0012 * noise,
+                  0.008 * noise, 0.12 * noise, 0.003 * noise)  # fmt: skip
         if not command:
             kit = replace(kit, fraction=float(rng.uniform(-0.4, 0.4)))
     if "battery" in sheet.needs:
@@ -407,12 +409,12 @@ def finished(sheet, kit, vehicle, off, tables, ideals, channels, windows, parts,
             fair.append(id)
     for entry in (*effects, *sheet.outside):
         entry |= {"size_over_noise": ratios[main], "main_channel": main, "amount": 1.0}
-    told = bool(effects or sheet.outside or off)
+    sealed = bool(effects or sheet.outside or off)
     verdict = ["no_mismatch"]
-    if told:
+    if sealed:
         verdict = ["partly_explained", "unexplained"] if sheet.outside else ["explained", "partly_explained"]
     # A sideways accelerometer that reads nothing but noise (no drag) reads the same with its sign flipped.
-    small = told and not set(sheet.edits) - {"sign"} and ratios[main] < SMALL
+    small = sealed and not set(sheet.edits) - {"sign"} and ratios[main] < SMALL
     if small:
         verdict.append("no_mismatch")
         fair += [e["id"] for e in effects]

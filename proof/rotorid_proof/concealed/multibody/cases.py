@@ -420,11 +420,11 @@ def finished(draft, grade, vehicle_file, off, tables, ideals, channels, seed):
     effects, outside = draft.effects, draft.outside
     for entry in (*effects, *outside):
         entry |= {"size_over_noise": ratios[main], "main_channel": main, "amount": 1.0}
-    told = bool(effects or outside or off)
+    sealed = bool(effects or outside or off)
     verdict = ["no_mismatch"]
-    if told:
+    if sealed:
         verdict = ["partly_explained", "unexplained"] if outside else ["explained", "partly_explained"]
-    small = told and ratios[main] < SMALL
+    small = sealed and ratios[main] < SMALL
     if small:
         verdict = [*verdict, "no_mismatch"]
     windows = [

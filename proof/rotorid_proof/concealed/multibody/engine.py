@@ -18,12 +18,12 @@ class Lost(RuntimeError):
 
 @dataclass
 class World:
-    """What is true, beside the quadrotor that the user believes in. All zero is nothing hidden."""
+    """What is true, in addition to the quadrotor that the user believes in. All zero is nothing hidden."""
 
     extra_bodies: str = ""
     """MJCF of bodies that hang on the vehicle."""
     extra_world: str = ""
-    """MJCF of the world beside it."""
+    """MJCF of the world next to it."""
     extra_tendons: str = ""
     mass: float | None = None
     """Mass, centre and inertia about it of the vehicle's own body, where they are not the believed ones."""

@@ -31,20 +31,20 @@ POSE = ("position", "velocity", "attitude", "rates", "force")
 
 def drawn(name: str, rng: np.random.Generator, command: bool, speed: bool = True) -> Grade:
     """Instruments of a grade; `command` and `speed`: whether the case needs these columns."""
-    loud = float(np.exp(rng.uniform(np.log(0.6), np.log(1.6))))
+    noise = float(np.exp(rng.uniform(np.log(0.6), np.log(1.6))))
     groups = (*(("speed",) if speed else ()), *(("command",) if command else ()), *POSE)
     if name == "lab":
         rate = int(rng.choice([200, 250, 500]))
         late = int(rng.integers(0, 1000 // rate))
-        return Grade(name, rate, groups, 0.0004 * loud, 0.015 * loud, 0.0015 * loud, 0.01 * loud, 0.1 * loud,
-                     0.002 * loud, late)  # fmt: skip
+        return Grade(name, rate, groups, 0.0004 * noise, 0.015 * noise, 0.0015 * noise, 0.01 * noise, 0.1 * noise,
+                     0.002 * noise, late)  # fmt: skip
     if name == "tele":
         rate = int(rng.choice([100, 125, 200]))
         late = int(rng.integers(0, 1000 // rate))
-        return Grade(name, rate, groups, 0.002 * loud, 0.03 * loud, 0.003 * loud, 0.015 * loud, 0.2 * loud,
-                     0.006 * loud, late)  # fmt: skip
-    return Grade(name, 100, ("command", *POSE), 0.02 * loud, 0.04 * loud, 0.006 * loud, 0.008 * loud, 0.15 * loud,
-                 0.0, 0, 0.35 * loud)  # fmt: skip
+        return Grade(name, rate, groups, 0.002 * noise, 0.03 * noise, 0.003 * noise, 0.015 * noise, 0.2 * noise,
+                     0.006 * noise, late)  # fmt: skip
+    return Grade(name, 100, ("command", *POSE), 0.02 * noise, 0.04 * noise, 0.006 * noise, 0.008 * noise, 0.15 * noise,
+                 0.0, 0, 0.35 * noise)  # fmt: skip
 
 
 def gyro_noise(k: int, sigma: float, rng: np.random.Generator) -> np.ndarray:

@@ -41,7 +41,7 @@ class Plan:
     form: str = "csv"
     noise_hint: float | None = 1.0  # factor on the `noise:` entry of vehicle.yaml; None leaves it out
     believes: tuple[str, ...] = ("rotor_radius_m",)  # optional keys of vehicle.yaml to write
-    equivalent: tuple[tuple[str, ...], ...] = ()  # sets of names that these data cannot tell apart
+    equivalent: tuple[tuple[str, ...], ...] = ()  # sets of names that these data cannot distinguish
 
 
 def _rng(seed: int, *labels) -> np.random.Generator:

@@ -501,12 +501,14 @@ def finished(c: Card, vehicle, off, tables, ideals, oracle, windows, seed):
     main = max(ratios, key=ratios.get)
     for entry in (*c.effects, *c.outside):
         entry |= {"size_over_noise": ratios[main], "main_channel": main, "amount": 1.0}
-    told = bool(c.effects or c.outside or off)
+    sealed = bool(c.effects or c.outside or off)
     verdict = ["no_mismatch"]
-    if told:
+    if sealed:
         verdict = ["partly_explained", "unexplained"] if c.outside else ["explained", "partly_explained"]
     # a lag shows between command and speed, steps and dropouts in the columns themselves
-    small = told and not (c.quantum or c.lost or "lag" in c.changes or "believed" in c.changes) and ratios[main] < SMALL
+    small = (
+        sealed and not (c.quantum or c.lost or "lag" in c.changes or "believed" in c.changes) and ratios[main] < SMALL
+    )
     if small:
         verdict.append("no_mismatch")
     truth = {

@@ -30,7 +30,7 @@ class Physics(Protocol):
 
 
 class Device:
-    """What all instruments do: start, stop, one interval. `streaming` tells the wire half to sample."""
+    """What all instruments do: start, stop, one interval. `streaming` makes the wire half sample."""
 
     instrument: wire.Instrument
     needs_watchdog = False  # refuses to move anything before its watchdog is on, as firmware from 1.3 on does

@@ -1,4 +1,4 @@
-"""A full calibration matrix from loads of known direction, beside the thesis's equations.
+"""A full calibration matrix from loads of known direction, next to the thesis's equations.
 
 The thesis reconstructs one axis at a time (eqs 2.6 to 2.8) and says itself that six readings do not determine six
 unknowns. Three of these, the forces, they do determine once it is known how the cells answer to each: voltages of

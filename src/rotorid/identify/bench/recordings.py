@@ -1,4 +1,4 @@
-"""The static tests as recording sets of kind `bench`: reconstructed force beside the load that was put on.
+"""The static tests as recording sets of kind `bench`: reconstructed force next to the load that was put on.
 
 One run holds the loads of one axis and repeat in the order in which they were put on. Its time counts from the
 first recording of the set, so that runs lie where they were in the day; each load has its own recording, tared

@@ -156,7 +156,7 @@ def specimens(samples: pd.DataFrame, sessions: pd.DataFrame) -> tuple[pd.DataFra
 
 
 def by_infill(table: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
-    """Mean of each infill's specimens with its 95 % interval, beside the thesis's table 2.5.
+    """Mean of each infill's specimens with its 95 % interval, next to the thesis's table 2.5.
 
     `printed` has the columns `infill_percent modulus_gpa strength_mpa yield_mpa`.
     """

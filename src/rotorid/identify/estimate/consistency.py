@@ -1,4 +1,4 @@
-"""Do the gyroscopic weights agree with the inertias trained beside them?
+"""Do the gyroscopic weights agree with the inertias trained jointly?
 
 Six weights describe three inertias, so three relations must hold: w11 = w14 (1/w25 - 1/w36), w22 = w25 (1/w36
 - 1/w14), w33 = w36 (1/w14 - 1/w25). A Wald test asks whether their violation is more than the weights' own

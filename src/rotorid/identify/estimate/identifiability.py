@@ -1,4 +1,4 @@
-"""How well a manoeuvre can tell each parameter: Fisher information and what follows from it."""
+"""How well a manoeuvre can determine each parameter: Fisher information and what follows from it."""
 
 from __future__ import annotations
 

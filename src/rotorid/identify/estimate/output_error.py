@@ -162,7 +162,7 @@ def fit_output_error(
     parameters = np.asarray(start, float).copy()
     w, m, _ = windows.rates.shape
     if w <= len(parameters):
-        raise ValueError(f"{w} windows cannot tell {len(parameters)} parameters apart: record longer")
+        raise ValueError(f"{w} windows cannot distinguish {len(parameters)} parameters: record longer")
     moments = np.ascontiguousarray(windows.moments)
     begin, extra = windows.rates[:, 0].copy(), np.zeros((w, 3))
     scale = np.ones(3)

@@ -2,7 +2,7 @@
 
 The reading at rest is taken off each test (the tare): before the motor starts, of a torque test also after.
 Thrust comes from the tester alone. Torque comes from two instruments with their own clocks: the tester counts
-revolutions, the wrench sensor feels the moment. The host's time tells when the sensor was while the motor ran; all
+revolutions, the wrench sensor feels the moment. The host's time shows which of its samples are of the motor's run; all
 margins are in each device's own time, which also holds for an emulator that runs faster than life.
 
 Tables are those of `rotorid.io.tables`: all samples of one instrument, and one row a recording.

@@ -1,7 +1,7 @@
 """The quadrotor's and the wrench sensor's samples on one clock.
 
-The host's arrival times (`rotorid.identify.stand.clocks.lower_edge`) tell each device's clock to within the interval at
-which the host looked, which for a radio link in bursts is several samples. The measurements themselves tell more:
+The host's arrival times (`rotorid.identify.stand.clocks.lower_edge`) give each device's clock to within the interval at
+which the host looked, which for a radio link in bursts is several samples. The measurements themselves show more:
 
 - the lift on the wrench's clock follows the throttle on the quadrotor's by the motors' lag plus the offset of the
   two clocks;
@@ -9,8 +9,8 @@ which the host looked, which for a radio link in bursts is several samples. The 
   motors' lag alone, on the same clock.
 
 The difference is the offset. One record's sag is too small for that, but the motors are the same in all of them:
-their delay is pooled. It is best had from the sines, which tell it from the idle current that a trapezoid switches on
-and off. The clocks' skew is read off the sines too, whose delay must not change over the record; a trapezoid's
+their delay is pooled. It is best had from the sines, which separate it from the idle current that a trapezoid switches
+on and off. The clocks' skew is read off the sines too, whose delay must not change over the record; a trapezoid's
 rising and falling ramp lag differently by themselves.
 """
 
@@ -77,7 +77,7 @@ def both_on_host(
     both = (host >= first["host_time_s"].min()) & (host <= first["host_time_s"].max())
     if not both.any():
         raise InputError("two recordings of one test have no time in common")
-    # Both arrive late, so that neither edge is the clocks'; what the median leaves, the measurements tell.
+    # Both arrive late, so that neither edge is the clocks'; what the median leaves, the measurements show.
     seen = device_time(first["time_s"], first["host_time_s"], host[both])
     offset = float(np.median(seen - second["time_s"].to_numpy()[both]))
     return (first.assign(host_s=first["time_s"]), 1.0), (second.assign(host_s=second["time_s"] + offset), 1.0)
@@ -107,7 +107,7 @@ def motor_delay(pair: Pair, thrust_of: Callable) -> Lag:
     """By how much the battery's sag follows the throttles, on the quadrotor's own clock.
 
     The charge that has been drawn lowers the voltage as well, and so does the idle current of motors that turn at
-    all; both stand beside the sag.
+    all; both are fitted jointly with the sag.
     """
     sent = pair.quadrotor["host_s"].to_numpy()
     when = np.arange(sent[0], sent[-1], STEP_S)
@@ -122,7 +122,7 @@ def lift_delay(pair: Pair, thrust_of: Callable, with_skew: bool = False) -> Lag:
     """By how much the lift on the wrench's clock follows the throttles on the quadrotor's.
 
     The battery empties meanwhile, so that the same throttle gives less lift at the end: the thrust times the
-    drop of the (smoothed) voltage stands beside the thrust.
+    drop of the (smoothed) voltage is fitted jointly with the thrust.
     """
     felt, sent = pair.wrench["host_s"].to_numpy(), pair.quadrotor["host_s"].to_numpy()
     when = np.arange(felt[0], felt[-1], STEP_S)

@@ -1,4 +1,4 @@
-"""How a rotor's speed follows throttle and voltage (beside thesis fig. 3.22), from steady points.
+"""How a rotor's speed follows throttle and voltage (next to thesis fig. 3.22), from steady points.
 
 The points come from `rotorid.identify.rotor.campaign`, one a test. C_F and C_Q, the slopes of thrust and torque over
 ω², are the business of `rotorid.identify.rotor.coefficients`.

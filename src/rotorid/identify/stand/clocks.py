@@ -131,7 +131,7 @@ def follow(
     """
     time_s, signal, cause = (np.asarray(v, float) for v in (time_s, signal, cause))
     if np.ptp(cause) == 0:
-        raise InputError("a constant cause tells no delay")
+        raise InputError("a constant cause shows no delay")
     at_once = np.column_stack([np.ones_like(time_s), *([] if others is None else np.asarray(others, float).T)])
     step = float(np.median(np.diff(time_s)))
     delay, skew = _coarse(time_s, signal, cause, at_once, np.arange(-largest_s, largest_s + step, 2 * step)), 0.0

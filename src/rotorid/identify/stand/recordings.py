@@ -143,7 +143,7 @@ LARGEST_OFFSET_ERROR_S = 0.01
 def torque_set(
     name: str, rotor: tuple, wrench: tuple, believed: Vehicle, noise: dict[str, float], largest_error: float
 ) -> RecordingSet:
-    """The 20 torque tests; where a test's lift is too weak to tell its clocks' offset, the others' median is taken."""
+    """The 20 torque tests; where a test's lift is too weak to show its clocks' offset, the others' median is taken."""
     counted, felt = by_recording(rotor[0]), by_recording(wrench[0])
     tests = []
     for drive, read in pairs(rotor[1], wrench[1]):

@@ -163,7 +163,7 @@ def weights(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gr
 
 
 def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> Weight:
-    """Mass and centre of mass from the readings at rest under all tilts, beside the believed ones.
+    """Mass and centre of mass from the readings at rest under all tilts, next to the believed ones.
 
     Fz gives the mass, the moments M = (R c) × W give c: under tilt also its height. The sensor's own zero is
     taken as zero (it was zeroed without the vehicle), and its frame as level.
@@ -243,7 +243,7 @@ def table(
 
 
 def weight_as_dict(found: Weight, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
-    """The weight for a JSON file, beside the believed one, and how far the believed vehicle's steady wrench is off."""
+    """The weight for a JSON file, next to the believed one, and how far the believed vehicle's steady wrench is off."""
     off = np.array([experiments[name] - experiments[f"{name}_model"] for name in WRENCH])
     half = np.array([experiments[f"{name}_half_95"] for name in WRENCH])
     axes = ("x", "y", "z")

@@ -116,7 +116,7 @@ def _dead(process: str) -> bool:
 
 
 def _to_disk(path: Path) -> None:
-    """Wait until a file's content, or a folder's names, are on the disk: a full disk may tell only then."""
+    """Wait until a file's content, or a folder's names, are on the disk: a full disk may be reported only then."""
     number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)

@@ -53,7 +53,7 @@ class Change:
     """Of an effect or of a mistake in the recordings, or the contract's name of a value."""
     status: Status
     alternatives: tuple[str, ...]
-    """The whole class, itself included, where the recordings cannot tell which of them changed."""
+    """The whole class, itself included, where the recordings cannot show which of them changed."""
     probability: float | None
     """That it, or one of its class, changed; None of a mistake, which is found before."""
     parameters: tuple[Estimate, ...]

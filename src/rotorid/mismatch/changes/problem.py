@@ -157,7 +157,7 @@ def problem_of_changes(
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
-    # What one row tells is little next to what flights differ by anyway: a change is wider than that.
+    # What one row says is little next to what flights differ by anyway: a change is wider than that.
     sd = np.hypot(sd, prior.value_reach * in_units(spread, unit))
     for key, effect in effects.items():
         if effect in NAMES.values() and (own := unit[columns_of[key]]).all():

@@ -51,7 +51,7 @@ from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.values import changed_vehicle, contract_values, names_of, told_of_commands
+from rotorid.mismatch.values import changed_vehicle, contract_values, names_of, stated_of_commands
 from rotorid.mismatch.within_trust import in_words, settled
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -61,7 +61,7 @@ SPEED_LEFT = "what was found between command and rotor speed does not carry over
 
 
 def same_curve(chain: ChainResult) -> dict[str, str]:
-    """Ids that beside a curve of the throttle only say again what it leaves, where speeds are known from it alone."""
+    """Ids that given a curve of the throttle only say again what it leaves, where speeds are known from it alone."""
     if not any(f.id in ids_of_stage(CURVE) and f.status in CLAIMED for f in chain.findings):
         return {}
     return dict.fromkeys(sorted(ids_of("curve_of_load")), "the curve between throttle and rotor speed takes it up")
@@ -149,8 +149,10 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     plain = values_of(Selection([], model.selection.fit))
     findings += absorbed_findings(model, values, findings)
     fit, moved_values = settled(model, values, model.selection.active)
-    told = values if measured else told_of_commands(findings, values)
-    choice = Choice(setup, model, chain, measured, values, told, tuple(findings), leftovers, reasons, tuple(remarks))
+    to_state = values if measured else stated_of_commands(findings, values)
+    choice = Choice(
+        setup, model, chain, measured, values, to_state, tuple(findings), leftovers, reasons, tuple(remarks)
+    )
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(model, chain, unseen)
@@ -238,7 +240,7 @@ def account(
         instrument=setup.instrument,
         loadings=seen.loadings,
         notes=(*choice.remarks, *notes_of(setup)),
-        put_right=in_words(moved_values, VALUE_NAMES),
+        corrected=in_words(moved_values, VALUE_NAMES),
         without=without_each(model, seen, choice.values, own_chain, list(findings), traces),
         without_values=without_values(
             model, seen, choice.values, moved_values, names_of(choice.stated, VALUE_NAMES), traces

@@ -2,7 +2,7 @@
 
 A law of nature has one form, an effect of the catalogue has many: another laboratory's thrust curve, cable or room is
 never quite that of any equation written down before. What a strong effect's form leaves follows the same inputs, is far
-above the noise, and something else in the catalogue will fit it. So whatever was found beside a stronger effect must
+above the noise, and something else in the catalogue will fit it. So whatever was found given a stronger effect must
 also be needed where that one is free to have any smooth form: its contribution times hat functions of the load's size,
 of its own size and of the tilt, each rotor's share of it apart, fading within a run, and a little late. What is not
 needed then is no effect of its own but the stronger one's form being only approximate. Effects whose equation is
@@ -32,7 +32,7 @@ KNOTS = (0.0, 1 / 3, 2 / 3, 1.0)
 WEAKER = 0.5
 """An effect is the weaker one of two where it adds less than this share of what the other explains by itself."""
 OF_ITS_OWN = 0.5
-"""Share of what an effect explains that must remain beside the stronger one's free form."""
+"""Share of what an effect explains that must remain given the stronger one's free form."""
 LATE_ROWS = (1, 2, 4, 8)
 """Rows by which a free form may also be late."""
 FREE = "free form"
@@ -48,7 +48,7 @@ class LeftOfForm:
     stronger: str
     """Key of the stronger one's term."""
     either: bool
-    """Whether the stronger one is in turn not needed beside a free form of this: then it may be the true one."""
+    """Whether the stronger one is in turn not needed given a free form of this: then it may be the true one."""
 
 
 def own_inputs(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
@@ -126,7 +126,7 @@ def later(values: np.ndarray, rows: int) -> np.ndarray:
 
 
 def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regression:
-    """The regression of some terms with the columns of a free form, key FREE, beside them."""
+    """The regression of some terms with the columns of a free form, key FREE, added."""
     regression, setup = model.regression, model.setup
     kept = [t for t in regression.terms if t.key in keys or t.kind != "effect"]
     cols = regression.columns([t.key for t in kept])
@@ -149,7 +149,7 @@ def sizes(model: ReadingModel, active: list[str]) -> dict[str, np.ndarray]:
 
 
 def left_of(model: ReadingModel, weak: str, strong: str, active: list[str], channels: list[int]) -> float:
-    """Share of what `weak` explains that remains beside a free form of `strong`; 0 where it is not significant.
+    """Share of what `weak` explains that remains given a free form of `strong`; 0 where it is not significant.
 
     `weak` is a term at work or a believed value, which then is as free as one that is called wrong.
     """

@@ -1,9 +1,9 @@
 """What lies between command and rotor speed on a stand: lag, delay, throttle curve, sag, saturation.
 
-Where speeds are measured beside the commands they are the response; where only commands or throttles are recorded
-the response is the wrench, with a constant for each channel and the reading's effects found so far left free. A chain
-of speed forms is grown one id at a time by nonlinear least squares on whitened residuals; tests and intervals are
-block-robust.
+Where speeds are measured in addition to the commands they are the response; where only commands or throttles are
+recorded the response is the wrench, with a constant for each channel and the reading's effects found so far left
+free. A chain of speed forms is grown one id at a time by nonlinear least squares on whitened residuals; tests and
+intervals are block-robust.
 """
 
 from __future__ import annotations
@@ -439,7 +439,7 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
         new = {key for key, _ in best.chain} - names
         if not new:
             break
-        # What came in another's place is whitened by its own residual, and beside it others may be needed.
+        # What came in another's place is whitened by its own residual, and given it others may be needed.
         dropped = {key: reason for key, reason in dropped.items() if key not in new}
     best = pruned(problem, better_forms(problem, best, forms), dropped)
     return worded(problem, without_mere_scale(problem, best, dropped), forms, dropped)
@@ -555,7 +555,7 @@ def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | 
 
 
 def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFit:
-    """The chain without what is no longer significant beside the forms that came after it."""
+    """The chain without what is no longer significant given the forms that came after it."""
     while best.chain:
         covariance, count = problem.covariance(best)
         doubtful = {}
@@ -567,7 +567,7 @@ def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFi
         if not doubtful:
             return best
         worst = max(doubtful, key=doubtful.get)
-        dropped.setdefault(worst, f"p = {doubtful[worst]:.2g} beside the others")
+        dropped.setdefault(worst, f"p = {doubtful[worst]:.2g} given the others")
         kept = [(k, f) for k, f in best.chain if k != worst]
         theta = [best.theta[:1]] if problem.scaled else []
         theta += [best.theta[place_of(best.chain, k, problem.scaled)] for k, _ in kept]

@@ -16,7 +16,7 @@ SMALL_LOADS = 0.3
 
 
 def curved_gains(model: ReadingModel, values: Values) -> set[str]:
-    """Gains called wrong beside a curved characteristic that is right at small loads, or right over all of them.
+    """Gains called wrong given a curved characteristic that is right at small loads, or right over all of them.
 
     The gain of a curve is a convention: a reading that saturates is right at small loads, one with a dead band nearly
     so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both.

@@ -43,13 +43,13 @@ def reading_findings(model: ReadingModel, leftovers: tuple[LeftOfForm, ...] = ()
     alternative to it.
     """
 
-    def told(key: str) -> TermReport:
+    def report_of(key: str) -> TermReport:
         channels = tuple(CHANNELS[c] for c in main_channels(model, key))
         either = [c.effect for c in leftovers if c.stronger == key and c.either]
         alternatives = [*alternatives_of(model, key), *either]
         return TermReport(active_values(model, key), parameters_of(model, key), channels, alternatives)
 
-    return findings_of(model.search, model.selection, told)
+    return findings_of(model.search, model.selection, report_of)
 
 
 def parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:

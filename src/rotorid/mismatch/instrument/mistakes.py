@@ -28,7 +28,7 @@ MOMENT_UNITS = {"N cm": 100.0, "N mm": 1000.0, "kgf cm": 10.1972, "mN m": 1000.0
 SPEED_UNITS = {"rpm": 1.0 / 9.549297**2, "Hz": 6.283185**2, "krpm": (1000.0 / 9.549297) ** 2}
 LARGEST_ANGLE_RAD = 1.6
 BETTER = 4.0
-"""Residual energy beside the stated order's, below which another order of rotors is the true one."""
+"""Residual energy over the stated order's, below which another order of rotors is the true one."""
 NAMES = c.FORCE + c.MOMENT
 
 

@@ -85,8 +85,8 @@ class ReadingSearch(Search):
     def alternatives(self, key, active):
         """Of what is collinear with a term over all runs together, what is worth about as much where it was not fitted.
 
-        A stand's runs differ in their tilt: one of them may tell a weight's moment from a tare. What has numbers of its
-        own for every run says nothing of one that was left out, and what explains as much by more numbers is no rival.
+        A stand's runs differ in their tilt: one of them may separate a weight's moment from a tare. What has numbers of
+        its own for every run says nothing of one that was left out; what explains as much by more numbers is no rival.
         """
         rest = [k for k in active if k != key]
         runs = len(np.unique(self.regression.run[self.regression.training]))
@@ -257,7 +257,7 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
 
     What stays below `least`, (6,), own unit, in a channel is within its resolution there: size 0.
     """
-    loud = np.where(np.isfinite(noise), noise, np.inf)
+    unit_noise = np.where(np.isfinite(noise), noise, np.inf)
 
     def sizes(cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
         energies = []
@@ -268,7 +268,7 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
         every = np.sort(np.concatenate(energies), axis=0)
         strongest = np.sqrt(every[int(STRONGEST * len(every)) :].mean(axis=0))
-        return np.where(strongest > least, strongest, 0.0) / loud
+        return np.where(strongest > least, strongest, 0.0) / unit_noise
 
     return sizes
 
@@ -476,7 +476,7 @@ def doubt_of_form(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
 
     Each form counts by its likelihood, exp(−½ whitened squares left), as in Buckland, Burnham and Augustin, Model
     selection: an integral part of inference, Biometrics 53, 1997: an image rotor and its inverse square differ by
-    more than their errors where the recordings hardly tell them apart.
+    more than their errors where the recordings hardly distinguish them.
     """
     form, values = model.search.terms[key].form, active_values(model, key)
     named = [(p.symbol, p.unit) for p in form.parameters]

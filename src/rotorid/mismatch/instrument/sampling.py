@@ -1,4 +1,4 @@
-"""Steps of a reading: quantisation that is coarse beside the noise."""
+"""Steps of a reading: quantisation that is coarse relative to the noise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.recordings import columns as c
 
 COARSE_SHARE = 0.25
-"""Share of the noise's variance that the steps must make, q²/12 beside σ²."""
+"""Share of the noise's variance that the steps must make, q²/12 relative to σ²."""
 LEAST_SAMPLES = 200
 ON_GRID = 0.99
 OFF_GRID = 0.02

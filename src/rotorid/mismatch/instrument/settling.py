@@ -19,7 +19,7 @@ CALM_BEFORE_S, CALM_AFTER_S = 0.3, 1.0
 LOOK_S = 3.0
 EARLY_S = 0.8
 BY_HAND = 1.5
-"""Scatter in the first moments beside the later scatter, from which loads count as put on by hand."""
+"""Scatter in the first moments relative to the later scatter, from which loads count as put on by hand."""
 SETTLED = 1.35
 SMOOTH = 5
 SLACK_S = 0.1

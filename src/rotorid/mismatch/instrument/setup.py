@@ -275,7 +275,7 @@ def without_voltmeter_noise(loadings: list[Loading]) -> list[Loading]:
 
 
 def with_expected_voltages(loadings: list[Loading]) -> list[Loading]:
-    """The loadings with the voltage that the commands make expected in place of the reading, which is kept beside."""
+    """The loadings with the voltage that the commands make expected in place of the reading, which is kept too."""
     read, steps = [x.motion.voltage for x in loadings], [x.dt_s for x in loadings]
     expected = expected_voltages(read, [x.command for x in loadings], steps)
     return [
@@ -470,7 +470,7 @@ def full_speed_of(recordings: RecordingSet, channels: tuple[int, ...]) -> tuple[
 
 
 def measured_full_speed(recordings: RecordingSet) -> float:
-    """Speed per unit of throttle, robustly, from speeds that were measured beside it."""
+    """Speed per unit of throttle, robustly, from speeds that were measured with it."""
     count = recordings.vehicle.rotor_count
     ratios = []
     for run in recordings.runs:

@@ -4,7 +4,7 @@ On a stand the speeds are the load: their noise is an error of the regressor, of
 takes away what is small or quick, and so looks like one. A rotor's inertia keeps its speed smooth, the noise of a
 counter is white: on a plateau every instant gets the longest window whose parabola agrees with those of all shorter
 ones (intersection of confidence intervals; A. Goldenshluger and A. Nemirovski, 1997); at a step the reading stays.
-What is quick may also be the rotors' own: the reading tells, for it follows rotors but not their counters.
+What is quick may also be the rotors' own: the reading shows which, for it follows rotors but not their counters.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LEVEL = 2.0
 """Ratio of the power in the two halves beyond which there is signal up there, and nothing is done."""
 PIECE = 256
 """Samples of a piece whose spectrum is taken; shorter stretches stay as they are."""
-QUIETER, LOUDER = 0.98, 1.01
+SMALLER, LARGER = 0.98, 1.01
 """Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none."""
 LOCAL_S = 1.0
 """Time over which the size of the noise is read off: it may grow with the speed."""
@@ -53,7 +53,7 @@ def quieter(as_read: list[Loading], smoothed: list[Loading]) -> list[Loading]:
     Compared by the squares of the steps from sample to sample, in which effects of the instrument are small.
     """
     ratio = _steps(smoothed) / np.maximum(_steps(as_read), 1e-300)
-    better = len(ratio) > 0 and np.nanmin(ratio) < QUIETER and np.nanmax(ratio) < LOUDER
+    better = len(ratio) > 0 and np.nanmin(ratio) < SMALLER and np.nanmax(ratio) < LARGER
     return smoothed if better else as_read
 
 

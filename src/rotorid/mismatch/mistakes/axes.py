@@ -73,14 +73,14 @@ class Reading:
 
 
 def read(fit: LaggedFit | None) -> Reading | None:
-    """Signed axes from the gains of a fit Y = M X, None where the motion tells too little.
+    """Signed axes from the gains of a fit Y = M X, None where the motion determines too little.
 
     An axis that moves too little keeps the sign of the others' rule (itself).
     """
     if fit is None:
         return None
     source, sign, gains, p_values = [0, 1, 2], [1, 1, 1], [], []
-    told = 0
+    clear = 0
     for j in range(3):
         row, sd = fit.gain[j], np.maximum(fit.gain_sd[j], 1e-12)
         order = np.argsort(-np.abs(row))
@@ -89,12 +89,12 @@ def read(fit: LaggedFit | None) -> Reading | None:
             continue
         if abs(row[best]) < DOMINANCE * abs(row[order[1]]):
             continue
-        told += 1
+        clear += 1
         # Row j of M names the column of X that is true axis j.
         source[best], sign[best] = j, int(np.sign(row[best]))
         gains.append((abs(row[best]), sd[best]))
         p_values.append(float(student.sf(abs(row[best]) / sd[best], max(fit.block_count - 1, 1))))
-    if told < 1 or sorted(source) != [0, 1, 2]:
+    if clear < 1 or sorted(source) != [0, 1, 2]:
         return None
     value = float(np.median([g for g, _ in gains]))
     return Reading(Turn(tuple(source), tuple(sign)), value, float(np.median([s for _, s in gains])), max(p_values))
@@ -283,16 +283,16 @@ def attitude_fits(all_signals: list[Signals], vehicle, strict: bool = False) -> 
     fit = lagged.fit(compare.accelerating(all_signals, vehicle, source)) if source else None
     if fit is None:
         return not strict or bool(agree)
-    told = [fit.gain[k, k] / max(fit.gain_sd[k, k], 1e-12) for k in (0, 1) if fit.explained[k] > LEAST_EXPLAINED]
+    ratios = [fit.gain[k, k] / max(fit.gain_sd[k, k], 1e-12) for k in (0, 1) if fit.explained[k] > LEAST_EXPLAINED]
     gain = [fit.gain[k, k] for k in (0, 1) if fit.explained[k] > LEAST_EXPLAINED]
-    if not told:
+    if not ratios:
         crossed = [k for k in (0, 1) if fit.explained[k] > 0.2]
         return not crossed or not strict
-    return bool(np.all(np.array(told) > LEAST_T / 2) and np.all(np.array(gain) > 0.3))
+    return bool(np.all(np.array(ratios) > LEAST_T / 2) and np.all(np.array(gain) > 0.3))
 
 
 def _gyroscope_units(recordings: RecordingSet, signals: list[Signals]) -> Result:
-    """Without a telling attitude: the gyroscope's unit from the size of the believed moments."""
+    """Without an attitude that shows it: the gyroscope's unit from the size of the believed moments."""
     sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
     if sensor is None or sensor == "throttle" and not recordings.vehicle.rotor_speed_limits_rad_s:
         return Result(recordings)
@@ -359,7 +359,7 @@ def _carried(fit: LaggedFit) -> np.ndarray:
 
 
 def _sideways(recordings: RecordingSet) -> Result:
-    """The accelerometer's x and y, where there is enough sideways force to tell."""
+    """The accelerometer's x and y, where there is enough sideways force to decide."""
     signals = signals_of(recordings)
     fit = lagged.fit(compare.sideways(signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
     if fit is None:

@@ -24,7 +24,7 @@ NYQUIST_SHARE = 0.35
 
 
 def speeds_of(signals: Signals) -> str | None:
-    """Which sensor tells the rotor speeds: measured, else commanded, else throttle."""
+    """Which sensor gives the rotor speeds: measured, else commanded, else throttle."""
     return next((n for n in ("rotors", "commands", "throttle") if n in signals.values), None)
 
 

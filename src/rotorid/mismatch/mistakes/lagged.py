@@ -310,7 +310,7 @@ def loss_by_block(blocks: Blocks, found: LaggedFit, gain: np.ndarray, lag_s) -> 
 
 
 def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
-    """Commands replaced by what a first-order motor makes of them, its time constant fitted beside the delay."""
+    """Commands replaced by what a first-order motor makes of them, its time constant fitted jointly with the delay."""
     base = fit(blocks)
     if base is None:
         return 0.0, blocks
@@ -330,7 +330,7 @@ def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
         for factor in (1 - width, 1 - width / 2, 1 + width / 2, 1 + width):
             attempt(best * factor)
     best = min(trials, key=lambda tau: trials[tau][0])
-    # Slow motion cannot tell a lag from a dead time: where it fits as well with hardly any, there is none.
+    # Slow motion cannot distinguish a lag from a dead time: where it fits as well with hardly any, there is none.
     plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + UNDECIDED]
     least = min(plausible, key=lambda tau: trials[tau][1])
     chosen = least if trials[least][1] < 0.5 * trials[best][1] else best

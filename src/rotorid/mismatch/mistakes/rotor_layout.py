@@ -180,7 +180,7 @@ def find(recordings: RecordingSet) -> Result:
     yaw_losses = np.array([loss(yaw, row) for row in yaw_rows]) if yaw else np.zeros(1)
     losses = losses_of_orders(parts, rows, orders)[:, None] + yaw_losses[None, :]
     if not np.isfinite(losses).all():
-        # Rotors that all turn alike make no moment to tell them apart by.
+        # Rotors that all turn alike make no moment that distinguishes them.
         return Result(recordings)
     whole = float(sum(m.square.sum() for m in parts) + (yaw.square.sum() if yaw else 0.0))
     costs = np.array([moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
@@ -190,7 +190,7 @@ def find(recordings: RecordingSet) -> Result:
     order, turned = ranked[0]
     if costs[order, turned] == 0:
         return Result(recordings)
-    # Only axes on which the two layouts differ can tell them apart.
+    # Only axes on which the two layouts differ can distinguish them.
     contested, now, then = [], [], []
     for a, m in enumerate(parts):
         if not np.array_equal(rows[a], rows[a][orders[order]]):
@@ -262,7 +262,7 @@ def _turned_gyroscope(
     note = "No attitude is recorded: the gyroscope's axes were identified from the believed rotors' moments."
     finding = axis_finding(recordings, "gyroscope", best[1], p_value)
     if best[0] == cost:
-        words = "; or else rotors are in another order than vehicle.yaml has them, which nothing recorded tells apart."
+        words = "; or else rotors are in another order than vehicle.yaml has them, which nothing recorded shows."
         finding = replace(
             finding,
             status="ambiguous",
@@ -294,11 +294,11 @@ def _reordered(recordings: RecordingSet, order: np.ndarray, p: float, ambiguous:
         return columns
 
     wrong = [i for i in range(len(order)) if order[i] != i]
-    told = ", ".join(f"column {i + 1} belongs to rotor {order[i] + 1}" for i in wrong)
+    moved = ", ".join(f"column {i + 1} belongs to rotor {order[i] + 1}" for i in wrong)
     finding = Finding(
         id="rotor_order",
         status="ambiguous" if ambiguous else "established",
-        sentence=f"The rotor columns are in another order than vehicle.yaml: {told}; put in order.",
+        sentence=f"The rotor columns are in another order than vehicle.yaml: {moved}; put in order.",
         p_value=p,
         channels=tuple(names["rotors"][i] for i in wrong),
         alternatives=("rotor_order", "spin_direction") if ambiguous else (),
@@ -319,8 +319,8 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
         return Signal(rate[:, 2:], True), Signal(np.concatenate([torque, change], axis=1)), Signal(rate)
 
     blocks = compare.gather(signals, ("gyroscope", sensor), YAW_BAND_HZ, make)
-    telling = roll.lag_sd < 0.005
-    late = roll.lag_s if telling else 0.0
+    sharp = roll.lag_sd < 0.005
+    late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))
     return moments(blocks, 0, late, free.weight[0]) if free else None
 

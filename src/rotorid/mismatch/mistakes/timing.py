@@ -25,8 +25,8 @@ from rotorid.mismatch.motion import fresh_samples
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 LEAST_ALONE = 0.9
-"""Share of the motion that commands must explain to tell a constant lateness: below it the motors' lag, fitted later,
-tells their dead time better. A growth of it is bounded by what disturbances can feign (`disturbed_s`)."""
+"""Share of the motion that commands must explain to show a constant lateness: below it the motors' lag, fitted later,
+shows their dead time better. A growth of it is bounded by what disturbances can feign (`disturbed_s`)."""
 LEAST_SHARE = 0.1
 """A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
 SHARE_STEP_S = 0.004
@@ -133,7 +133,7 @@ Shares = tuple[tuple[str, float], ...]
 def comparisons(
     all_signals: list[Signals], vehicle: Vehicle
 ) -> list[tuple[str, str, Blocks, LaggedFit, float, Shares]]:
-    """Every comparison that may tell time: later and earlier sensor, spectra, fit, motor lag taken out (s), shares."""
+    """Every comparison that may show time: later and earlier sensor, spectra, fit, motor lag taken out (s), shares."""
     have = set().union(*(s.values for s in all_signals))
     speeds = next((n for n in map(compare.speeds_of, all_signals) if n), None)
     force = "accelerometer" if "accelerometer" in have else None
@@ -347,7 +347,7 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
 
 
 def telling_differences(known: list, drifting: bool) -> tuple[list[Difference], list]:
-    """Every difference of lateness that a comparison is good enough to tell, and those comparisons."""
+    """Every difference of lateness that a comparison is good enough to show, and those comparisons."""
     found = [(difference(*c, drifting=drifting), c) for c in known]
     kept = [
         (d, c)
@@ -384,7 +384,7 @@ def in_every_run(whole: Difference, comparison: tuple) -> bool:
         own = blocks.part(blocks.run == run)
         if own.count < 2:
             continue
-        # A run of a few blocks cannot tell gains of its own.
+        # A run of a few blocks cannot determine gains of its own.
         d = difference(late, over, own, found, motor_s, shares, drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
         sd = d.sd(1)
         agree.append(abs(d.growth - whole.growth) < RUN_SIGMAS * sd + RUN_AGREEMENT * abs(whole.growth))
@@ -575,13 +575,13 @@ def _listed(sensors: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def one_clock(differences: list[Difference], telling: list[Difference]) -> tuple[str, ...]:
+def one_clock(differences: list[Difference], growing: list[Difference]) -> tuple[str, ...]:
     """The sensor whose clock alone explains all growths best, and others that do so as well; none for no candidate.
 
-    Candidates are the two sides of the comparisons that surely tell of a growth. Nothing but height rests on the
+    Candidates are the two sides of the comparisons with a significant growth. Nothing but height rests on the
     position, so that it is none of them.
     """
-    names = {n for d in telling for n in (d.late, *(name for name, _ in d.shares))} - {"position"}
+    names = {n for d in growing for n in (d.late, *(name for name, _ in d.shares))} - {"position"}
     left = {}
     for name in names:
         rate, _ = across(differences, [name], 1)
@@ -599,7 +599,7 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     found, sources = telling_differences(known, drifting=True)
     longest = max((s.time_s[-1] - s.time_s[0] for s in signals), default=0.0)
     periods = own_period_s(signals)
-    telling = []
+    growing = []
     for d, source in zip(found, sources, strict=True):
         beyond = abs(d.growth) - d.bound(1)
         p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.pieces - 2, 1)))
@@ -607,8 +607,8 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
         if p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > LEAST_LIKELIHOOD:
             if not in_every_run(d, source):
                 continue
-            telling.append((p, d))
-    if not telling:
+            growing.append((p, d))
+    if not growing:
         return Result(recordings)
     solved = lateness(found, 1)
     drift = relative_to_most(solved, {n: 0.5 * max(periods[n], 2e-3) / longest for n in solved.names}, 3.0)
@@ -620,14 +620,14 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     wrong = [n for n in wrong if n != "position" or {"velocity", "attitude"} & set(wrong)]
     other = ""
     if not wrong:
-        # Two clocks surely part, and the rest cannot tell which is right: the one that leaves least to explain.
-        blamed = one_clock(found, [d for _, d in telling])
+        # Two clocks surely part, and the rest cannot show which is right: the one that leaves least to explain.
+        blamed = one_clock(found, [d for _, d in growing])
         if not blamed:
             return Result(recordings)
         drift = {blamed[0]: (across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
         wrong = [blamed[0]]
         if len(blamed) > 1:
-            other = f" (or that of {_listed(list(blamed[1:]))} the other way: nothing else recorded tells which)"
+            other = f" (or that of {_listed(list(blamed[1:]))} the other way: nothing else recorded shows which)"
     # One clock at a time, the one most sensors go by first: what a second one did is measured anew.
     rates = {n: value for n, (value, _, _) in drift.items()}
     sides = [[n for n in wrong if rates[n] > 0], [n for n in wrong if rates[n] < 0]]
@@ -657,7 +657,7 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
             f"every second; put on the other sensors' time."
         ),
         parameters=(Estimate("skew", rate, "1", rate - 1.96 * sd, rate + 1.96 * sd),),
-        p_value=max(min(p for p, _ in telling), 0.0),
+        p_value=max(min(p for p, _ in growing), 0.0),
         channels=tuple(columns),
     )
     return Result(fixed, (finding,))

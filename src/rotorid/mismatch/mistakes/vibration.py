@@ -3,7 +3,7 @@
 The phase of each rotor is the integral of its recorded speed. Multiplying a reading by e^(-iψ) at the instants of
 its samples turns a line locked to the rotor, or its alias, into a constant, whatever the sampling rate; a
 structural resonance stays at its own frequency and passes by. In short windows the power at the rotor's order is
-compared with the power at orders beside it.
+compared with the power at orders next to it.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from rotorid.recordings import columns as c
 
 WINDOW_S = 0.35
 SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
-"""Offsets from the order, in widths of the window, that tell the level beside the line."""
+"""Offsets from the order, in widths of the window, that give the level next to the line."""
 ORDERS = (1, 2)
 P_LIMIT = 1e-9
 LEAST_MEDIAN = 3.0
-"""Power at the order over that beside it in half of the windows, at least."""
+"""Power at the order over that next to it in half of the windows, at least."""
 LEAST_AMPLITUDE = 0.5
-"""Line over the reading's own scatter beside it (one sigma a sample), at least, to matter."""
+"""Line over the reading's own scatter next to it (one sigma a sample), at least, to matter."""
 SCALES = np.arange(0.85, 1.151, 0.015)
-"""Factors on a commanded speed that are tried: the window tells speeds of 18 rad/s apart."""
+"""Factors on a commanded speed that are tried: the window distinguishes speeds of 18 rad/s."""
 COMMAND_LAG_S = 0.03
 """How late rotors follow their commands, roughly."""
 MOST_WINDOWS = 30
@@ -125,7 +125,7 @@ def scaled(s: Signals, scale: float) -> Signals:
 
 
 def strongest_line(signals: list[Signals]) -> float:
-    """Power at the order over that beside it, in half of the windows, of the accelerometer's clearest line."""
+    """Power at the order over that next to it, in half of the windows, of the accelerometer's clearest line."""
     best = 0.0
     for axis in range(3):
         for order in ORDERS:
@@ -142,7 +142,7 @@ def strongest_line(signals: list[Signals]) -> float:
 
 
 def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, unit: str, order: int) -> Line | None:
-    """Power at the rotors' order over that beside it, summed over windows and rotors."""
+    """Power at the rotors' order over that next to it, summed over windows and rotors."""
     ratios, powers, levels, lengths = [], [], [], []
     for s in all_signals:
         length = int(WINDOW_S * s.rate_hz)
@@ -165,7 +165,7 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
     n = len(ratio)
     if np.median(ratio) < LEAST_MEDIAN:
         return None  # a line is there as long as the rotors turn; single fierce moments are motion
-    # Each ratio is about exponential, a little heavier because the level beside is estimated from eight bins.
+    # Each ratio is about exponential, a little heavier because the level nearby is estimated from eight bins.
     p = float(gamma.sf(float(ratio.sum()) * (1 - 1 / len(SIDE_BINS)), n))
     mean = float(power.mean())
     sd = float(power.std(ddof=1) / np.sqrt(n))
@@ -178,7 +178,7 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
 def demodulated(
     s: Signals, sensor: str, axis: int, order: int, length: int, most: int | None = None
 ) -> tuple[np.ndarray, ...]:
-    """Squared amplitude at the order, beside it, number of rotors that share the line, and noise: (windows, rotors).
+    """Squared amplitude at the order, next to it, number of rotors that share the line, and noise: (windows, rotors).
 
     NaN where it is not identifiable. Of no more than `most` windows spread over the run, if stated.
     """

@@ -32,7 +32,7 @@ class PosteriorSearch:
     def run(self, start: Sequence[str] | None = None) -> Selection:
         """The effects at work; the search starts from nothing and from `start`.
 
-        Where the model holds a believed value that may be plainly wrong, values have more room from here on.
+        Where the model holds a believed value that may be wrong beyond its trust, values have more room from here on.
         """
         found = decide(evidence_from(self.regression), self.prior, start or ())
         self._found = found

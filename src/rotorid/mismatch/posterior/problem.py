@@ -33,7 +33,7 @@ class Problem:
     effects: Mapping[str, str]
     """Key of an effect's term to what can be in a model only once: its id, or of one window its key."""
     freed: Mapping[str, float]
-    """Key of a believed value to its scaled one-sigma where it may be plainly wrong: such keys are part of a model."""
+    """Key of a believed value to its scaled one-sigma where it may be wrong by more: such keys are part of a model."""
     log_prior_of: Mapping[str, float]
     """Key of what a model may hold to its log prior, nats."""
     unit: np.ndarray
@@ -196,7 +196,7 @@ def believed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """One-sigma, lower and upper bound of every scaled coefficient, and whether it is a believed value, (K,) each.
 
-    Effects have unit information (one-sigma √rows: what one row alone would tell), nuisances what is stated of them,
+    Effects have unit information (one-sigma √rows: what one row determines), nuisances what is stated of them,
     values the user's trust.
     """
     count = len(unit)

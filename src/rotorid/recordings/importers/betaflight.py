@@ -128,7 +128,7 @@ def convert(
     throttle, more = _throttles(raw, headers)
     faults += more
     if throttle is None:
-        raise InputError(f"{where}: motor[0] to motor[3] are not logged, so that nothing tells when the vehicle flies")
+        raise InputError(f"{where}: motor[0] to motor[3] are not logged, so that nothing shows when the vehicle flies")
     table[list(c.rotor_columns("throttle", throttle.shape[1]))] = throttle
     turns = fields("eRPM", throttle.shape[1])
     if turns is not None and np.nanmax(turns) > 0:

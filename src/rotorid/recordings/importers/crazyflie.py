@@ -178,7 +178,7 @@ def flights(
     table, more = convert(tables["fixedFrequency"])
     missing = [name for name in THROTTLES if name not in table]
     if missing and not stretches:
-        raise InputError(f"{path}: motor.m1 to motor.m4 are not logged, so that nothing tells when the vehicle flies")
+        raise InputError(f"{path}: motor.m1 to motor.m4 are not logged, so that nothing shows when the vehicle flies")
     stretches = stretches or detect(table)
     if not stretches:
         raise InputError(f"{path}: the vehicle never flies for 4 s in this log")

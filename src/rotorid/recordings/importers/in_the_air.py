@@ -30,7 +30,7 @@ LIFTS = 0.95
 FALLING = 0.9
 """Share of the usual specific force below which a vehicle falls: on the ground it stays at 1 g."""
 NEAR_WEIGHT_ALONE = 0.7
-"""The same where no accelerometer tells a fall from the ground."""
+"""The same where no accelerometer distinguishes a fall from the ground."""
 TURNS_RAD_S = 1.0
 """Root mean square of slow body rates above which a vehicle whose rotors turn is in the air. A public log has one that
 rocks on the ground at 0.3 to 0.8 with rotors at two thirds of what flight takes."""

@@ -57,7 +57,7 @@ class Px4Log:
 class Converted:
     """A whole log in contract columns.
 
-    `flying` (n,) says in which rows the vehicle is in the air, as far as the log tells.
+    `flying` (n,) says in which rows the vehicle is in the air, as far as the log shows.
     """
 
     table: pd.DataFrame

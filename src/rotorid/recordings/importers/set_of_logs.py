@@ -54,7 +54,7 @@ class SetOfLogs:
         """Write `vehicle.yaml` (unless it was there and is kept), a file a run, a report and the list of the runs.
 
         All of it or nothing: it is written aside and takes its name in one step. A set that is there already gets the
-        new runs beside its own; until all are there its list says that it is not whole. Runs are Parquet files; plain
+        new runs next to its own; until all are there its list says that it is not whole. Runs are Parquet files; plain
         CSV where wished, and .csv.gz where pyarrow is not installed.
 
         Raises
@@ -131,7 +131,7 @@ def set_of_logs(
     Raises
     ------
     InputError
-        A log cannot be read or holds no flight; the logs do not belong together; nothing tells what vehicle it is;
+        A log cannot be read or holds no flight; the logs do not belong together; nothing says what vehicle it is;
         `there` exists and would change.
     """
     if len(logs) > MOST_RUNS:
@@ -164,7 +164,7 @@ def set_of_logs(
         template = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
         if template is None:
             raise InputError(
-                f"{logs[0]}: nothing tells what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
+                f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
                 f"{', '.join(templates.names())} and --mass-kg"
             )
         vehicle = templates.read(template)

@@ -57,10 +57,10 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
     total = sum(4 * len(t.time_s) for traces in by_pair.values() for t in traces)
     every = max(1, int(np.ceil(total / BUDGET)))
     runs = list(dict.fromkeys(run for run, _ in by_pair))
-    loudest = _loudest_run(analysis, verdict, main)
-    flown = replay(analysis, verdict, loudest, segments)
+    largest = _largest_run(analysis, verdict, main)
+    flown = replay(analysis, verdict, largest, segments)
     return {
-        "main": {"channel": main, "run": loudest},
+        "main": {"channel": main, "run": largest},
         "every": every,
         "channels": {
             c: {"name": channel_words(c), "unit": verdict.channels[c].unit, "noise": verdict.channels[c].noise_floor}
@@ -71,7 +71,7 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
                  for r in runs},
         "traces": [_series(*pair, traces, read_by_pair[pair], every) for pair, traces in by_pair.items()],
         "fit_percent": {c: [round(v, 2) for v in fit] for c, fit in fit_percent(analysis, readings).items()},
-        "replay": None if flown is None else _frames(loudest, flown),
+        "replay": None if flown is None else _frames(largest, flown),
         "locations": [
             {"run": loc.run, "channel": loc.channel, "start": loc.start_s, "stop": loc.stop_s}
             for loc in verdict.locations
@@ -81,7 +81,7 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
     }  # fmt: skip
 
 
-def _loudest_run(analysis: Analysis, verdict: Verdict, main: str) -> str:
+def _largest_run(analysis: Analysis, verdict: Verdict, main: str) -> str:
     """The held-out run in which most of the main channel's error was removed, else any run."""
     traces = [t for t in analysis.traces if t.channel == main]
     if not traces:

@@ -391,7 +391,7 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
     others = [effect_words(i) for i in e.alternatives if i != e.id]
     if others:
         notes.append(
-            f"It could as well be {listed(others, 'or')}: these recordings cannot tell them apart; the model holds "
+            f"It could as well be {listed(others, 'or')}: these recordings cannot distinguish them; the model holds "
             f"{effect_words(e.id)} in the place of the class."
         )
     if e.size is not None and e.size.share is not None:
@@ -630,11 +630,11 @@ def next_text(verdict: Verdict, recordings: RecordingSet) -> str:
             return f"What is left has no name yet: repeat the flight with slow sweeps{over}, one at a time."
         if verdict.verdict == "no_mismatch":
             return "Nothing is open. Faster, higher or rougher flight would show whether the model holds there too."
-        return "Nothing is left to tell apart."
+        return "Nothing is left to distinguish."
     text = capital(plan.manoeuvre).rstrip(".") + "."
     if plan.separates:
         what = "flight" if verdict.kind == "flight" else "session"
-        text += f" It is meant to tell {listed([effect_words(i) for i in plan.separates])} apart. "
+        text += f" It is meant to distinguish {listed([effect_words(i) for i in plan.separates])}. "
         return Markup("{}<code>rotorid plan</code> says which {} within your limits does, if any, and how far.").format(
             text, what
         )

@@ -73,7 +73,7 @@ def hidden_sizes(sizes: pd.DataFrame) -> Figure:
 
 
 def inertia_training(history: pd.DataFrame, fits: dict) -> Figure:
-    """Error by epoch (figure 4.22) and, right, trained gyroscopic weights beside what their inertias imply."""
+    """Error by epoch (figure 4.22) and, right, trained gyroscopic weights next to what their inertias imply."""
     fig, axes = style.figure(2.9, 1, 2)
     for colour, rate in zip(AXIS_COLOURS, "pqr", strict=True):
         axes[0].loglog(history["epoch"] + 1, history[rate], color=colour, label=rf"$\dot {rate}$")
@@ -134,7 +134,7 @@ def excitation(traces: pd.DataFrame) -> Figure:
 
 
 def errors(draws: pd.DataFrame, thesis_percent: list[float], network_percent: list[float]) -> Figure:
-    """Error of each inertia: every draw of the noise with its interval; the thesis's and the network's beside it."""
+    """Error of each inertia: every draw of the noise with its interval; the thesis's and the network's next to it."""
     fig, axes = style.figure(2.7, 1, 3, sharey=True)
     for k, (axis, name) in enumerate(zip(axes, ("xx", "yy", "zz"), strict=True)):
         axis.axhspan(-0.2, 0.2, color="#e6f2ea")

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 SHOWN_SAMPLES = 1600
 SMOOTH_S = 0.5
 STRIP_CELL_S = 0.5
-LOUDEST = 10.0
-"""Size beside the noise at which the heat strip's colour ends."""
+LARGEST = 10.0
+"""Size relative to the noise at which the heat strip's colour ends."""
 SHADE = "#f3e6d8"
 
 
@@ -107,7 +107,7 @@ def heat_strip(
     sizes: Mapping[tuple[str, str, str], tuple[np.ndarray, np.ndarray]],
     located: Mapping[tuple[str, str], Sequence[tuple[float, float]]],
 ) -> Figure:
-    """Size of the error beside the noise, channels down, the runs' time across, before above after.
+    """Size of the error relative to the noise, channels down, the runs' time across, before above after.
 
     `sizes` maps (stage, run, channel) to instants and sizes in units of the noise; `located` maps (run, channel)
     to intervals, which are underlined.
@@ -127,7 +127,7 @@ def heat_strip(
         sharey=True,
         gridspec_kw={"width_ratios": widths},
     )
-    norm = LogNorm(0.7, LOUDEST)
+    norm = LogNorm(0.7, LARGEST)
     for row, stage in enumerate(("before", "after")):
         for column, run in enumerate(runs):
             ax = axes[row, column]
@@ -137,7 +137,7 @@ def heat_strip(
                 time_s, size = sizes[stage, run, channel]
                 step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else STRIP_CELL_S
                 edges = np.append(time_s - step / 2, time_s[-1] + step / 2)
-                image = np.clip(size, 0.7, LOUDEST)[None, :]
+                image = np.clip(size, 0.7, LARGEST)[None, :]
                 ax.pcolormesh(edges, [line - 0.44, line + 0.36], image, norm=norm, cmap="YlOrRd", rasterized=True, lw=0)
                 if row == 0:
                     for start, stop in located.get((run, channel), ()):

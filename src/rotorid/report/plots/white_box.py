@@ -119,7 +119,7 @@ def pose(roll_rad: float, pitch_rad: float, yaw_rad: float) -> list[np.ndarray]:
 
 
 def view(flight: pd.DataFrame, every_s: float = 1.0) -> Figure:
-    """Key poses of the simulated flight (figure 4.9a), one beside the other, with the angles that they have."""
+    """Key poses of the simulated flight (figure 4.9a), one next to the other, with the angles that they have."""
     step = float(flight["time_s"].iloc[1])
     rows = flight.iloc[:: max(int(round(every_s / step)), 1)]
     fig, axes = style.figure(1.75, 1, len(rows), gridspec_kw={"wspace": 0.02})

@@ -47,8 +47,8 @@ def remarks(vehicle: Vehicle) -> tuple[str, ...]:
     """What `swings` flies otherwise than the file says, a sentence each; InputError for what does not fly."""
     flown, said = flyable(vehicle)
     found = hover(flown, command_path(flown), START_HEIGHT_M)
-    if found.carried < 1:
-        share = 100 * max(found.carried, 0.0)
+    if found.supported < 1:
+        share = 100 * max(found.supported, 0.0)
         said += (f"The vehicle sinks: all that its rotors can do carries {share:.0f} % of what hover needs.",)
     return said
 

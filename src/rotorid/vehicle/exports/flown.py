@@ -1,4 +1,4 @@
-"""An exported vehicle flown in the tool it is for, beside ours with what the file expresses, on the same commands.
+"""An exported vehicle flown in the tool it is for, next to ours with what the file expresses, on the same commands.
 
 What a file cannot express is named by `rotorid.vehicle.exports.forms`; a flight here shows that what it does express
 flies as it does with us. RotorPy and MuJoCo fly their file themselves. Gazebo and gym-pybullet-drones are no packages
@@ -32,7 +32,7 @@ START_M_S = 2.0
 
 @dataclass(frozen=True)
 class Difference:
-    """How far two simulations part: largest distance and angle, beside how far ours flew and turned."""
+    """How far two simulations part: largest distance and angle, next to how far ours flew and turned."""
 
     position_m: float
     angle_rad: float
@@ -43,7 +43,7 @@ class Difference:
     @property
     def sentence(self) -> str:
         return (
-            f"flown in {self.where} beside ours, with what the file expresses, on the same commands: at most "
+            f"flown in {self.where} next to ours, with what the file expresses, on the same commands: at most "
             f"{self.position_m:.2g} m apart after {self.flown_m:.2g} m of way and "
             f"{self.angle_rad:.2g} rad after {self.turned_rad:.2g} rad of turning"
         )
@@ -104,7 +104,7 @@ def difference(
 
 
 def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
-    """Fly RotorPy's Multirotor with the exported parameters beside ours."""
+    """Fly RotorPy's Multirotor with the exported parameters next to ours."""
     from rotorpy.vehicles.multirotor import Multirotor
 
     time, speeds = commands_of(vehicle, duration_s)
@@ -132,7 +132,7 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
 
 
 def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
-    """Fly the exported model in MuJoCo beside ours without the effects that the model cannot express."""
+    """Fly the exported model in MuJoCo next to ours without the effects that the model cannot express."""
     import mujoco
 
     with read_by("MuJoCo"):
@@ -192,7 +192,7 @@ class GazeboMotor:
 
 
 def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
-    """Fly the exported SDF model in Drake beside ours without the effects that the model cannot express.
+    """Fly the exported SDF model in Drake next to ours without the effects that the model cannot express.
 
     Drake reads masses, inertias, places and joints. It has no motor model: thrust C_F ω² and drag −k ω v⊥ act on the
     rotor's link and the torque on the body, as in Gazebo's `MulticopterMotorModel::UpdateForcesAndMoments`.
@@ -276,7 +276,7 @@ BULLET_DAMPING = 0.04
 def in_pybullet(
     vehicle: Vehicle, exported: Exported, duration_s: float = 0.3, damping: float = BULLET_DAMPING
 ) -> Difference:
-    """Fly the exported URDF in Bullet beside ours without the effects that gym-pybullet-drones cannot express.
+    """Fly the exported URDF in Bullet next to ours without the effects that gym-pybullet-drones cannot express.
 
     Forces on the rotors' links, torque and drag on the link at the centre of mass, all from the file's `properties`, as
     in that tool's `BaseAviary._physics` and `_drag`.
@@ -342,7 +342,7 @@ FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], Difference]]] = {
 
 
 def try_out(vehicle: Vehicle, to: str, exported: Exported) -> str:
-    """What a flight beside ours showed, or why none was made; empty for a form that no tool flies.
+    """What a flight next to ours showed, or why none was made; empty for a form that no tool flies.
 
     InputError where the tool does not read the file.
     """

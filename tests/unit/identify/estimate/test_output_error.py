@@ -83,7 +83,7 @@ def test_windows_with_gaps_are_left_out_and_too_few_are_said():
     windows = cut_windows(rates, moments, DT, 0.5)
     assert np.isfinite(windows.rates).all() and len(windows.rates) == 6
     few = RateWindows(windows.rates[:2], windows.moments[:2], DT)
-    with pytest.raises(ValueError, match="2 windows cannot tell 3 parameters apart"):
+    with pytest.raises(ValueError, match="2 windows cannot distinguish 3 parameters"):
         fit_output_error(few, tied, np.log(TRUE))
 
 

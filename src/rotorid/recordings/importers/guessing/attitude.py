@@ -170,7 +170,7 @@ def _rates_alone(draft: Draft, family: Family, seen: str, mirrored: str) -> None
     elif top > FASTEST_GYRO_RAD_S:
         draft.put("angular_velocity", family.columns, evidence + ", too fast for rad/s", unit="deg/s")
     else:
-        question = "rad/s or deg/s: neither the names nor an attitude tell"
+        question = "rad/s or deg/s: neither the names nor an attitude show which"
         draft.put("angular_velocity", family.columns, evidence, question, unit=OPEN)
 
 
@@ -196,7 +196,7 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
         draft.put("attitude", chosen.columns, evidence, form=chosen.form)
         draft.wxyz = signed_continuous(chosen.wxyz)
     elif first.form == "euler":
-        draft.put("attitude", first.columns, why, "rad or deg: no gyroscope tells", form="euler", unit=OPEN)
+        draft.put("attitude", first.columns, why, "rad or deg: no gyroscope shows which", form="euler", unit=OPEN)
     else:
-        question = f"wxyz or xyzw: no gyroscope tells (cosine of the tilt: {said})"
+        question = f"wxyz or xyzw: no gyroscope shows which (cosine of the tilt: {said})"
         draft.put("attitude", first.columns, why, question, form=OPEN)

@@ -73,7 +73,7 @@ def guess_frames(draft: Draft) -> tuple[str, str]:
     if body == OPEN:
         draft.open["body"] = "frd reads -1, flu +1 in level flight"
     if draft.wxyz is None or draft.time_s is None:
-        draft.open["world"] = "ned, enu or nwu: without an attitude of known order nothing tells which way z points"
+        draft.open["world"] = "ned, enu or nwu: without an attitude of known order nothing shows which way z points"
         return body, OPEN
     turned = by.into_world(draft.time_s, draft.wxyz, values)
     up = float(np.nanmedian(turned[:, 2] / np.linalg.norm(turned, axis=1)))
@@ -96,7 +96,7 @@ def _frames_without_accelerometer(draft: Draft) -> tuple[str, str]:
     """Frames by where a vehicle that tilts is accelerated to: its thrust is along -z (FRD) or +z (FLU)."""
     speeds = [f for f in triples_of(draft) if named.is_named(f, "velocity")]
     places = [f for f in triples_of(draft) if named.is_named(f, "position")]
-    question = "frd or flu: neither an accelerometer nor velocity and attitude tell"
+    question = "frd or flu: neither an accelerometer nor velocity and attitude show which"
     if draft.wxyz is not None and draft.instants is not None and (speeds or places):
         axis = np.tile([0.0, 0.0, 1.0], (len(draft.time_s), 1))
         z = by.into_world(draft.time_s, draft.wxyz, axis)
@@ -115,7 +115,7 @@ def _frames_without_accelerometer(draft: Draft) -> tuple[str, str]:
             up = float(np.nanmedian(z[:, 2])) * (-1 if body == "frd" else 1)
             return body, _world(draft, up, "the thrust turned by the attitude")
     draft.open["body"] = question
-    draft.open["world"] = "ned, enu or nwu: nothing tells which way z points"
+    draft.open["world"] = "ned, enu or nwu: nothing shows which way z points"
     return OPEN, OPEN
 
 

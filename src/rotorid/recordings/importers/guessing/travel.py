@@ -69,7 +69,7 @@ def _velocity_confirmed(draft: Draft, best: tuple[str, Family], found: dict, by_
     if not is_clear(agreed, other):
         more["axes"] = _stated_axes(family)
         if more["axes"] == OPEN:
-            question = " ".join(filter(None, (question, "in world or body axes? The flight hardly tells them apart")))
+            question = " ".join(filter(None, (question, "in world or body axes? The flight hardly distinguishes them")))
     draft.put("velocity", family.columns, said, question, **more)
 
 
@@ -100,7 +100,7 @@ def _velocity_alone(draft: Draft, family: Family, found: dict) -> None:
             others = [a for name, a in seen.items() if name != better]
             axes = better if all(is_clear(seen[better], a) for a in others) or axes == better else OPEN
     if axes == OPEN:
-        questions.append("in world or body axes? Nothing in the table tells")
+        questions.append("in world or body axes? Nothing in the table shows which")
     if unit == OPEN and len(questions) < 2:
         questions.append("in which unit?")
     draft.put(
