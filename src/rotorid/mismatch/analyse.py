@@ -29,7 +29,7 @@ from rotorid.mismatch.delivery.usable import own_faults, question_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, RunWind, Trace
-from rotorid.mismatch.fitted import Chain, Fitted, fitted
+from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each, without_values
 from rotorid.mismatch.leftover import leftover
@@ -45,7 +45,7 @@ from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.shares import fitted_part
-from rotorid.mismatch.speedpath import SpeedResult, commanded_path
+from rotorid.mismatch.speedpath import CommandChain, SpeedResult, commanded_path
 from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.value_sides import sides_of_values
 from rotorid.mismatch.values import (
@@ -305,7 +305,7 @@ def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
     if model.gusts:
         findings.append(gust_finding(model.gusts))
     if found.chain is not None:
-        findings += speed_findings(found.chain[0], prepared, found.measured, found.chain[1])
+        findings += speed_findings(found.chain.result, prepared, found.measured, found.chain.full_speed)
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
@@ -330,12 +330,12 @@ def payload_for_a_time(finding: Finding, windows: tuple[tuple[str, float, float]
     return replace(finding, windows=windows, sentence=f"{finding.sentence}: {when}")
 
 
-def not_testable(prepared: Prepared, chain: Chain | None, findings: list[Finding]) -> dict[str, str]:
+def not_testable(prepared: Prepared, chain: CommandChain | None, findings: list[Finding]) -> dict[str, str]:
     """Reasons why ids cannot be tested on this set, those aside that were found all the same."""
     reasons = dict(prepared.not_testable)
     if chain is None:
         reasons.update({k: "no rotor commands recorded" for k in before_the_rotors()})
-    elif chain[2] is None:
+    elif chain.full_voltage is None:
         reasons = {**dict.fromkeys(ids_of_stage(SUPPLY), "no battery voltage"), **reasons}
     known = {f.id for f in findings if f.status in CLAIMED}
     return {k: v for k, v in reasons.items() if k not in known}
@@ -352,11 +352,11 @@ def instead_of(model: WrenchModel, values: Values) -> dict[str, tuple[str, ...]]
     }
 
 
-def lag_alone_notes(chain: Chain | None) -> list[str]:
+def lag_alone_notes(chain: CommandChain | None) -> list[str]:
     """The lag as others state it, who fit neither a delay nor a throttle curve jointly, where it shares with them."""
-    if chain is None or chain[0].lag_alone is None:
+    if chain is None or chain.result.lag_alone is None:
         return []
-    fit = chain[0].lag_alone
+    fit = chain.result.lag_alone
     tau, reach = float(fit.values[0]), 1.96 * float(np.sqrt(fit.covariance[0, 0]))
     return [
         "The lateness of the rotors is shared by a lag and what else was found; a lag alone would be "
@@ -490,9 +490,9 @@ def make_traces(
                 unit = UNITS[CHANNELS[c].split("_")[0]]
                 out.append(Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c]))
         if chain is not None and found.measured:
-            result = chain[0]
+            result = chain.result
             path = commanded_path(
-                segment, result.fit.chain, result.fit.values, result.fit.shift_s, *chain[1:], result.fit.holds
+                segment, result.fit.chain, result.fit.values, result.fit.shift_s, *chain.full, result.fit.holds
             )
             believed = prepared.thinner(segment.motion.rotor_speed - segment.command)
             left = prepared.thinner(segment.motion.rotor_speed - path)
@@ -553,8 +553,8 @@ def speed_floor(found: Fitted) -> np.ndarray:
     """
     thinner, left, inputs = found.prepared.thinner, [], []
     for segment in found.prepared.segments:
-        fit = found.chain[0].fit
-        path = commanded_path(segment, fit.chain, fit.values, fit.shift_s, *found.chain[1:], fit.holds)
+        fit = found.chain.result.fit
+        path = commanded_path(segment, fit.chain, fit.values, fit.shift_s, *found.chain.full, fit.holds)
         left.append(thinner(segment.motion.rotor_speed - path))
         command = segment.command / max(float(np.abs(segment.command).max()), 1e-12)
         slope = np.gradient(command, segment.dt_s, axis=0)

@@ -49,7 +49,7 @@ class Ratio:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class HeldOutEvidence:
     """What the runs held out say of one effect."""
 
     ratios: tuple[Ratio, ...] = ()
@@ -79,7 +79,7 @@ class Evidence:
             return "on the runs held out no channel is surely better with it"
         return ""
 
-    def undone_by(self, whole: Evidence) -> str:
+    def undone_by(self, whole: HeldOutEvidence) -> str:
         """Why a gain says nothing: with all that was found a channel is worse than as believed; empty else.
 
         An effect may gain only by correcting the error of a wrong value.
@@ -144,7 +144,9 @@ def effect_shares(
     return {i: float(np.clip((energy(x) - after) / (before - after), 0.0, 1.0)) for i, x in analysis.without.items()}
 
 
-def judged(finding: Finding, analysis: Analysis, held: list[np.ndarray], share: float, whole: Evidence) -> Finding:
+def judged(
+    finding: Finding, analysis: Analysis, held: list[np.ndarray], share: float, whole: HeldOutEvidence
+) -> Finding:
     """A finding with its gain and the word that it deserves; one that no model holds (a mistake) as it is.
 
     `whole` is the evidence on all that was found together.
@@ -180,7 +182,7 @@ def in_windows(trace: Trace, windows: tuple[tuple[str, float, float], ...]) -> n
 
 def evidence(
     analysis: Analysis, without: tuple[np.ndarray, ...], held: list[np.ndarray], acts_on: Collection[str] = ()
-) -> Evidence:
+) -> HeldOutEvidence:
     """What rows held out (masks of the traces) say of an effect, given what is left of the traces without it.
 
     Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
@@ -198,13 +200,13 @@ def evidence(
     there = {c: np.sqrt(s[2] / max(s[3], 1)) / noise[c] for c, s in size.items()}
     strongest = max(here.values(), default=0.0)
     if strongest <= LEAST_EXCITED * max(there.values(), default=0.0):
-        return Evidence()
+        return HeldOutEvidence()
     sensors = {t.channel for t in analysis.between_sensors}
     differing = [c for c in here if here[c] > ACTS * strongest]
     acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
     ratios = [r for r in (ratio_of(analysis, without, held, c) for c in acting) if r is not None]
     beyond = any(here[c] * noise[c] > leftover_rms(analysis, held, c) for c in acting)
-    return Evidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
+    return HeldOutEvidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
 
 
 def leftover_rms(analysis: Analysis, held: list[np.ndarray], channel: str) -> float:

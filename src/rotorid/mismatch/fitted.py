@@ -25,7 +25,7 @@ from rotorid.mismatch.prepare import Prepared
 from rotorid.mismatch.refitted import size_of_value
 from rotorid.mismatch.rows import RUN_SCALE, Term
 from rotorid.mismatch.select import COST_PER_EFFECT, COST_PER_PARAMETER
-from rotorid.mismatch.speedpath import SpeedResult
+from rotorid.mismatch.speedpath import CommandChain, SpeedResult
 from rotorid.mismatch.swinging import hung, like, price, swinging_term, with_likely_length
 from rotorid.mismatch.value_sides import sides_of_values
 from rotorid.mismatch.within_trust import beyond_trust
@@ -51,9 +51,6 @@ ROUNDS, CHAIN_ROUNDS = 4, 2
 MOVED = 0.3
 """Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict."""
 
-Chain = tuple[SpeedResult, float, float | None]
-"""What lies between command and speed, the full speed in rad/s, and the voltage at which it is reached."""
-
 
 @dataclass(frozen=True)
 class Fitted:
@@ -61,7 +58,7 @@ class Fitted:
 
     model: WrenchModel
     values: Values
-    chain: Chain | None
+    chain: CommandChain | None
     """None where no command is recorded."""
     measured: bool
     """Whether rotor speeds are measured."""
@@ -88,7 +85,7 @@ def fitted(prepared: Prepared) -> Fitted:
     return Fitted(model, values_called_wrong(model, ()), chain, measured)
 
 
-def turning(prepared: Prepared, chain: Chain | None = None):
+def turning(prepared: Prepared, chain: CommandChain | None = None):
     """Segments and their noisy copies with the rotors turning as measured, or as a chain makes of their commands."""
     both = prepared.segments, prepared.noisy_segments
     if chain is None:
@@ -96,7 +93,7 @@ def turning(prepared: Prepared, chain: Chain | None = None):
     return tuple(path_segments(segments, *chain, prepared.thinner.cutoff_hz) for segments in both)
 
 
-def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
+def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, WrenchModel]:
     """The chain and the model where rotor speeds are known from commands alone."""
     model = refined_model(prepared, *turning(prepared, chain))
     known, trusted = bool(model.selection.active), strains(model)
@@ -107,11 +104,12 @@ def with_chain(prepared: Prepared, chain: Chain) -> tuple[Chain, WrenchModel]:
         model = refined_model(prepared, *turning(prepared, chain))
         if trusted or not (trusted := strains(model)):
             break
-    if rules.MERE_SCALE(only_scales(chain[0])):
+    if rules.MERE_SCALE(only_scales(chain.result)):
         curves = ids_of_stage(CURVE)
-        result, *full = speed_path(prepared, chosen(model), tuple(curves), trusted=trusted)
+        chain = speed_path(prepared, chosen(model), tuple(curves), trusted=trusted)
         reason = Reason("mere_scale", "another thrust coefficient explains as much")
-        chain = replace(result, dropped={**result.dropped, **dict.fromkeys(curves, reason)}), *full
+        dropped = {**chain.result.dropped, **dict.fromkeys(curves, reason)}
+        chain = chain._replace(result=replace(chain.result, dropped=dropped))
         model = refined_model(prepared, *turning(prepared, chain))
     return chain, model
 

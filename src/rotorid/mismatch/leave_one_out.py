@@ -19,7 +19,7 @@ from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.report_runs import rows_of, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, Rows
-from rotorid.mismatch.speedpath import commanded_path
+from rotorid.mismatch.speedpath import CommandChain, commanded_path
 from rotorid.mismatch.within_trust import settled
 from rotorid.mismatch.wrench import WrenchModel, path_segments
 
@@ -44,7 +44,7 @@ def without_each(
         if finding.status not in CLAIMED or finding.id in out:
             continue
         own = [k for k in active if model.search.terms[k].effect == finding.id]
-        in_chain = found.chain is not None and finding.id in {k for k, _ in found.chain[0].fit.chain}
+        in_chain = found.chain is not None and finding.id in {k for k, _ in found.chain.result.fit.chain}
         if own:
             fewer = settled(model, values, [k for k in active if k not in own])[0]
             left = residuals_of(seen, scaled_by_run(seen, fewer))
@@ -106,19 +106,19 @@ def without_wind(segment, wind: np.ndarray) -> np.ndarray:
     return segment.motion.wind - np.array([*wind, 0.0])
 
 
-def chain_without(found: Fitted, key: str):
-    """What lies between command and speed with one id less, with full speed and voltage.
+def chain_without(found: Fitted, key: str) -> CommandChain:
+    """What lies between command and speed with one id less.
 
     Fitted anew where speeds are measured. Where commands alone are, forces and moments are fitted with the chain as it
     is: it stays so but for the id, or the two would no longer belong together.
     """
-    result, *rest = found.chain
+    result = found.chain.result
     if found.measured:
-        return replace(result, fit=result.without[key]), *rest
+        return found.chain._replace(result=replace(result, fit=result.without[key]))
     where = result.fit.slice_of(key)
     chain = tuple((k, f) for k, f in result.fit.chain if k != key)
     values = np.delete(result.fit.values, np.arange(where.start, where.stop))
-    return replace(result, fit=replace(result.fit, chain=chain, values=values)), *rest
+    return found.chain._replace(result=replace(result, fit=replace(result.fit, chain=chain, values=values)))
 
 
 def made_by(model: WrenchModel, segments, fit: Fit) -> list[np.ndarray]:

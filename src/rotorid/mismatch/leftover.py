@@ -23,7 +23,7 @@ LEAST_NOISE = 0.1
 
 
 @dataclass(frozen=True)
-class Channel:
+class ChannelLeftover:
     """What one channel holds on the stretches judged, as energies: sums of squares, N² or N² m²."""
 
     name: str
@@ -107,7 +107,7 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     )
 
 
-def channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[Channel]:
+def channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[ChannelLeftover]:
     """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others.
 
     `full` is the fit of the whole model, `added` (n, 12) of each stretch what it makes of the channels; `least` is how
@@ -149,7 +149,7 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
         # What moves slowly, or between runs, is no noise: shares are of what the named effects could have explained.
         noise = max(flexible - moving - shifted, LEAST_NOISE * flexible, 1e-300)
         out.append(
-            Channel(
+            ChannelLeftover(
                 name,
                 count,
                 noise,
@@ -166,7 +166,7 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
 
 
 def description(
-    channels: Sequence[Channel],
+    channels: Sequence[ChannelLeftover],
     sentences: Sequence[str],
     slow: Mapping[str, tuple[float, float]],
     depends: Sequence[str],

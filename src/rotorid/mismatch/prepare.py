@@ -14,7 +14,14 @@ from rotorid.effects.contract import Form, not_testable_reason
 from rotorid.mismatch import rules
 from rotorid.mismatch.estimated_velocity import made_from_accelerometer
 from rotorid.mismatch.excess_noise import noise_factors
-from rotorid.mismatch.motion import Segment, SensorNoise, analysis_rate_hz, build_segments, full_speed
+from rotorid.mismatch.motion import (
+    HIGHEST_CUTOFF_HZ,
+    Segment,
+    SensorNoise,
+    analysis_rate_hz,
+    build_segments,
+    full_speed,
+)
 from rotorid.mismatch.rows import (
     OFFSETS,
     PARAMETER_NAMES,
@@ -255,7 +262,7 @@ def form_terms(effect_id: str, form: Form, suggested: tuple[tuple[float, ...], .
 
 def prepare(
     recordings: RecordingSet,
-    cutoff_hz: float = 20.0,
+    cutoff_hz: float = HIGHEST_CUTOFF_HZ,
     shift_s: dict[str, float] | None = None,
     unseen: tuple[str, ...] = (),
 ) -> Prepared:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -92,6 +93,21 @@ class SpeedResult:
     """Where a lag shares its lateness with a delay or a curve: the lag as it would be without these."""
     without: dict[str, SpeedFit] = field(default_factory=dict)
     """The chain fitted with one id less."""
+
+
+class CommandChain(NamedTuple):
+    """What lies between command and rotor speed, as fitted to a set."""
+
+    result: SpeedResult
+    full_speed: float
+    """rad/s, at full throttle."""
+    full_voltage: float | None
+    """V, at which the full speed is reached; None where no voltage is recorded."""
+
+    @property
+    def full(self) -> tuple[float, float | None]:
+        """Full speed and voltage, as `commanded_path` takes them."""
+        return self.full_speed, self.full_voltage
 
 
 def commanded_path(

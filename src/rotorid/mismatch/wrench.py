@@ -33,6 +33,7 @@ from rotorid.mismatch.regression import (
 from rotorid.mismatch.rows import Rows, Term, baseline_wrench, residual, state_terms
 from rotorid.mismatch.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.speedpath import (
+    CommandChain,
     MeasuredSpeed,
     SpeedResult,
     SpeedSearch,
@@ -368,7 +369,7 @@ def speed_path(
     known: list[tuple[Form, np.ndarray]] | None = None,
     refused: Sequence[str] = (),
     trusted: bool = False,
-):
+) -> CommandChain | None:
     """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
     nothing can show it. Where only commands are recorded believed values are free with it unless `trusted`."""
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
@@ -426,7 +427,7 @@ def speed_path(
         late_s = late_s if rules.CLOSED_LOOP_BIAS(late_s > 0.0) else 0.0
         problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
     forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
-    return SpeedSearch(problem, forms).run(), full_speed, full_voltage
+    return CommandChain(SpeedSearch(problem, forms).run(), full_speed, full_voltage)
 
 
 def at_speed(segment: Segment, speed: np.ndarray) -> Segment:

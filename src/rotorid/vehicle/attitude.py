@@ -76,17 +76,3 @@ def euler_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
     pitch = np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0))
     yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return np.stack([roll, pitch, yaw], axis=-1)
-
-
-def rates_to_euler_rates(euler_rad: np.ndarray) -> np.ndarray:
-    """W of thesis eq. 4.15, (..., 3, 3): d(roll, pitch, yaw)/dt = W Ω. Singular at a pitch of ±90 degrees."""
-    roll, pitch, _ = np.moveaxis(np.asarray(euler_rad, float), -1, 0)
-    out = np.zeros(roll.shape + (3, 3))
-    out[..., 0, 0] = 1.0
-    out[..., 0, 1] = np.sin(roll) * np.tan(pitch)
-    out[..., 0, 2] = np.cos(roll) * np.tan(pitch)
-    out[..., 1, 1] = np.cos(roll)
-    out[..., 1, 2] = -np.sin(roll)
-    out[..., 2, 1] = np.sin(roll) / np.cos(pitch)
-    out[..., 2, 2] = np.cos(roll) / np.cos(pitch)
-    return out

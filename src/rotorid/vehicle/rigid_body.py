@@ -22,9 +22,3 @@ def angular_acceleration(body: RigidBody, rates: np.ndarray, moment: np.ndarray)
     """dΩ/dt = J⁻¹ (τ - Ω × J Ω) (eq. 4.4), (..., 3), rad/s2; rates in rad/s, moment in N m, body axes."""
     momentum = rates @ body.inertia_kg_m2.T
     return (moment - cross(rates, momentum)) @ body.inverse_inertia.T
-
-
-def kinetic_energy_j(body: RigidBody, velocity: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """½ m v² + ½ Ωᵀ J Ω, (...), J."""
-    turning = np.einsum("...i,ij,...j->...", rates, body.inertia_kg_m2, rates)
-    return 0.5 * body.mass_kg * np.einsum("...i,...i->...", velocity, velocity) + 0.5 * turning

@@ -84,7 +84,7 @@ def test_the_page_is_whole_and_the_same_twice(tmp_path, findings, shown):
 def test_names_in_figures_are_no_mathematics():
     import numpy as np
 
-    from rotorid.report.plots.mismatch import before_and_after, svg
+    from rotorid.report.plots.mismatch import gains, svg
 
-    time_s, name = np.arange(50) / 10, "$\\frac{1}{$"
-    assert "<svg" in svg(before_and_after(time_s, np.sin(time_s), np.cos(time_s), None, name, name))
+    name, errors = "$\\frac{1}{$", np.array([2.0])
+    assert "<svg" in svg(gains([name], errors, errors / 2, errors / 4))

@@ -28,11 +28,6 @@ class Tets:
     cells: np.ndarray
     """Indices of the corners of each tetrahedron, shape (m, 4)."""
 
-    def volumes_m3(self) -> np.ndarray:
-        """Signed volume of each tetrahedron [m³], shape (m,)."""
-        a, b, c, d = (self.points_m[self.cells[:, k]] for k in range(4))
-        return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
-
     def put(self, frame: Frame) -> Tets:
         """The same mesh in the frame in which its own is `frame`."""
         return Tets(frame.origin_m + self.points_m @ frame.axes, self.cells)

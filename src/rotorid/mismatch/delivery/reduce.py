@@ -85,4 +85,4 @@ def rebuilt(
 
 def chain_ids(found: Fitted) -> set[str]:
     """Ids of the effects between command and rotor speed."""
-    return set() if found.chain is None else {key for key, _ in found.chain[0].fit.chain}
+    return set() if found.chain is None else {key for key, _ in found.chain.result.fit.chain}

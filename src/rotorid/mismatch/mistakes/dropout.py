@@ -41,7 +41,7 @@ LEAST_JUMP = 5.0
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Dropout:
     """One dropout of one column."""
 
     run: str
@@ -90,7 +90,7 @@ def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     return replace_columns(recordings, change), finding
 
 
-def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
+def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
     """Every dropout of a run, column by column; `noisy` columns are known to have noise of their own."""
     found = []
     for sensor, names in sensor_columns(vehicle).items():
@@ -113,17 +113,17 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Stretch]:
             values = run.column(name)
             blank = missing(run.time_s, values)
             if name in zero:
-                found += _as_stretches(run, name, sensor, "zero", zero[name], 0.0)
+                found += _as_dropouts(run, name, sensor, "zero", zero[name], 0.0)
                 blank = blank & ~zero[name]
-            found += _as_stretches(run, name, sensor, "missing", blank, 0.0)
+            found += _as_dropouts(run, name, sensor, "missing", blank, 0.0)
             rest = np.where(zero.get(name, np.zeros(len(values), bool)), np.nan, values)
             for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy), *frozen]:
                 if flown or load_went_on(run, vehicle, values, mask):
-                    found += _as_stretches(run, name, sensor, "held", mask, p)
+                    found += _as_dropouts(run, name, sensor, "held", mask, p)
     return found
 
 
-def standing_commands(run: Run, sensor: str, names: list[str], noisy: set[str]) -> list[Stretch]:
+def standing_commands(run: Run, sensor: str, names: list[str], noisy: set[str]) -> list[Dropout]:
     """Stretches in which one rotor's command stands still while all others go on.
 
     A command at the end of its range may truly stand still: its motor gives all that it can. On the ground all commands
@@ -138,7 +138,7 @@ def standing_commands(run: Run, sensor: str, names: list[str], noisy: set[str]) 
         for mask, p in held(run.time_s, own[:, None], noisy=name in noisy):
             others = np.delete(moves[mask], k, axis=1).mean(axis=0)
             if own[mask][0] not in ends and others.min() > OTHERS_GO_ON:
-                found += _as_stretches(run, name, sensor, "held", mask, p)
+                found += _as_dropouts(run, name, sensor, "held", mask, p)
     return found
 
 
@@ -168,7 +168,7 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
     return bool(max(np.ptp(expected), np.nanmedian(off)) > max(PLAIN_CHANGE * noise, PLAIN_STEPS * step))
 
 
-def _as_stretches(run: Run, name, sensor, kind, mask, p_value) -> list[Stretch]:
+def _as_dropouts(run: Run, name, sensor, kind, mask, p_value) -> list[Dropout]:
     """Masks as stretches, close ones merged."""
     t = run.time_s
     pieces = []
@@ -181,7 +181,7 @@ def _as_stretches(run: Run, name, sensor, kind, mask, p_value) -> list[Stretch]:
     for start, stop in pieces:
         own = np.zeros(len(t), bool)
         own[start:stop] = True
-        out.append(Stretch(run.name, name, sensor, kind, float(t[start]), float(t[stop - 1]), own, p_value))
+        out.append(Dropout(run.name, name, sensor, kind, float(t[start]), float(t[stop - 1]), own, p_value))
     return out
 
 

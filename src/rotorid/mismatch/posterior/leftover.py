@@ -48,7 +48,7 @@ class Weighed:
 
 
 @dataclass(frozen=True)
-class Channel:
+class ChannelSpectrum:
     """Products of one channel in the eigenvectors of each environment's Gram matrix, of the columns that act in it."""
 
     columns: np.ndarray
@@ -67,7 +67,7 @@ class Spectrum:
 
     unit: np.ndarray
     """(K,) coefficient in its own unit of a scaled one of 1; 0 for a column that is never excited."""
-    channels: tuple[Channel, ...]
+    channels: tuple[ChannelSpectrum, ...]
     rows: float
     """Whitened squares that the model of all columns leaves: the number of rows, as the whitening counts them."""
 
@@ -123,7 +123,7 @@ def spectrum_of(evidence: Evidence, unit: np.ndarray | None = None) -> Spectrum:
         at = unit[columns]
         values, vectors = np.linalg.eigh(gram[:, columns[:, None], columns] * np.outer(at, at))
         turned = np.einsum("eik,ei->ek", vectors, cross[:, columns] * at)
-        channels.append(Channel(columns, np.maximum(values, 0.0), vectors, turned))
+        channels.append(ChannelSpectrum(columns, np.maximum(values, 0.0), vectors, turned))
     gram = evidence.gram.sum(axis=(0, 1)) * np.outer(unit, unit)
     total = evidence.cross.sum(axis=(0, 1)) * unit
     left = evidence.square.sum() - total @ np.linalg.solve(gram + FULL_RIDGE * np.eye(len(unit)), total)

@@ -14,8 +14,6 @@ from rotorid.report.plots import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHOWN_SAMPLES = 1600
-SMOOTH_S = 0.5
 STRIP_CELL_S = 0.5
 LARGEST = 10.0
 """Size relative to the noise at which the heat strip's colour ends."""
@@ -50,53 +48,6 @@ def names_are_names(fig: Figure) -> None:
     for text in fig.findobj(Text):
         if text not in powers:
             text.set_parse_math(False)
-
-
-def smoothed(values: np.ndarray, width: int) -> np.ndarray:
-    """Centred moving mean over `width` samples, the ends over what there is."""
-    half = max(width // 2, 0)
-    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(values))])
-    index = np.arange(len(values))
-    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
-    return (total[last] - total[first]) / (last - first)
-
-
-def before_and_after(
-    time_s: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
-    noise: float | None,
-    label: str,
-    unit: str,
-    where: Sequence[tuple[float, float]] = (),
-) -> Figure:
-    """Error of one channel of one run with the believed vehicle above, with the improved one below.
-
-    Faint: every sample; strong: half-second mean; grey band: two sigma of the sensors' noise; tinted: where the
-    mismatch was located.
-    """
-    fig, axes = style.figure(3.5, rows=2, sharex=True, sharey=True)
-    period = float(np.median(np.diff(time_s)))
-    reach = 1.05 * float(np.nanquantile(np.abs(before), 0.998))
-    for ax, values, name, colour in (
-        (axes[0], before, "as believed", style.COLOUR["before"]),
-        (axes[1], after, "improved", style.COLOUR["after"]),
-    ):
-        for start, stop in where:
-            ax.axvspan(start, stop, color=SHADE, lw=0, zorder=0)
-        if noise:
-            ax.axhspan(-2 * noise, 2 * noise, color="#d9d9d9", lw=0, zorder=0.5)
-        kept = style.thin(values, SHOWN_SAMPLES)
-        ax.plot(time_s[kept], values[kept], color=colour, lw=0.5, alpha=0.35)
-        ax.plot(time_s, smoothed(values, int(SMOOTH_S / period)), color=colour, lw=1.4)
-        ax.axhline(0, color="black", lw=0.5)
-        ax.set_title(name, loc="left", color=colour, fontweight="bold", pad=3)
-        ax.set_ylabel(f"error ({unit})")
-    axes[0].set_title(label, loc="right", color=style.GREY, pad=3)
-    axes[0].set_ylim(-reach, reach)
-    axes[1].set_xlim(time_s[0], time_s[-1])
-    axes[1].set_xlabel("time (s)")
-    return fig
 
 
 def heat_strip(
