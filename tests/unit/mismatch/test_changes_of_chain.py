@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 
 from rotorid.mismatch.changes.chain import chain_terms
 from rotorid.mismatch.changes.compare import changes_in, decided_of_speeds, mistakes_that_differ
+from rotorid.mismatch.changes.notes import command_notes
 from rotorid.mismatch.findings import Estimate, Finding
 from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.speedpath import CommandChain
 
 from .test_speedpath import FULL, recorded, searched
 
@@ -22,7 +25,7 @@ def compared(**at_work):
     """What is stated to have changed from two good flights with a lag of 50 ms to two others."""
     first = [recorded(k, voltage=VOLTAGE, **GOOD) for k in (1, 2)]
     second = [recorded(k, voltage=VOLTAGE, **at_work) for k in (3, 4)]
-    found = SimpleNamespace(chain=(searched(*first), FULL, float(VOLTAGE.max())), commanded=False)
+    found = SimpleNamespace(chain=CommandChain(searched(*first), FULL, float(VOLTAGE.max())), commanded=False)
     options, squares = decided_of_speeds(found, chain_terms(found, first), (first, second), Prior())
     assert all(np.all(np.linalg.eigvalsh(own) >= -1e-9) for own in squares.values())
     return {s.id: s for s in changes_in(options, Prior()) if s.status in ("established", "ambiguous")}
@@ -50,6 +53,13 @@ def test_a_battery_that_sags_is_named():
     changed = compared(**GOOD, battery_sag=("power of voltage", (0.9,)))
     assert changed.keys() == {"battery_sag"}
     assert changed["battery_sag"].parameters[0].value == pytest.approx(0.9, abs=0.1)
+
+
+def test_a_set_without_commands_is_said_to_have_none():
+    with_commands, without = recorded(1), replace(recorded(2), command=None)
+    assert command_notes([with_commands], [with_commands], "monday", "friday") == ()
+    (note,) = command_notes([without], [with_commands], "monday", "friday")
+    assert note.startswith("monday has no commands")
 
 
 def late(amount_s: float, sd_s: float) -> Finding:

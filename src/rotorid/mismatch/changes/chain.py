@@ -147,9 +147,9 @@ def chain_terms(found: Fitted, segments: Sequence[Segment]) -> ChainTerms | None
 
 def turning(found: Fitted, chain: ChainTerms) -> Fitted:
     """The set's model with another chain."""
-    result, *full = found.chain
+    result = found.chain.result
     fit = replace(result.fit, chain=chain.chain, values=chain.values)
-    return replace(found, chain=(replace(result, fit=fit), *full))
+    return replace(found, chain=found.chain._replace(result=replace(result, fit=fit)))
 
 
 def change_of_chain(found: Found, chain: ChainTerms) -> np.ndarray:

@@ -19,7 +19,7 @@ from rotorid.mismatch.changes.chain import (
     squares_of_speeds,
 )
 from rotorid.mismatch.changes.joint import Joint, Reference, joined_at, joints_of, reference_of
-from rotorid.mismatch.changes.notes import notes_of
+from rotorid.mismatch.changes.notes import command_notes, notes_of
 from rotorid.mismatch.changes.of_instruments import (
     InstrumentReference,
     instrument_reference_of,
@@ -108,11 +108,11 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
         joint, options = most_alike(reference, new, prior)
         stretches = reference.recorded, joint.recorded
         found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
-        stated = changes_in(options, prior)
+        stated, notes = changes_in(options, prior), command_notes(*stretches, base.name, new.name)
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
         found = joint.decide(joint.base, joint.new, yardstick(joint, reference.runs, prior), prior)
-        stated = statements_of(found)
+        stated, notes = statements_of(found), ()
     limits = limits_of(found, joint.squares)
     if of_speeds:
         stated = (*stated, *changes_in(of_speeds[0], prior))
@@ -131,7 +131,7 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
         limits=tuple(sorted((x for x in limits if x.id not in changed), key=lambda x: -x.share)),
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
-        notes=notes_of(joint, base.name, new.name),
+        notes=(*notes_of(joint, base.name, new.name), *notes),
         kind=new.vehicle.kind,
     )
 

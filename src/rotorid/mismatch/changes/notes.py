@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from rotorid.mismatch.changes.joint import Joint
 from rotorid.mismatch.changes.usual import left_by_all
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
+from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.leftover import TINY
 from rotorid.mismatch.rows import CHANNELS
 from rotorid.mismatch.words import channel_words, listed, number, regime_words
@@ -22,6 +23,15 @@ FARTHER = 1.5
 def notes_of(joint: Joint, base: str, new: str) -> tuple[str, ...]:
     """Notes on a comparison, in sentences."""
     return (*residual_notes(joint, base, new), *regime_notes(joint.flown_by_base, joint.flown_by_new, base, new))
+
+
+def command_notes(reference: Sequence[Segment], recorded: Sequence[Segment], base: str, new: str) -> tuple[str, ...]:
+    """That one of two sets has no commands, so that the chain from command to rotor speed was not compared."""
+    first, second = (any(s.command is not None for s in own) for own in (reference, recorded))
+    if first == second:
+        return ()
+    without = new if first else base
+    return (f"{without} has no commands: the motors' lag, delay, throttle curve and battery were not compared.",)
 
 
 def residual_notes(joint: Joint, base: str, new: str) -> list[str]:
