@@ -112,6 +112,8 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     ratio = both["measured_sigma"] / both["predicted_sigma"].clip(lower=1e-9)
     inside = both["measured_sigma"].between(both["predicted_low"], both["predicted_high"])
     fast = faster["measured_sigma"] ** 2 >= 2 * faster["standard_sigma"] ** 2
+    rank = {"right": 2, "open": 1, "wrong": 0}
+    worse = planned["outcome"].map(rank) < planned["standard_outcome"].map(rank)
     counted = (
         ("settled rightly, of all open", asked["outcome"] == "right"),
         ("settled wrongly, of all open", asked["outcome"] == "wrong"),
@@ -121,6 +123,8 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
         (f"prediction within a factor of {WITHIN:g}", (ratio < WITHIN) & (ratio > 1 / WITHIN)),
         ("measured within the interval stated", inside),
         ("planned at least twice as fast (squares a second)", fast),
+        ("separated further than by a standard flight as long", faster["measured_sigma"] > faster["standard_sigma"]),
+        ("outcome no worse than of a standard flight as long", ~worse),
     )
     out = []
     for name, hits in counted:

@@ -1,6 +1,7 @@
 """Prove the next flight on concealed sets: plan, record, judge both together.
 
-- Records sets in which pairs look alike, by code that shares nothing with the library.
+- Records sets in which pairs look alike, by code that shares nothing with the library. The listed ones were looked at
+  while the planner was made, and so were their first new draws: what is proven are further draws of the same list.
 - Plans a flight for what each leaves open; the plan never sees an answer.
 - Has the same simulator record the planned flight, and a standard one of the same length, and judges each with the set.
 - Writes the row of every set as it comes, so that an interrupted proof goes on where it stopped.
@@ -62,14 +63,15 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     for name, reference in references.items():
         second = as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
         outcome[name], said[name], whole = judged(first, second, ids, truth)
-        measured[name] = proof.measured(known(whole), question, named)
+        if question is not None:
+            measured[name] = proof.measured(known(whole), question, named)
     row = proof.Row(
         case=case.name,
         truth=named,
         open=" ".join(ids),
         planned_s=made.duration_s,
-        measured_sigma=measured["planned"],
-        standard_sigma=measured["standard"],
+        measured_sigma=measured.get("planned", float("nan")),
+        standard_sigma=measured.get("standard", float("nan")),
         promised=made.settles,
         outcome=outcome["planned"],
         standard_outcome=outcome["standard"],
@@ -81,10 +83,19 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     return replace(row, predicted_sigma=expected.sigma, predicted_low=low, predicted_high=high)
 
 
-def main(table: str, summary: str, so_far: str, limits: str, code: str = "", most: int | None = None) -> None:
+def main(
+    table: str,
+    summary: str,
+    so_far: str,
+    limits: str,
+    code: str = "",
+    most: int | None = None,
+    draws: tuple[int, ...] = (5, 6),
+) -> None:
     """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
 
-    A row of another `code` stays until the case is judged anew; `most` cases are taken at most.
+    A row of another `code` stays until the case is judged anew; `most` cases are taken at most; `draws` are the
+    numbers of the draws of each listed one.
     """
     warnings.simplefilter("ignore")
     from rotorid_proof.concealed import planned as simulator
@@ -94,9 +105,10 @@ def main(table: str, summary: str, so_far: str, limits: str, code: str = "", mos
     kept = Path(so_far)
     kept.parent.mkdir(parents=True, exist_ok=True)
     rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
-    # Where speeds are commands alone a set takes minutes: those come last.
-    every = [*simulator.look_alikes(), *simulator.ambiguous()]
-    cases = sorted(every, key=lambda case: "speed" not in case.settings.groups)[:most]
+    # Where speeds are commands alone a set takes minutes: those come last of a draw.
+    listed = [*simulator.look_alikes(), *simulator.ambiguous()]
+    listed = sorted(listed, key=lambda case: "speed" not in case.settings.groups)
+    cases = [simulator.drawn_anew(case, number) for number in draws for case in listed][:most]
     done = {r["case"] for r in rows if str(r["judged_by"]) == code}
     for case in cases:
         if case.name in done:

@@ -69,6 +69,11 @@ def ambiguous() -> list[Case]:
     return [c for c in all_cases() if c.name.startswith("confusable/") and "/without/" in c.name]
 
 
+def drawn_anew(case: Case, number: int) -> Case:
+    """A case with other hidden sizes, directions, winds and noise: draw `number` of it, from 1."""
+    return replace(case, name=f"{case.name}/draw {number}", seed=case.seed + 100_000 * number)
+
+
 def reference_of(trajectory: pd.DataFrame, step_s: float, rotors: int) -> manoeuvres.Reference:
     """A planned trajectory on the simulator's grid, after a hover that lets the controller settle."""
     until = float(trajectory["time_s"].iloc[-1])
@@ -121,4 +126,4 @@ def record(case: Case, answer: dict, references: dict[str, manoeuvres.Reference]
     return Recording(vehicle, runs, (), plan.form)
 
 
-__all__ = ["ambiguous", "grid", "look_alikes", "record", "reference_of", "standard", "write_set"]
+__all__ = ["ambiguous", "drawn_anew", "grid", "look_alikes", "record", "reference_of", "standard", "write_set"]

@@ -1,26 +1,21 @@
-"""`rotorid compare`: what changed from one set of flights of a vehicle to another."""
+"""`rotorid compare`: what changed from one set of a vehicle, a stand or a bench to another."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
 
-if TYPE_CHECKING:
-    from rotorid.recordings import RecordingSet
-
 
 def compare(
     sets: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="GOOD... NEW", help="Sets: one or more of flights that were good, then the one in question."
-        ),
+        typer.Argument(metavar="GOOD... NEW", help="Sets: one or more that were good, then the one in question."),
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File for the result as JSON.")] = None,
     page: Annotated[Path | None, typer.Option("--page", help="File for a page with figures (HTML).")] = None,
@@ -28,11 +23,12 @@ def compare(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
     ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where a change is stated (probability 0.99).")] = False,
 ) -> None:
-    """Say what changed since the flights of one vehicle that were good, and by how much at most everything else.
+    """Say what changed since the sets that were good, and by how much at most everything else.
 
+    Flights of one vehicle, or recordings of one stand or bench: there the answer is whether to calibrate it again.
     Each set is held against its own vehicle.yaml: what was changed on purpose and is written there is no change. With
     three or more good flights their differences among themselves are the yardstick.
-    Not compared yet: the chain from command to rotor speed where speeds are not measured, and stands and benches.
+    Not compared yet: the chain from command to rotor speed where speeds are not measured.
 
     Examples:
 
@@ -41,6 +37,8 @@ def compare(
     `rotorid compare monday tuesday wednesday thursday`
 
     `rotorid compare reference today --ci --page changes.html`
+
+    `rotorid compare bench-after-calibration bench-today`
     """
     with one_sentence():
         *good, new = sets
@@ -49,8 +47,9 @@ def compare(
         with progress(None, quiet) as step:
             step(f"reading {', '.join(path.name for path in sets)}")
             from rotorid.mismatch.changes import as_one, changes_between, words
+            from rotorid.recordings import read_set
 
-            first, second = as_one([flights(path) for path in good]), flights(new)
+            first, second = as_one([read_set(path) for path in good]), read_set(new)
             step(f"comparing {second.name} with {first.name}")
             found = changes_between(first, second)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
@@ -75,15 +74,3 @@ def write(path: Path, text: str) -> None:
 
     with all_or_none(path) as (part,):
         part.write_text(text, encoding="utf-8")
-
-
-def flights(folder: Path) -> RecordingSet:
-    """The set in a folder; InputError where it is none of flights."""
-    from rotorid.recordings import read_set
-
-    found = read_set(folder)
-    if found.vehicle.kind != "flight":
-        raise InputError(
-            f"{folder / 'vehicle.yaml'}: kind is {found.vehicle.kind}, expected flight: only flights compare"
-        )
-    return found

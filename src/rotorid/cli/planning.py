@@ -17,11 +17,16 @@ from rotorid.io.text.names import neighbour
 def plan(
     verdict: Annotated[Path, typer.Argument(metavar="VERDICT", help="A verdict's folder, or its verdict.json.")],
     recordings: Annotated[
-        Path | None, typer.Option("--set", help="The recording set; by default the one next to the verdict.")
+        list[Path] | None,
+        typer.Option("--set", help="The recording set, or sets judged together; by default those next to the verdict."),
     ] = None,
     limits: Annotated[Path | None, typer.Option(help="YAML file of what the flight, or session, may ask for.")] = None,
     want: Annotated[
-        list[str] | None, typer.Option(help="An interval to reach, as torque_coefficient_n_m_s2=1%.")
+        list[str] | None,
+        typer.Option(
+            help="An interval to reach, as torque_coefficient_n_m_s2=1%, or a limit of what is not at work, as "
+            "ground_effect=2% of the weight."
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the plan; default VERDICT/plan.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
@@ -43,10 +48,11 @@ def plan(
         allowed = read_limits(limits, Limits if flight else SessionLimits)
         if wishes and not flight:
             raise InputError(f"--want: intervals are planned for flights; this verdict is of a {content['kind']}")
-        source = recordings or set_of(folder, content)
+        sources = recordings or sets_of(folder, content)
         with progress(None, quiet) as step, warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            step(f"fitting {source.name} once more")
+            step(f"fitting {content['set']} once more")
+            source = read_sets(sources)
             if flight:
                 said, files, picture = flight_plan(source, content, allowed, wishes, out or folder / "plan", step)
             else:
@@ -57,28 +63,26 @@ def plan(
         typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
 
 
-def flight_plan(source: Path, content: dict, allowed, wishes: dict[str, float], folder: Path, step):
+def flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder: Path, step):
     """Plan a flight and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.plan import plan as make_plan
     from rotorid.plan.questions import known
     from rotorid.plan.write import text, write
-    from rotorid.recordings import read_set
     from rotorid.recordings.sufficient import sufficient
 
     suggested = [e["id"] for e in content["effects"] if e["status"] == "suggested"]
-    made = make_plan(known(sufficient(read_set(source)), suggested), allowed, wishes, step)
+    made = make_plan(known(sufficient(source), suggested), allowed, wishes, step)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.pieces else None
 
 
-def session_plan(source: Path, allowed, folder: Path, step):
+def session_plan(source, allowed, folder: Path, step):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.session import known_instrument, plan_session
     from rotorid.plan.write_session import text, write
-    from rotorid.recordings import read_set
     from rotorid.recordings.sufficient import sufficient
 
-    made = plan_session(known_instrument(sufficient(read_set(source))), allowed, step)
+    made = plan_session(known_instrument(sufficient(source)), allowed, step)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.steps else None
 
@@ -96,7 +100,7 @@ def onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> N
 
 
 def wished(texts: list[str]) -> dict[str, float]:
-    """Wishes as `name=1%` or `name=0.01`."""
+    """Wishes as `name=1%` or `name=0.01`; an effect's share is one of the weight."""
     out = {}
     for text in texts:
         name, _, size = text.partition("=")
@@ -105,7 +109,9 @@ def wished(texts: list[str]) -> dict[str, float]:
         except ValueError:
             value = 0.0
         if not name or not 0 < value < 1:
-            raise InputError(f"--want {text}: expected a value of vehicle.yaml and a share, as mass_kg=1%")
+            raise InputError(
+                f"--want {text}: expected a value of vehicle.yaml, or an effect, and a share, as mass_kg=1%"
+            )
         out[name] = value
     return out
 
@@ -124,28 +130,43 @@ def read_verdict(path: Path) -> tuple[Path, dict]:
     return file.parent, content
 
 
-def set_of(folder: Path, content: dict) -> Path:
-    """The recording set that a verdict is of, where it usually lies."""
-    name, here = content["set"], folder.resolve()
-    places = [here / name, here.parent / name, Path(name), Path("raw/recordings") / name]
-    for place in places:
-        if (place / "vehicle.yaml").is_file():
-            return place
-    raise InputError(f"{folder}: the recording set {name} of this verdict is not next to it; name it with --set")
+def sets_of(folder: Path, content: dict) -> list[Path]:
+    """The recording sets that a verdict is of, where they usually lie: `a+b` is of the sets a and b together."""
+    here = folder.resolve()
+
+    def place_of(name: str) -> Path | None:
+        places = [here / name, here.parent / name, Path(name), Path("raw/recordings") / name]
+        return next((p for p in places if (p / "vehicle.yaml").is_file()), None)
+
+    for names in ([content["set"]], content["set"].split("+")):
+        found = {name: place_of(name) for name in names}
+        if None not in found.values():
+            return list(found.values())
+    lacking = next(name for name, place in found.items() if place is None)
+    raise InputError(f"{folder}: the recording set {lacking} of this verdict is not next to it; name it with --set")
+
+
+def read_sets(paths: list[Path]):
+    """A set, or several of one vehicle as one."""
+    from rotorid.plan.together import joined_sets
+    from rotorid.recordings import read_set
+
+    sets = [read_set(p) for p in paths]
+    return sets[0] if len(sets) == 1 else joined_sets(*sets)[0]
 
 
 def together(
     first: Annotated[Path, typer.Argument(help="The recording set that left something open.")],
-    second: Annotated[Path, typer.Argument(help="The set flown to settle it.")],
+    later: Annotated[list[Path], typer.Argument(help="The sets flown to settle it, one after the other.")],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder for the results; default FIRST+SECOND-verdict.")
+        Path | None, typer.Option("--out", "-o", help="Folder for the results; default FIRST+LATER-verdict.")
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
-    """Judge a set together with one flown later, and say what the second settled.
+    """Judge a set together with those flown later, and say what they settled.
 
-    Both must be of one vehicle as believed. Writes the files of `rotorid verdict` for both sets together, and
-    `answers.json`.
+    All must be of one vehicle as believed. Writes the files of `rotorid verdict` for the sets together, and
+    `answers.json`. What is still open `rotorid plan` plans for again, from the folder written.
 
     Example: `rotorid together flights next_flight`
     """
@@ -155,14 +176,14 @@ def together(
         from rotorid.recordings import read_set
         from rotorid.report.deliver import analysis_of, write_files
 
-        sets = [read_set(p) for p in (first, second)]
+        sets = [read_set(p) for p in (first, *later)]
         whole, notes = joined_sets(*sets)
         target = out or Path(f"{whole.name}-verdict")
         with progress(None, quiet) as step, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             step(f"{sets[0].name} alone")
             before = open_classes(analysis_of(sets[0]))
-            step("both together")
+            step("all together")
             analysis = analysis_of(whole)
             analysis = type(analysis)(**{**vars(analysis), "notes": (*analysis.notes, *notes)})
             files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
@@ -176,4 +197,6 @@ def together(
             typer.echo(f"  - {line}")
         if not before:
             typer.echo("  - The first set left nothing open.")
+        if open_classes(analysis):
+            typer.echo(f"  - Not all is settled: `rotorid plan {target}` plans the next flight.")
         typer.echo(f"{target / 'report.html'}")

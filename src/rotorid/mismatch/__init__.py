@@ -1,11 +1,13 @@
 """Locate a mismatch between simulation and recordings, name what was left out, model it, improve."""
 
 OPEN = (
+    "absent",
     "analyse",
     "changes",
     "changes.compare",
     "changes.words",
     "choosing",
+    "comparison",
     "consistency",
     "decided",
     "delivery.doubts",
@@ -30,6 +32,7 @@ OPEN = (
     "motion",
     "next_flight",
     "posterior.evidence",
+    "posterior.limits",
     "posterior.prior",
     "posterior.search",
     "posterior.statements",

@@ -18,8 +18,8 @@ from rotorid.mismatch.posterior.problem import problem_of
 from rotorid.mismatch.posterior.score import Posterior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.prepare import training_rule
-from rotorid.mismatch.regression import build
-from rotorid.mismatch.rows import Term
+from rotorid.mismatch.regression import Regression, build
+from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.wrench import WrenchModel, block_seconds
 from rotorid.recordings import Vehicle
@@ -59,12 +59,18 @@ def chosen_already(model: WrenchModel) -> Found:
 
 def squares_of(model: WrenchModel, terms: Sequence[Term]) -> dict[str, np.ndarray]:
     """To the key of each term what its columns amount to (k, k), as mean squares of shares of the weight."""
-    scale = scales(model.prepared.vehicle)
+    return mean_squares(model.rows, model.regression, terms, scales(model.prepared.vehicle))
+
+
+def mean_squares(
+    rows: Sequence[Rows], regression: Regression, terms: Sequence[Term], scale: np.ndarray
+) -> dict[str, np.ndarray]:
+    """To the key of each term the mean squares of its columns (k, k), in units of `scale` (6,) of force and moment."""
     out = {t.key: np.zeros((t.size, t.size)) for t in terms}
-    count = sum(len(r.y) for r in model.rows)
-    for rows in model.rows:
+    count = sum(len(r.y) for r in rows)
+    for part in rows:
         for term in terms:
-            x = np.nan_to_num(rows.x[:, :6, model.regression.columns([term.key])]) / scale[:, None]
+            x = np.nan_to_num(part.x[:, :6, regression.columns([term.key])]) / scale[:, None]
             out[term.key] += np.einsum("nci,ncj->ij", x, x) / count
     return out
 

@@ -72,6 +72,8 @@ class Finding:
     """Of a `suggested` one: why it is not established."""
     windows: tuple[tuple[str, float, float], ...] = ()
     """(run, start_s, stop_s) where it acts, for effects in part of the flight; empty for always."""
+    late_s: float | None = None
+    """Of stamps that are late (positive) or early: by how much; `parameters` have the length alone."""
     probability: float | None = None
     """That it, or one of its class, is at work; None where none was computed."""
     withheld: str = ""

@@ -7,7 +7,7 @@ orthogonal over the piece.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +16,15 @@ from rotorid.plan.limits import Limits
 
 GRAVITY_M_S2 = 9.81
 RAMP_S = 2.0
-BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0))
+SLOW_RAMP_S = 4.0
+"""Of motions over ground: in RAMP_S a fast pass would tilt more to start than to turn round."""
+BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0), (0.3, 8.0))
 """Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
 makes of them turns the vehicle as hard as doublets do."""
+DOUBLET_S = 0.3
+"""Half of a doublet."""
+STANDARD = {"eight": 0.3, "climb at 1": 0.2, "shake all to 8 Hz": 0.2, "turn": 0.15, "doublets": 0.15}
+"""Parts of the standard flight, in their order, and the share of its time that each takes."""
 ROOM = 0.85
 """Share of the tilt allowed that a reference asks for: drag and the controller take some."""
 PIECE_S = 10.0
@@ -58,24 +64,31 @@ class Piece:
         return Reference(t, position, yaw)
 
 
-def envelope(t: np.ndarray) -> np.ndarray:
-    """From 0 smoothly to 1 and back to 0, twice differentiable; RAMP_S each way."""
-    s = np.clip(np.minimum(t, t[-1] - t) / RAMP_S, 0, 1)
+def envelope(t: np.ndarray, ramp_s: float = RAMP_S) -> np.ndarray:
+    """From 0 smoothly to 1 and back to 0, twice differentiable; `ramp_s` each way."""
+    s = np.clip(np.minimum(t, t[-1] - t) / ramp_s, 0, 1)
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi) -> np.ndarray:
+def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: float = RAMP_S) -> np.ndarray:
     """Phase that speeds up from rest and slows down to it, a whole number of units in all, (n,), rad."""
-    speed = envelope(t)
+    speed = envelope(t, ramp_s)
     raw = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
     units = max(1.0, np.floor(rate_rad_s * raw[-1] / unit_rad + 0.02))
     return unit_rad * units * raw / raw[-1]
 
 
-def whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi) -> float:
+def swing(t: np.ndarray, amplitude: float, rate_rad_s: float, ramp_s: float = SLOW_RAMP_S) -> tuple[float, np.ndarray]:
+    """Amplitude and phase (n,), rad, of a swing there and back; smaller where the time asks for a faster phase."""
+    angle = phase(t, rate_rad_s, ramp_s=ramp_s)
+    fastest = float(np.gradient(angle, t).max())
+    return amplitude * min(1.0, (1.05 * rate_rad_s / fastest) ** 2), angle
+
+
+def whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi, ramp_s: float = RAMP_S) -> float:
     """Duration near `about_s`, s, in which a phase of that rate goes through a whole number of units."""
-    units = max(1, round(rate_rad_s * (about_s - RAMP_S) / unit_rad))
-    return RAMP_S + units * unit_rad / rate_rad_s
+    units = max(1, round(rate_rad_s * (about_s - ramp_s) / unit_rad))
+    return ramp_s + units * unit_rad / rate_rad_s
 
 
 def multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
@@ -112,7 +125,25 @@ def candidates(limits: Limits, yaw_acceleration_rad_s2: float) -> tuple[Piece, .
         *_turns(limits, yaw_acceleration_rad_s2),
         *_climbs(limits),
         *_oscillations(limits, yaw_acceleration_rad_s2),
+        _doublets(limits, yaw_acceleration_rad_s2),
     )
+
+
+def standard(parts: Mapping[str, Piece], duration_s: float) -> Piece:
+    """What a pilot flies who has no plan, in `duration_s`: an eight, climbs, quick motions, turns and doublets.
+
+    `parts` are candidates by their names, of these at least those of STANDARD.
+    """
+
+    def make(t):
+        edges = np.round(np.cumsum([0.0, *STANDARD.values()]) * (len(t) - 1)).astype(int)
+        position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
+        for name, start, stop in zip(STANDARD, edges, edges[1:], strict=False):
+            position[start : stop + 1], yaw[start : stop + 1] = parts[name].make(t[start : stop + 1] - t[start])
+        return position, yaw
+
+    words = "the standard flight: an eight, climbs, quick motions, turns to and fro, doublets"
+    return Piece("standard", words, make, duration_s)
 
 
 def _still(limits: Limits) -> list[Piece]:
@@ -149,24 +180,24 @@ def _passes(limits: Limits) -> list[Piece]:
             amplitude, rate = largest(limits, room, share)
 
             def make(t, amplitude=amplitude, rate=rate, ahead=ahead):
-                return amplitude * np.sin(phase(t, rate))[:, None] * ahead, np.zeros(len(t))
+                return amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))[:, None] * ahead, np.zeros(len(t))
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
-            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 12.0)))
+            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 15.0, ramp_s=SLOW_RAMP_S)))
     for degrees, axis in ((0, 0), (90, 1)):
         amplitude, rate = largest(limits, limits.room_m[axis], 0.8)
         heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / HEAVE_RAD_S, 0.3 * GRAVITY_M_S2 / HEAVE_RAD_S**2)
 
         def make(t, amplitude=amplitude, rate=rate, axis=axis, heave=heave):
             out = np.zeros((len(t), 3))
-            out[:, axis] = amplitude * np.sin(phase(t, rate))
+            out[:, axis] = amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))
             out[:, 2] = heave * np.sin(phase(t, HEAVE_RAD_S))
             return out, np.zeros(len(t))
 
         way = "along the nose" if axis == 0 else "sideways"
         words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
-        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 12.0)))
+        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 15.0, ramp_s=SLOW_RAMP_S)))
     return out
 
 
@@ -180,20 +211,30 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
         return np.zeros((len(t), 3)), phase(t, yaw_rate, 2 * np.pi)
 
     def eight(t):
-        angle = phase(t, rate / np.sqrt(2))
+        size, angle = swing(t, amplitude, rate / np.sqrt(2))
         out = np.zeros((len(t), 3))
-        out[:, 0], out[:, 1] = amplitude * np.sin(angle), amplitude / 2 * np.sin(2 * angle)
+        out[:, 0], out[:, 1] = size * np.sin(angle), size / 2 * np.sin(2 * angle)
         return out, np.zeros(len(t))
+
+    def turn(t):
+        # One way in the first half, back in the second: the nose ends where it was.
+        half = t[: (len(t) + 1) // 2]
+        speed = yaw_rate * envelope(half)
+        there = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(half))])
+        return np.zeros((len(t), 3)), np.concatenate([there, there[: len(t) // 2][::-1]])
 
     def drift(t):
         # To and fro over ground while the nose turns: body axes and world axes part.
         out = np.zeros((len(t), 3))
-        out[:, 0] = amplitude * np.sin(phase(t, rate))
+        out[:, 0] = amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))
         return out, phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
     pieces = [
         Piece(
-            "eight", f"a figure of eight, {amplitude:.1f} m each way, nose held", eight, whole(rate / np.sqrt(2), 15.0)
+            "eight",
+            f"a figure of eight, {amplitude:.1f} m each way, nose held",
+            eight,
+            whole(rate / np.sqrt(2), 15.0, ramp_s=SLOW_RAMP_S),
         )
     ]
     # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
@@ -206,6 +247,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
 
     pieces.append(Piece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
     degrees = np.degrees(yaw_rate)
+    pieces.append(Piece("turn", f"turn on the spot to and fro at up to {degrees:.0f} degrees a second", turn))
     for name, words, make, speed in (
         ("spin", f"turn on the spot at up to {degrees:.0f} degrees a second", spin, yaw_rate),
         ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
@@ -224,8 +266,9 @@ def _climbs(limits: Limits) -> list[Piece]:
         rate = min(speed / amplitude, np.sqrt(4.0 / amplitude))
 
         def make(t, amplitude=amplitude, rate=rate):
+            size, angle = swing(t, amplitude, rate, RAMP_S)
             out = np.zeros((len(t), 3))
-            out[:, 2] = -amplitude * np.sin(phase(t, rate))
+            out[:, 2] = -size * np.sin(angle)
             return out, np.zeros(len(t))
 
         words = f"climb and descend by {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s"
@@ -280,6 +323,36 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
                 Piece(f"{name} to {high_hz:g} Hz", f"{words[name]}, {low_hz:g} to {high_hz:g} times a second", make)
             )
     return out
+
+
+def _doublets(limits: Limits, most_rad_s2: float) -> Piece:
+    """Pushes of the tilt forwards, sideways and of the nose, each followed by its opposite, which leads back."""
+    most = ROOM * GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    push = min(most, limits.speed_m_s / DOUBLET_S, min(limits.room_m[:2]) / DOUBLET_S**2)
+    turn = min(np.radians(20.0), 0.5 * np.radians(limits.yaw_rate_deg_s) * DOUBLET_S, most_rad_s2 * DOUBLET_S**2 / 5.77)
+
+    def make(t):
+        position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
+        step, each = t[1] - t[0], 4.0 * DOUBLET_S
+        half = int(round(DOUBLET_S / step))
+        edge = np.hanning(max(half // 3, 3))
+        for number in range(int((t[-1] - DOUBLET_S) / (2 * each))):
+            # + - at once, - + a little later: at rest again, and back.
+            start = int(round((DOUBLET_S / 2 + 2 * each * number) / step))
+            wave = np.zeros(len(t))
+            for place, sign in ((0, 1.0), (half, -1.0), (4 * half, -1.0), (5 * half, 1.0)):
+                wave[start + place : start + place + half] = sign
+            wave = np.convolve(wave, edge / edge.sum(), "same")
+            axis = number % 3
+            if axis < 2:
+                position[:, axis] += push * step**2 * np.cumsum(np.cumsum(wave))
+            else:
+                yaw += turn * wave
+        return position, yaw
+
+    return Piece(
+        "doublets", "quick pushes to and fro: forwards, sideways, of the nose", make, 8.0 * DOUBLET_S * 6 + 1.0
+    )
 
 
 def joined(pieces: tuple[Piece, ...] | list[Piece], step_s: float, still_s: float = 1.0) -> Reference:

@@ -1,32 +1,33 @@
 """The flight that settles what a set left open: manoeuvres chosen one after the other by what they separate a second.
 
 Every candidate is flown in simulation; one that leaves the limits is out. Then the manoeuvre that brings the open
-questions furthest towards the wanted separation for its time is taken, and again, until all are settled or no time is
-left. What the others make needless is dropped. The flight as a whole is then flown once more by each competing model,
-and these predictions are the ones stated.
+questions and wishes furthest towards their goals for its time is taken, and again, until all are reached or no time is
+left. What the others make needless is dropped. Next to that flight stand the best one without its first manoeuvre and
+the standard flight of the same length. Each is flown once more by every competing model; these predictions are the ones
+stated, and by them the best of the three is the plan.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.plan.candidates import Piece, Reference, candidates, joined, smaller
-from rotorid.plan.intervals import Width, widths
+from rotorid.mismatch.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
+from rotorid.plan.candidates import STANDARD, Piece, Reference, candidates, joined, smaller, standard
+from rotorid.plan.intervals import Width, check_wishes, widths
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import Known
 from rotorid.plan.separation import (
     Information,
-    Separation,
+    Questions,
     asked_terms,
     chain_separations,
     expecting,
     flown,
-    left_overs,
-    of_flight,
+    of_flights,
     of_set,
     separations,
     smallest_separation,
@@ -41,8 +42,11 @@ YAW_SHARE = 0.2
 SIZES = (1.0, 0.75, 0.5)
 """Sizes of a manoeuvre that are tried, the largest that keeps the limits is taken."""
 QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")
+NOTHING = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
+"""Of a flight without pieces."""
 BETWEEN_S = 1.0
 """At rest between manoeuvres."""
+LEAST_S = LEAST_ENVIRONMENTS * ENVIRONMENT_S
 MOST_PIECES = 12
 LEAST_PROGRESS = 0.01
 """Share of the way to the goal that a further manoeuvre must bring."""
@@ -61,22 +65,19 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class Plan:
-    """A flight to fly next, and what is expected of it."""
+class Forecast:
+    """A flight, and what is expected of it next to the set at hand."""
 
-    set: str
-    limits: Limits
+    name: str
+    """`chosen`, `second` (the best without the chosen one's first manoeuvre), or `standard`."""
     pieces: tuple[Piece, ...]
     reference: Reference
     """From the middle of the volume."""
     flight: Flown | None
     """As the vehicle would fly it."""
-    questions: tuple[tuple[tuple[str, ...], tuple[Separation, ...]], ...]
+    questions: Questions
     """Ids of each open question, and how far apart their models will be."""
     widths: tuple[Width, ...]
-    tried: tuple[Tried, ...]
-    unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
-    not_testable: tuple[tuple[str, str], ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -87,6 +88,23 @@ class Plan:
     def sigma(self) -> float | None:
         """Smallest separation expected over all questions; None where nothing is compared."""
         return smallest_separation(self.questions)
+
+    def reached(self, target_sigma: float) -> float:
+        """Share of the way to all goals."""
+        return share_reached([s.sigma for _, found in self.questions for s in found], self.widths, target_sigma)
+
+
+@dataclass(frozen=True)
+class Plan(Forecast):
+    """A flight to fly next, and what else was considered."""
+
+    set: str
+    limits: Limits
+    others: tuple[Forecast, ...] = ()
+    """What else was considered as a whole, the better one first."""
+    tried: tuple[Tried, ...] = ()
+    unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
+    not_testable: tuple[tuple[str, str], ...] = ()
 
     @property
     def settles(self) -> bool:
@@ -126,13 +144,18 @@ def broken(flight: Flown, limits: Limits, vehicle: Vehicle) -> str:
     return ""
 
 
-def tried(known: Known, limits: Limits, progress: Callable[[str], None] = lambda text: None) -> list[Tried]:
+def tried(
+    known: Known,
+    limits: Limits,
+    progress: Callable[[str], None] = lambda text: None,
+    wishes: Iterable[str] = (),
+) -> list[Tried]:
     """Every candidate flown in simulation by the model as fitted, as large as the limits allow it to be flown.
 
     The controller makes some motions larger than they are asked for: where a limit would be broken a smaller size of
     the same manoeuvre is tried.
     """
-    world, terms, step = world_of(known, None, None), asked_terms(known), step_of(known)
+    world, terms, step = world_of(known, None, None), asked_terms(known, wishes), step_of(known)
     vehicle = known.prepared.vehicle
     most = yaw_acceleration(vehicle)
     sizes = [{p.name: p for p in candidates(smaller(limits, s), s * most)} for s in SIZES]
@@ -141,46 +164,47 @@ def tried(known: Known, limits: Limits, progress: Callable[[str], None] = lambda
         for options in sizes:
             if name not in options:
                 continue
-            piece, reason, flight = options[name], "", None
+            piece = options[name]
             try:
-                flight = flown(known, world, joined([piece], step, BETWEEN_S), limits)
-                reason = broken(flight, limits, vehicle)
+                flights = flown(world, joined([piece], step, BETWEEN_S), limits)
+                reason = next((b for f in flights if (b := broken(f, limits, vehicle))), "")
             except InputError as error:
                 reason = str(error)
             if not reason:
                 break
         seconds = piece.duration_s + BETWEEN_S
-        information = None if reason else of_flight(known, flight, world, terms)
+        information = None if reason else of_flights(known, flights, world, terms)
         out.append(Tried(piece, information, seconds, reason))
         progress(f"flown in simulation: {name}")
     return out
 
 
-def reached(known: Known, information: Information, target: float) -> float:
-    """Share of the way to the goal: the mean over all models and rivals of their separation over that wanted."""
-    found = [min(s / target, 1.0) for q in known.questions for s in left_overs(known, q, information)]
-    for _, own in chain_separations(known, information):
-        found += [min(s.sigma / target, 1.0) for s in own]
+def share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma: float) -> float:
+    """Share of the way to the goals: the mean over all models and wishes of what is reached of each."""
+    found = [min(s / target_sigma, 1.0) for s in sigmas]
+    found += [min(w.wished / w.after, 1.0) for w in wished if w.wished]
     return float(np.mean(found)) if found else 1.0
 
 
+def reached(known: Known, base: Information, information: Information, target: float, wishes: dict) -> float:
+    """Share of the way to the goals with the set (`base`) and more, as `share_reached`."""
+    sigmas = [s.sigma for q in known.questions for s in separations(known, q, base, information)]
+    sigmas += [s.sigma for _, own in chain_separations(known, information) for s in own]
+    return share_reached(sigmas, widths(known, base, information, wishes) if wishes else (), target)
+
+
 def chosen_pieces(
-    known: Known, limits: Limits, options: list[Tried], most: int = MOST_PIECES
+    known: Known, limits: Limits, options: list[Tried], most: int = MOST_PIECES, wishes: dict[str, float] | None = None
 ) -> tuple[list[Tried], list[Tried]]:
     """The manoeuvres to fly, `most` at most, and all options with their progress."""
     base = of_set(known)
-    start = reached(known, base, limits.target_sigma)
+
+    def share_of(information: Information) -> float:
+        return reached(known, base, information, limits.target_sigma, wishes or {})
+
+    start = share_of(base)
     judged = [
-        t
-        if t.information is None
-        else Tried(
-            t.piece,
-            t.information,
-            t.flown_s,
-            t.reason,
-            reached(known, base + t.information, limits.target_sigma) - start,
-        )
-        for t in options
+        t if t.information is None else replace(t, progress=share_of(base + t.information) - start) for t in options
     ]
     usable = [t for t in judged if t.information is not None]
     taken: list[Tried] = []
@@ -190,7 +214,7 @@ def chosen_pieces(
         offers = []
         for t in usable:
             if t.flown_s <= left:
-                then = reached(known, now + t.information, limits.target_sigma)
+                then = share_of(now + t.information)
                 offers.append(((then - share) / t.flown_s, then, t))
         if not offers:
             break
@@ -204,7 +228,7 @@ def chosen_pieces(
         total = base
         for o in rest:
             total = total + o.information
-        if rest and reached(known, total, limits.target_sigma) >= share - LEAST_PROGRESS / 2:
+        if rest and share_of(total) >= share - LEAST_PROGRESS / 2:
             taken = rest
     return taken, judged
 
@@ -216,12 +240,78 @@ def expecting_quick(known: Known, limits: Limits) -> Known:
         options = {p.name: p for p in candidates(smaller(limits, share), share * yaw_acceleration(vehicle))}
         for piece in (options[n] for n in QUICK if n in options):
             try:
-                flight = flown(known, world, joined([piece], step, BETWEEN_S), limits)
+                flight, *_ = flown(world, joined([piece], step, BETWEEN_S), limits)
             except InputError:
                 continue
             if not broken(flight, limits, vehicle):
                 return expecting(known, [(flight, world)])
     return known
+
+
+def standard_piece(known: Known, limits: Limits, options: list[Tried], duration_s: float) -> Piece | None:
+    """The standard flight of that length as large as the limits allow; None where they allow none."""
+    world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
+    able = {t.piece.name: t.piece for t in options if t.information is not None}
+    sizes = [{p.name: p for p in candidates(smaller(limits, s), s * yaw_acceleration(vehicle))} for s in SIZES]
+    for parts in (able, *sizes):
+        if not set(STANDARD) <= set(parts):
+            continue
+        piece = standard(parts, duration_s)
+        try:
+            flights = flown(world, joined([piece], step, BETWEEN_S), limits)
+        except InputError:
+            continue
+        if not any(broken(f, limits, vehicle) for f in flights):
+            return piece
+    return None
+
+
+def forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...], wishes: dict[str, float]) -> Forecast:
+    """What is expected of a flight of these pieces; without any, what the set holds. `known` is the set alone.
+
+    Every competing model flies it, as it would be flown if that model were the true one.
+    """
+    alone, base = known, of_set(known)
+    if not pieces:
+        questions = [(q.ids, tuple(separations(known, q, base, base))) for q in known.questions]
+        questions += chain_separations(known, base)
+        return Forecast(name, (), NOTHING, None, tuple(questions), tuple(widths(known, base, base, wishes)))
+    reference, world = joined(pieces, step_of(known), BETWEEN_S), world_of(known, None, None)
+    flights = flown(world, reference, limits)
+    known = expecting(known, [(flights[0], world)])
+    terms, before = asked_terms(known, wishes), of_set(known)
+    after = before + of_flights(known, flights, world, terms)
+    questions = []
+    for question in known.questions:
+        found = []
+        for hypothesis in question.hypotheses:
+            own = after
+            if hypothesis.keys:
+                try:
+                    by = world_of(known, question, hypothesis)
+                    own = before + of_flights(known, flown(by, reference, limits), by, terms)
+                except InputError:
+                    own = after
+            found += [s for s in separations(known, question, base, own) if s.true == hypothesis.id]
+        questions.append((question.ids, tuple(found)))
+    questions += chain_separations(known, after)
+    return Forecast(name, pieces, reference, flights[0], tuple(questions), tuple(widths(alone, base, after, wishes)))
+
+
+def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes, progress) -> Forecast:
+    """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left.
+
+    They are flown for LEAST_S at least: an effect that one pass shows is none that the engine finds wherever it looks.
+    """
+    progress(f"predicting the {name} flight")
+    pieces = tuple(t.piece for t in taken)
+    most = int((limits.duration_s - BETWEEN_S) / max(sum(t.flown_s for t in taken), BETWEEN_S)) if taken else 1
+    least = int(np.ceil((LEAST_S - BETWEEN_S) / sum(t.flown_s for t in taken))) if taken else 1
+    times = max(1, min(least, most))
+    made = forecast(known, limits, name, pieces * times, wishes)
+    if most > times and made.reached(limits.target_sigma) < 1.0:
+        return forecast(known, limits, name, pieces * most, wishes)
+    return made
 
 
 def plan(
@@ -231,75 +321,22 @@ def plan(
     progress: Callable[[str], None] = lambda text: None,
 ) -> Plan:
     """The flight to fly next; without anything to settle, or any manoeuvre that helps, one without pieces."""
+    wishes = wishes or {}
+    check_wishes(known, wishes)
     reasons = tuple(sorted(known.prepared.not_testable.items()))
-    nothing = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
+    about = {"set": known.recordings.name, "limits": limits, "unanswerable": known.unanswerable}
     if not known.questions and not known.chains and not wishes:
-        return Plan(known.recordings.name, limits, (), nothing, None, (), (), (), known.unanswerable, reasons)
-    first, known = known, expecting_quick(known, limits)
-    options = tried(known, limits, progress)
+        return Plan(**vars(forecast(known, limits, "chosen", (), {})), **about, not_testable=reasons)
+    quick = expecting_quick(known, limits)
+    options = tried(quick, limits, progress, wishes)
     progress("choosing")
-    taken, judged = chosen_pieces(known, limits, options) if known.questions or known.chains else ([], options)
-    base = of_set(known)
-    if wishes:
-        taken = with_wishes(known, limits, taken, judged, base, wishes)
-    pieces = tuple(t.piece for t in taken)
-    reference = joined(pieces, step_of(known), BETWEEN_S) if pieces else nothing
-    flight, questions, after = None, [], base
-    if pieces:
-        world = world_of(known, None, None)
-        flight = flown(known, world, reference, limits)
-        known = expecting(first, [(flight, world)])
-        base = of_set(known)
-        after = base + of_flight(known, flight, world, asked_terms(known))
-    for question in known.questions:
-        progress(f"predicting {' or '.join(question.ids)}")
-        found = []
-        for hypothesis in question.hypotheses:
-            own = after
-            if pieces and hypothesis.keys:
-                world = world_of(known, question, hypothesis)
-                try:
-                    flight_h = flown(known, world, reference, limits)
-                    own = base + of_flight(known, flight_h, world, asked_terms(known))
-                except InputError:
-                    own = after
-            found += [s for s in separations(known, question, of_set(first), own) if s.true == hypothesis.id]
-        questions.append((question.ids, tuple(found)))
-    questions += chain_separations(known, after)
-    return Plan(
-        known.recordings.name,
-        limits,
-        pieces,
-        reference,
-        flight,
-        tuple(questions),
-        tuple(widths(known, base, after, wishes or {})),
-        tuple(judged),
-        known.unanswerable,
-        reasons,
-    )
-
-
-def with_wishes(known, limits, taken, options, base, wishes: dict[str, float]) -> list[Tried]:
-    """Manoeuvres added until the wished intervals are reached, or no time or use is left."""
-    taken = list(taken)
-
-    def missing(information: Information) -> float:
-        found = widths(known, base, information, wishes)
-        return sum(max(np.log(w.after / w.wished), 0.0) for w in found if w.wished)
-
-    def total(of: list[Tried]) -> Information:
-        out = base
-        for t in of:
-            out = out + t.information
-        return out
-
-    usable = [t for t in options if t.information is not None]
-    while len(taken) < MOST_PIECES:
-        now = missing(total(taken))
-        left = limits.duration_s - BETWEEN_S - sum(t.flown_s for t in taken)
-        offers = [((now - missing(total([*taken, t]))) / t.flown_s, t) for t in usable if t.flown_s <= left]
-        if now <= 0 or not offers or max(o[0] for o in offers) <= 1e-4:
-            break
-        taken.append(max(offers, key=lambda o: o[0])[1])
-    return taken
+    taken, judged = chosen_pieces(quick, limits, options, wishes=wishes)
+    others = [t for t in judged if not taken or t.piece is not taken[0].piece]
+    found = [expected(known, limits, "chosen", taken, wishes, progress)]
+    if taken and (second := chosen_pieces(quick, limits, others, wishes=wishes)[0]):
+        found.append(expected(known, limits, "second", second, wishes, progress))
+    longest = found[0].duration_s or limits.duration_s
+    if (piece := standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
+        found.append(forecast(known, limits, "standard", (piece,), wishes))
+    found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
+    return Plan(**vars(found[0]), **about, others=tuple(found[1:]), tried=tuple(judged), not_testable=reasons)

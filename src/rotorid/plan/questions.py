@@ -105,8 +105,9 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
             if (between := chain_question(found, finding, ids)) is not None:
                 chains.append(between)
             else:
-                what = "between command and rotor speed; record the rotor speeds beside the commands"
-                unanswerable.append((ids, what))
+                needed = "these columns give no chain of the others to compare with"
+                more = "" if found.measured else "; record the rotor speeds next to the commands"
+                unanswerable.append((ids, needed + more))
         elif (question := question_of(found, finding, ids)) is not None:
             questions.append(question)
         else:

@@ -6,19 +6,26 @@ normal equations of h's columns once everything that the rival and all believed 
 over is projected out. The loss difference that the engine will then find is about λ with a standard deviation of 2 √λ:
 in standard errors of the data the models are √λ apart, give or take one. The normal equations are those of the set as
 recorded plus those of the simulated flight, through the same filters (the instruments' noise and what the model left).
+
+A separation is the median over draws of θ, as doubtful as the set leaves it. How fast the vehicle's loops are is known
+roughly: a flight is simulated with the bandwidths as stated and with slower ones (SLOWER_LOOPS), and the smaller median
+is the one stated. The interval is over all draws of both.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.mismatch.absent import scales
+from rotorid.mismatch.comparison import ENVIRONMENT_S
 from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.prepare import assemble_rows, prepare_like, training_rule
 from rotorid.mismatch.regression import Regression, autoregression, build, ridge_inverse
-from rotorid.mismatch.rows import Term
+from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
 from rotorid.plan.between import interval as chain_interval
 from rotorid.plan.between import squares
@@ -26,11 +33,16 @@ from rotorid.plan.candidates import Reference
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import Hypothesis, Known, Question
 from rotorid.plan.simulate import Flown, World, commands, fly, recorded
-from rotorid.recordings import RecordingSet
+from rotorid.recordings import RecordingSet, Vehicle
 
 DRAWS = 400
 LEAST_RATE_HZ = 400.0
 """Flights are simulated at least this finely."""
+SLOWER_LOOPS = (1.0, 0.7)
+"""Shares of the stated bandwidths that flights are simulated with: what is asked of quick motions only a loop as fast
+as stated flies."""
+SIZES = np.geomspace(1e-2, 1e2, 41)
+"""Sizes, of the coefficients found, among which that of a model's coefficients is looked for."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +50,28 @@ class Information:
     """What some recordings hold about the open questions."""
 
     gram: np.ndarray
-    """Normal equations (K, K) of the set's terms, in the columns of the set's regression."""
+    """Normal equations of the set's terms, in the columns of the set's regression: (K, K), of a flight (C, K, K), one
+    for each of SLOWER_LOOPS."""
     squares: np.ndarray | None = None
-    """λ of every pair of competing chains; None for nothing."""
+    """λ of every pair of competing chains, (P,) or (C, P); None for nothing."""
+    seconds: float = 0.0
+    """How long they are."""
+    shares: np.ndarray | float = 0.0
+    """Products (K, K) of the columns as shares of the weight, summed over these seconds; of flights alone."""
 
     def __add__(self, other: Information) -> Information:
         known = [i.squares for i in (self, other) if i.squares is not None]
-        return Information(self.gram + other.gram, np.sum(known, axis=0) if known else None)
+        return Information(
+            self.gram + other.gram,
+            sum(known[1:], known[0]) if known else None,
+            self.seconds + other.seconds,
+            self.shares + other.shares,
+        )
+
+    @property
+    def each(self) -> list[np.ndarray]:
+        """Normal equations (K, K) of each of the loops."""
+        return list(self.gram.reshape(-1, *self.gram.shape[-2:]))
 
 
 @dataclass(frozen=True)
@@ -55,14 +82,16 @@ class Separation:
     rival: str
     sigma: float
     interval_95: tuple[float, float]
-    """Of the separation that will be found: the model's own doubt about its size, and the noise of the flight."""
+    """Of the separation that will be found: the model's own doubt about its size, the loops' and the noise's."""
     so_far: float
     """What the set at hand separates them by."""
+    log_odds: float = 0.0
+    """Expected log odds, nats, of the true model against its nearest rival."""
 
 
-def asked_terms(known: Known) -> list[Term]:
-    """Terms that any open question needs, in the order of the regression."""
-    wanted = set()
+def asked_terms(known: Known, ids: Iterable[str] = ()) -> list[Term]:
+    """Terms that any open question needs, or that stand for some `ids`, in the order of the regression."""
+    wanted = {t.key for t in known.regression.terms if t.effect and t.effect in ids}
     for question in known.questions:
         wanted |= set(question.shared)
         wanted |= {k for choices in question.rivals.values() for keys in choices for k in keys}
@@ -75,7 +104,16 @@ def of_set(known: Known) -> Information:
     """What the fitted runs of the set hold."""
     regression = known.regression
     gram, _, bias, _ = regression._normal(np.arange(len(regression.precision)), regression.training)
-    return Information(gram - bias)
+    seconds = float(regression.training.sum() * regression.block_s)
+    shares = seconds * shares_of(known.fitted.model.rows, known.prepared.vehicle) if isinstance(known, Known) else 0.0
+    return Information(gram - bias, None, seconds, shares)
+
+
+def shares_of(rows: Sequence[Rows], vehicle: Vehicle) -> np.ndarray:
+    """Products (K, K) of the columns of force and moment as shares of the weight, the mean over rows."""
+    scale = scales(vehicle)[:, None]
+    columns = [np.nan_to_num(r.x[:, :6]) / scale for r in rows]
+    return sum(np.einsum("nci,ncj->ij", x, x, optimize=True) for x in columns) / sum(len(x) for x in columns)
 
 
 def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | None) -> World:
@@ -133,9 +171,18 @@ def columns_of(known: Known) -> tuple[str, ...]:
     return tuple(n for n in runs[0].table.columns if all(r.has(n) for r in runs))
 
 
-def flown(known: Known, world: World, reference: Reference, limits: Limits) -> Flown:
-    """A reference flown by a competing model."""
-    return fly(world, reference, limits.attitude_bandwidth_rad_s, limits.middle_m, limits.position_bandwidth_rad_s)
+def flown(world: World, reference: Reference, limits: Limits) -> tuple[Flown, ...]:
+    """A reference flown by a competing model, with the loops as stated and slower (SLOWER_LOOPS)."""
+    fast, slow = limits.attitude_bandwidth_rad_s, limits.position_bandwidth_rad_s
+    return tuple(fly(world, reference, s * fast, limits.middle_m, slow and s * slow) for s in SLOWER_LOOPS)
+
+
+def of_flights(known: Known, flights: Sequence[Flown], world: World, terms: Sequence[Term]) -> Information:
+    """What a reference would hold, flown with each of the loops."""
+    found = [of_flight(known, flight, world, terms) for flight in flights]
+    squares = [i.squares for i in found if i.squares is not None]
+    grams = np.stack([i.gram for i in found])
+    return Information(grams, np.stack(squares) if squares else None, found[0].seconds, found[0].shares)
 
 
 def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) -> Information:
@@ -164,9 +211,11 @@ def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) 
     rate_hz = prepared.thinner.rate_hz
     own = build(rows, list(terms), known.regression.filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
     every = known.regression.columns([t.key for t in terms])
-    gram = np.zeros_like(known.regression.gram[0])
+    gram, shares = np.zeros_like(known.regression.gram[0]), np.zeros_like(known.regression.gram[0])
     gram[np.ix_(every, every)] = own.gram.sum(axis=0)
-    return Information(gram, np.array(apart) if apart else None)
+    seconds = float(flight.motion.time_s[-1] - flight.motion.time_s[0])
+    shares[np.ix_(every, every)] = seconds * shares_of(rows, prepared.vehicle)
+    return Information(gram, np.array(apart) if apart else None, seconds, shares)
 
 
 def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
@@ -184,7 +233,8 @@ def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
         run = recorded(flight, world, columns_of(known), rate, f"planned {number}")
         segments += prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
     floor, remains = channel_floor(segments, prepared.vehicle), after_residual(model)
-    filters = {c: autoregression([r[:, c] for r in remains], floor[c]) for c in regression.filters}
+    # What is steady in a run is no noise: a filter that takes it out would see nothing slow.
+    filters = {c: autoregression([r[:, c] - r[:, c].mean() for r in remains], floor[c]) for c in regression.filters}
     rule, rate_hz = training_rule(prepared.split, model.segments), prepared.thinner.rate_hz
     again = build(
         model.rows, model.terms, filters, rule, block_seconds(model.rows, rate_hz), rate_hz, model.contributions.noisy
@@ -197,19 +247,16 @@ def own_rate_hz(known: Known) -> float:
     return 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
 
 
-def left_over(
-    regression: Regression, information: Information, own: Sequence[str], others: Sequence[str]
-) -> np.ndarray:
-    """What is left of the normal equations of terms (k, k) once others could take over what they can."""
+def left_over(regression: Regression, gram: np.ndarray, own: Sequence[str], others: Sequence[str]) -> np.ndarray:
+    """What is left of normal equations (K, K) of terms (k, k) once others could take over what they can."""
     a, b = regression.columns(own), regression.columns([k for k in others if k not in own])
-    gram, prior = information.gram, np.diag(regression.precision[b])
-    inner = ridge_inverse(gram[np.ix_(b, b)] + prior)
+    inner = ridge_inverse(gram[np.ix_(b, b)] + np.diag(regression.precision[b]))
     pull = gram[np.ix_(b, a)]
     left = gram[np.ix_(a, a)] - pull.T @ inner @ pull
     return (left + left.T) / 2
 
 
-def rivals_left(known: Known, question: Question, true: Hypothesis, rival: str, information: Information):
+def rivals_left(known: Known, question: Question, true: Hypothesis, rival: str, gram: np.ndarray):
     """S of every form of a rival, and which of the true model's coefficients it is of."""
     out = []
     for keys in question.rivals[rival]:
@@ -217,17 +264,49 @@ def rivals_left(known: Known, question: Question, true: Hypothesis, rival: str, 
         if own:
             # Where the rival shares a term with the true model, only what is the true model's own counts.
             at = np.flatnonzero(np.isin(known.regression.columns(true.keys), known.regression.columns(own)))
-            out.append((left_over(known.regression, information, own, [*question.shared, *keys]), at))
+            out.append((left_over(known.regression, gram, own, [*question.shared, *keys]), at))
     return out
 
 
-def against(known: Known, question: Question, true: Hypothesis, rival: str, information: Information):
-    """λ of a true model against the best form of a rival, S of that form, and of which coefficients it is."""
-    forms = rivals_left(known, question, true, rival, information)
-    if not forms:
-        return None
-    left, at = min(forms, key=lambda f: size_of(true.beta, *f))
-    return size_of(true.beta, left, at), left, at
+def apart(known: Known, question: Question, true: Hypothesis, gram: np.ndarray) -> dict[str, np.ndarray]:
+    """√λ (DRAWS,) of a true model against every rival, the best of its forms in each draw of the coefficients."""
+    draws = drawn(true, gram[np.ix_(*[known.regression.columns(true.keys)] * 2)])
+    out = {}
+    for rival in question.ids:
+        forms = [] if rival == true.id else rivals_left(known, question, true, rival, gram)
+        squares = [np.einsum("dk,kl,dl->d", draws[:, at], left, draws[:, at]) for left, at in forms]
+        if squares:
+            out[rival] = np.sqrt(np.maximum(np.min(squares, axis=0), 0.0))
+    return out
+
+
+def drawn(true: Hypothesis, gram: np.ndarray) -> np.ndarray:
+    """Draws of a model's coefficients (DRAWS, k).
+
+    What the set does not know of them is not as large as its doubt: the columns of one model are taken to contribute
+    alike, so the coefficients, in units of their columns' length in the normal equations `gram` (k, k), are normal
+    about zero with one size, the most probable for what the set found.
+    """
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    found, doubt = true.beta / unit, true.covariance / np.outer(unit, unit)
+    values, vectors = np.linalg.eigh(doubt)
+    values, along = np.maximum(values, 1e-12 * max(values.max(), 1e-300)), vectors.T @ found
+    variances = np.square(SIZES * max(float(np.abs(found).max()), 1e-300))
+    fits = [-(np.log(values + v) + along**2 / (values + v)).sum() for v in variances]
+    variance = variances[int(np.argmax(fits))]
+    kept = variance / (values + variance)
+    normal = np.random.default_rng(0).standard_normal((DRAWS, len(unit)))
+    return (kept * along + normal * np.sqrt(kept * values)) @ vectors.T * unit
+
+
+def log_odds(sigma: np.ndarray, seconds: float) -> float:
+    """Expected log odds, nats, of separations √λ (n,) of a true model from its rival in so many seconds.
+
+    λ/2 for a form that is right. An effect's contribution may be wrong by a share of it (`Prior.form_error`), anew in
+    every environment: of N of them that adds f² λ/N to the variance of what separates the two, 1 from the noise.
+    """
+    environments = max(seconds / ENVIRONMENT_S, 1.0)
+    return float(np.mean(sigma**2 / (1.0 + Prior().form_error ** 2 * sigma**2 / environments)) / 2)
 
 
 def separations(known: Known, question: Question, before: Information, after: Information) -> list[Separation]:
@@ -238,53 +317,27 @@ def separations(known: Known, question: Question, before: Information, after: In
     """
     out = []
     for true in question.hypotheses:
-        if not true.keys:
+        found = [apart(known, question, true, gram) for gram in after.each] if true.keys else []
+        if not any(found):
             continue
-        found = []
-        for rival in question.ids:
-            if rival == true.id:
-                continue
-            forms = rivals_left(known, question, true, rival, after)
-            if forms:
-                found.append((min(size_of(true.beta, *f) for f in forms), rival, forms))
-        if not found:
-            continue
-        _, rival, _ = min(found, key=lambda f: f[0])
-        sigma, interval_95 = spread(true, [f for _, _, forms in found for f in forms])
-        so_far, _ = spread(true, rivals_left(known, question, true, rival, before))
-        out.append(Separation(true.id, rival, sigma, interval_95, so_far))
+        nearest = [np.min(list(f.values()), axis=0) for f in found]
+        worst = int(np.argmin([np.median(n) for n in nearest]))
+        rival = min(found[worst], key=lambda r: float(np.median(found[worst][r])))
+        so_far = apart(known, question, true, before.each[0])[rival]
+        every = np.concatenate(nearest)
+        noise = np.random.default_rng(1).standard_normal(len(every))
+        low, high = np.quantile(np.maximum(every + noise, 0.0), [0.025, 0.975])
+        out.append(
+            Separation(
+                true.id,
+                rival,
+                float(np.median(nearest[worst])),
+                (float(low), float(high)),
+                float(np.median(so_far)),
+                log_odds(nearest[worst], after.seconds),
+            )
+        )
     return out
-
-
-def size_of(beta: np.ndarray, left: np.ndarray, at: np.ndarray) -> float:
-    """λ of coefficients (k,)."""
-    return float(max(beta[at] @ left @ beta[at], 0.0))
-
-
-def spread(true: Hypothesis, forms: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, tuple[float, float]]:
-    """Median and 95 % interval of the separation that will be found, over the model's own doubt and the flight's noise.
-
-    `forms` hold S of every form of every rival, and which of the model's coefficients it is of.
-    """
-    rng = np.random.default_rng(0)
-    unit = np.sqrt(np.maximum(np.diag(true.covariance), 1e-300))
-    values, vectors = np.linalg.eigh(true.covariance / np.outer(unit, unit))
-    draws = (rng.standard_normal((DRAWS, len(unit))) * np.sqrt(np.maximum(values, 0))) @ vectors.T * unit + true.beta
-    squares = [np.einsum("dk,kl,dl->d", draws[:, at], left, draws[:, at]) for left, at in forms]
-    size = np.sqrt(np.maximum(np.min(squares, axis=0), 0.0))
-    low, high = np.quantile(np.maximum(size + rng.standard_normal(DRAWS), 0.0), [0.025, 0.975])
-    return float(np.median(size)), (float(low), float(high))
-
-
-def left_overs(known: Known, question: Question, information: Information) -> list[float]:
-    """√λ of every model of a question against every rival."""
-    found = [
-        against(known, question, true, rival, information)
-        for true in question.hypotheses
-        for rival in question.ids
-        if true.keys and rival != true.id
-    ]
-    return [float(np.sqrt(best[0])) for best in found if best is not None]
 
 
 def chain_separations(known: Known, information: Information) -> list[tuple[tuple[str, ...], tuple[Separation, ...]]]:
@@ -293,10 +346,14 @@ def chain_separations(known: Known, information: Information) -> list[tuple[tupl
     for question in known.chains:
         found: dict[str, Separation] = {}
         for true, rival in question.pairs:
-            sigma = 0.0 if information.squares is None else float(np.sqrt(information.squares[at]))
+            every = np.zeros(1) if information.squares is None else np.sqrt(information.squares[..., at].ravel())
             at += 1
+            sigma, most = float(every.min()), float(every.max())
             if true.id not in found or sigma < found[true.id].sigma:
-                found[true.id] = Separation(true.id, rival.id, sigma, chain_interval(sigma, true.doubt), 0.0)
+                ends = (chain_interval(sigma, true.doubt)[0], chain_interval(most, true.doubt)[1])
+                found[true.id] = Separation(
+                    true.id, rival.id, sigma, ends, 0.0, log_odds(np.array([sigma]), information.seconds)
+                )
         out.append((question.ids, tuple(found.values())))
     return out
 

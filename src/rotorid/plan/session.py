@@ -277,7 +277,7 @@ def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Inform
     every = known.regression.columns([t.key for t in terms])
     gram = np.zeros_like(known.regression.gram[0])
     gram[np.ix_(every, every)] = added.gram.sum(axis=0)
-    return Information(gram)
+    return Information(gram, None, step.duration_s)
 
 
 def plan_session(

@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
-from scipy.signal import bilinear_zpk, sosfilt, zpk2sos
+from scipy.signal import bilinear_zpk, butter, sosfilt, sosfiltfilt, zpk2sos
 from scipy.spatial.transform import Rotation
 
 from rotorid.effects.contract import Form, Motion, SpeedPath
@@ -181,6 +181,9 @@ def fly(
         )
         motion = replace(motion, accelerometer=motion.specific_force, gyroscope=rates)
         force, moment = _wrench(world, motion)
+        # The tilt answers a force, and turning into it asks for moments that grow with the square of the frequency:
+        # beyond what the rotors follow the rounds would not converge.
+        force = sosfiltfilt(butter(2, FASTER * bandwidth_rad_s * step / np.pi, output="sos"), force, axis=0)
     cut = {f.name: getattr(motion, f.name) for f in fields(motion)}
     cut = {name: v[inner] for name, v in cut.items() if isinstance(v, np.ndarray) and len(v) == len(t)}
     motion = replace(motion, **cut)

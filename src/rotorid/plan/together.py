@@ -1,8 +1,9 @@
-"""A second set judged together with the first, and what of the first's open questions it settled.
+"""Sets of one vehicle judged together, and what of the first's open questions the later ones settled.
 
-Values of the vehicle and effects are held equal in both sets; each run keeps what belongs to a run (a scale of its
+Values of the vehicle and effects are held equal in all sets; each run keeps what belongs to a run (a scale of its
 thrust where runs differ beyond doubt, gusts, offsets in time). Runs are named by their set, so that `2-hover` is of the
-second. What the first holds out stays held out; of the second a third is held out where it has three runs or more.
+second. What the first holds out stays held out; of each other a third is held out. One of fewer than three runs is cut
+for that: runs held out of calm flights say nothing of what a planned flight excites.
 """
 
 from __future__ import annotations
@@ -10,7 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rotorid.errors import InputError
+from rotorid.mismatch.comparison import ENVIRONMENT_S
 from rotorid.mismatch.findings import CLAIMED, Analysis, Finding
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run
@@ -19,37 +23,54 @@ MAY_DIFFER = ("name", "noise", "effects", "ground_z_m")
 """Keys of vehicle.yaml that say nothing of the vehicle itself."""
 
 
-def joined_sets(first: RecordingSet, second: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:
-    """Both sets as one, and what a reader must know about it.
+def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:
+    """All sets as one, and what a reader must know about it.
 
     Raises
     ------
     InputError
         The sets are not of one vehicle as believed, or share no columns beside the time.
     """
-    beliefs = [s.vehicle.model_dump(exclude=set(MAY_DIFFER)) for s in (first, second)]
-    for key, value in beliefs[0].items():
-        if value != beliefs[1][key]:
-            raise InputError(
-                f"sets {first.name} and {second.name} differ in {key} of vehicle.yaml ({brief(value)} and "
-                f"{brief(beliefs[1][key])}); judged together they must be of one vehicle as believed"
-            )
+    others = tuple(in_thirds(s) for s in others)
+    sets = (first, *others)
+    beliefs = [s.vehicle.model_dump(exclude=set(MAY_DIFFER)) for s in sets]
+    for other, belief in zip(others, beliefs[1:], strict=True):
+        for key, value in beliefs[0].items():
+            if value != belief[key]:
+                raise InputError(
+                    f"sets {first.name} and {other.name} differ in {key} of vehicle.yaml ({brief(value)} and "
+                    f"{brief(belief[key])}); judged together they must be of one vehicle as believed"
+                )
     split = split_runs(first)
     held = [] if split.held_out == split.training else [f"1-{n}" for n in split.held_out]
-    if len(second.runs) >= 3:
-        held += [f"2-{n}" for n in split_runs(replace(second, held_out=second.held_out)).held_out]
-    runs = [*(renamed(r, "1") for r in first.runs), *(renamed(r, "2") for r in second.runs)]
-    columns = [set.intersection(*(present(r) for r in s.runs)) for s in (first, second)]
-    shared = columns[0] & columns[1]
+    notes = ["Values and effects are held equal in all sets; thrust may differ from run to run."]
+    for number, other in enumerate(others, 2):
+        if len(other.runs) >= 3:
+            held += [f"{number}-{n}" for n in split_runs(other).held_out]
+    columns = [set.intersection(*(present(r) for r in s.runs)) for s in sets]
+    shared = set.intersection(*columns)
+    name = "+".join(s.name for s in sets)
     if shared <= {"time_s"}:
-        raise InputError(f"sets {first.name} and {second.name} have no column in common but the time")
-    notes = ["Values and effects are held equal in both sets; thrust may differ from run to run."]
-    for number, (own, other) in enumerate((columns, columns[::-1]), 1):
-        if extra := sorted(own - other):
-            notes.append(f"Only set {number} has {', '.join(extra[:4])}{' …' if len(extra) > 4 else ''}.")
+        raise InputError(f"sets {' and '.join(s.name for s in sets)} have no column in common but the time")
+    for number, own in enumerate(columns, 1):
+        if extra := sorted(own - shared):
+            notes.append(f"Not all sets have {', '.join(extra[:4])}{' …' if len(extra) > 4 else ''} of set {number}.")
+    runs = [renamed(r, str(number)) for number, s in enumerate(sets, 1) for r in s.runs]
     runs = [replace(r, table=r.table[[n for n in r.table.columns if n in shared]]) for r in runs]
-    whole = RecordingSet(f"{first.name}+{second.name}", first.vehicle, tuple(runs), tuple(held) or None)
-    return whole, tuple(notes)
+    return RecordingSet(name, first.vehicle, tuple(runs), tuple(held) or None), tuple(notes)
+
+
+def in_thirds(recordings: RecordingSet) -> RecordingSet:
+    """A set of one or two runs with each in three parts, as far as these are as long as an environment."""
+    if len(recordings.runs) >= 3 or recordings.held_out is not None:
+        return recordings
+    runs = []
+    for run in recordings.runs:
+        edges = np.linspace(0, len(run.table), 4).astype(int)
+        parts = [run.table.iloc[a:b].reset_index(drop=True) for a, b in zip(edges, edges[1:], strict=False)]
+        long = run.time_s[-1] - run.time_s[0] >= 3 * ENVIRONMENT_S
+        runs += [replace(run, name=f"{run.name}-{i}", table=t) for i, t in enumerate(parts, 1)] if long else [run]
+    return replace(recordings, runs=tuple(runs))
 
 
 def brief(value) -> str:
@@ -79,7 +100,7 @@ class Answer:
 
 
 def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[Answer]:
-    """What the findings of both sets together say of each class that was left open."""
+    """What the findings of all sets together say of each class that was left open."""
     out = []
     for ids in open_before:
         named = " or ".join(ids)
@@ -87,7 +108,7 @@ def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding])
         still = [f for f in findings if f.status == "ambiguous" and set(f.alternatives) & set(ids)]
         if sure and not still:
             what = " and ".join(sure)
-            out.append(Answer(ids, sure[0], f"{named}: both sets together say {what}"))
+            out.append(Answer(ids, sure[0], f"{named}: all sets together say {what}"))
         elif still:
             left = still[0].alternatives
             fewer = set(left) < set(ids)

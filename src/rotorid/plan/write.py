@@ -18,7 +18,8 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.plan import mission
 from rotorid.plan.by_hand import by_hand
-from rotorid.plan.plan import Plan
+from rotorid.plan.intervals import SHARE
+from rotorid.plan.plan import Forecast, Plan
 from rotorid.plan.separation import Questions, Separation
 
 FILE_HZ = 100.0
@@ -136,6 +137,7 @@ def questions_as_data(questions: Questions, target: float) -> list[dict]:
                     "rival": s.rival,
                     "sigma": s.sigma,
                     "interval_95": list(s.interval_95),
+                    "log_odds_nats": s.log_odds,
                     "so_far_sigma": s.so_far,
                     "meaning": outcome(s, target),
                 }
@@ -146,21 +148,32 @@ def questions_as_data(questions: Questions, target: float) -> list[dict]:
     ]
 
 
+def forecast_as_data(flight: Forecast, target: float) -> dict:
+    """A flight and what is expected of it, for JSON."""
+    known = {w.name: [s if np.isfinite(s) else None for s in (w.before, w.after)] for w in flight.widths}
+    return {
+        "flight": flight.name,
+        "duration_s": flight.duration_s,
+        "predicted_separation_sigma": flight.sigma,
+        "manoeuvres": [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in flight.pieces],
+        "questions": questions_as_data(flight.questions, target),
+        "intervals": [
+            {"name": w.name, "unit": w.unit}
+            | dict(zip(("half_width_before", "half_width_after"), known[w.name], strict=True))
+            | ({"wished": w.wished} if w.wished else {})
+            for w in flight.widths
+        ],
+    }
+
+
 def summary(plan: Plan) -> dict:
     """The plan as data, for `plan.json` and for pages."""
     return rounded(
         {
             "set": plan.set,
             "settles": plan.settles,
-            "duration_s": plan.duration_s,
-            "predicted_separation_sigma": plan.sigma,
-            "manoeuvres": [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in plan.pieces],
-            "questions": questions_as_data(plan.questions, plan.limits.target_sigma),
-            "intervals": [
-                {"name": w.name, "unit": w.unit, "half_width_before": w.before, "half_width_after": w.after}
-                | ({"wished": w.wished} if w.wished else {})
-                for w in plan.widths
-            ],
+            **forecast_as_data(plan, plan.limits.target_sigma),
+            "others": [forecast_as_data(f, plan.limits.target_sigma) for f in plan.others],
             "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
             "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
@@ -177,7 +190,7 @@ def text(plan: Plan) -> list[str]:
         out.append(f"Fly for {plan.duration_s:.0f} s (without take-off and landing):")
         out += [f"  {line}" for line in steps(plan)]
     elif plan.questions:
-        out.append("No manoeuvre within the limits separates what is open any further.")
+        out.append(f"No manoeuvre within the limits separates what is open any further: {why_none(plan)}.")
     for _, found in plan.questions:
         out += [outcome(s, plan.limits.target_sigma) for s in found]
     if plan.sigma is not None and not plan.settles:
@@ -185,16 +198,34 @@ def text(plan: Plan) -> list[str]:
             f"Not all would be settled: the smallest separation is {plan.sigma:.1f} standard errors of "
             f"{plan.limits.target_sigma:g}. More time, speed, tilt or room in the limits may do it."
         )
+    for other in plan.others:
+        if other.sigma is not None:
+            name = "The standard flight" if other.name == "standard" else "The next best flight"
+            words = "" if other.name == "standard" else f" ({', '.join(dict.fromkeys(p.name for p in other.pieces))})"
+            out.append(f"{name}{words}, {other.duration_s:.0f} s: {other.sigma:.1f} standard errors at the least.")
     out += [
-        f"{w.name}: ± {share(w.before, w.unit)} now, ± {share(w.after, w.unit)} with this flight"
+        f"{w.name}: {size(w.before, w.unit)} now, {size(w.after, w.unit)} with this flight"
         + (f" (wished: {share(w.wished, w.unit)})" if w.wished else "")
         for w in plan.widths
+        if plan.pieces or w.wished
     ]
     for ids, what in plan.unanswerable:
         out.append(f"No flight with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append("Nothing is open: no flight is needed to distinguish effects.")
     return out + in_words(plan)
+
+
+def why_none(plan: Plan) -> str:
+    """Why there is nothing to fly: what keeps the manoeuvres out, or that none of those flown helps."""
+    able = [t for t in plan.tried if not t.reason]
+    if not able:
+        return f"none of {len(plan.tried)} keeps them ({plan.tried[0].piece.name}: {plan.tried[0].reason})"
+    best = max(able, key=lambda t: t.progress)
+    return (
+        f"{len(able)} of {len(plan.tried)} keep them, and in each the others can take over what one of them would do "
+        f"with these columns (the best, {best.piece.name}, brings {100 * max(best.progress, 0.0):.1f} % of the way)"
+    )
 
 
 def open_ids(plan: Plan) -> list[tuple[str, ...]]:
@@ -222,9 +253,18 @@ def steps(plan: Plan) -> list[str]:
     return out
 
 
+def size(value: float, unit: str) -> str:
+    """A half width, or an upper limit, in words."""
+    if not np.isfinite(value):
+        return "unknown"
+    return f"{'at most' if unit == SHARE else '±'} {share(value, unit)}"
+
+
 def share(value: float, unit: str) -> str:
-    """A half width with its unit; relative ones in percent."""
-    return f"{100 * value:.2g} %" if unit == "relative" else f"{value:.2g} {unit if unit != '1' else ''}".rstrip()
+    """A half width with its unit; relative ones and shares in percent."""
+    if unit in ("relative", SHARE):
+        return f"{100 * value:.2g} % {unit if unit == SHARE else ''}".rstrip()
+    return f"{value:.2g} {unit if unit != '1' else ''}".rstrip()
 
 
 def write(plan: Plan, folder: Path) -> list[Path]:

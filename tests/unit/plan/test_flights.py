@@ -1,5 +1,7 @@
 """Candidates, and a candidate flown: at rest where it joins the next, consistent in its forces, as files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,9 +10,9 @@ from rotorid.errors import InputError
 from rotorid.mismatch.motion import build_segments
 from rotorid.mismatch.rows import residual
 from rotorid.plan import mission, page, write
-from rotorid.plan.candidates import Reference, candidates, joined, smaller
+from rotorid.plan.candidates import Reference, candidates, joined, smaller, standard
 from rotorid.plan.limits import Limits
-from rotorid.plan.plan import SIZES, Plan, broken, yaw_acceleration
+from rotorid.plan.plan import NOTHING, SIZES, Plan, Tried, broken, yaw_acceleration
 from rotorid.plan.simulate import World, commands, fly, followed, low_pass, recorded
 from rotorid.recordings import templates
 
@@ -60,6 +62,27 @@ def test_every_manoeuvre_can_be_flown_in_some_size() -> None:
                 continue
             kept |= set() if broken(flight, LIMITS, VEHICLE) else {piece.name}
     assert kept == {p.name for p in PIECES}
+
+
+@pytest.mark.parametrize("seconds", [10.0, 30.0, 75.0])
+def test_the_standard_flight_is_as_long_as_asked_and_ends_where_it_starts(seconds: float) -> None:
+    parts = {p.name: p for p in candidates(smaller(LIMITS, 0.5), 0.5 * yaw_acceleration(VEHICLE))}
+    made = standard(parts, seconds)
+    reference = made.reference(0.01)
+    assert reference.duration_s == seconds
+    velocity = np.gradient(reference.position_m, reference.time_s, axis=0)
+    assert np.abs(reference.position_m[[0, -1]]).max() < 1e-9 and np.abs(velocity[[0, -1]]).max() < 0.02
+    assert reference.yaw_rad[-1] == pytest.approx(0.0, abs=1e-9)
+    flight = fly(World(VEHICLE), joined([made], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
+    assert broken(flight, LIMITS, VEHICLE) == ""
+
+
+def test_without_a_manoeuvre_that_helps_the_plan_says_why() -> None:
+    hover = Tried(piece("hover"), None, 11.0, "", 0.002)
+    out = Tried(piece("eight"), None, 16.0, "tilt_deg would be 50")
+    nothing = Plan("chosen", (), NOTHING, None, (), (), "set", LIMITS, tried=(hover, out))
+    assert "1 of 2 keep them" in write.why_none(nothing) and "hover, brings 0.2 %" in write.why_none(nothing)
+    assert "tilt_deg would be 50" in write.why_none(replace(nothing, tried=(out,)))
 
 
 def test_smaller_limits_lie_within_the_others() -> None:
@@ -151,7 +174,7 @@ def a_plan() -> Plan:
     pieces = (piece("drift"), piece("pass 45 at 1"))
     reference = joined(pieces, 0.004)
     flight = fly(World(VEHICLE), reference, 9.0, LIMITS.middle_m)
-    return Plan("set", LIMITS, pieces, reference, flight, (), (), ())
+    return Plan("chosen", pieces, reference, flight, (), (), "set", LIMITS)
 
 
 def test_a_crazyflie_polynomial_goes_where_the_reference_goes_in_its_own_axes(a_plan: Plan) -> None:
@@ -197,7 +220,7 @@ def test_the_page_shows_the_last_plan_once(a_plan: Plan) -> None:
 def mission_of(names: tuple[str, ...], **limits) -> Plan:
     allowed = LIMITS.model_copy(update=limits)
     pieces = tuple(piece(n) for n in names)
-    return Plan("set", allowed, pieces, joined(pieces, 0.01), None, (), (), ())
+    return Plan("chosen", pieces, joined(pieces, 0.01), None, (), (), "set", allowed)
 
 
 def test_a_mission_goes_to_where_the_reference_turns_round() -> None:

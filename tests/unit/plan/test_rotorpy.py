@@ -67,7 +67,7 @@ def test_rotorpy_flies_a_plan_within_the_limits(names: tuple[str, ...]) -> None:
     pieces = tuple(options[n] for n in names)
     reference = joined(pieces, 0.004)
     expected = fly(World(vehicle), reference, bandwidth, LIMITS.middle_m, position)
-    table, _ = write.crazyflie(Plan("set", LIMITS, pieces, reference, expected, (), (), ()))
+    table, _ = write.crazyflie(Plan("chosen", pieces, reference, expected, (), (), "set", LIMITS))
 
     first = flat(table, 0.0)
     hover = np.sqrt(quad_params["mass"] * 9.81 / 4 / quad_params["k_eta"])

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
+from rotorid.cli.planning import sets_of
 from rotorid.errors import InputError
 from rotorid.mismatch.findings import Finding
 from rotorid.plan.together import answers, joined_sets
@@ -32,11 +33,39 @@ def test_runs_carry_their_set_and_the_first_keeps_what_it_holds_out() -> None:
     assert len(notes) == 1
 
 
+def test_a_later_flight_in_one_run_is_cut_so_that_a_third_is_held_out() -> None:
+    t = np.arange(0, 30, 0.01)
+    table = pd.DataFrame({"time_s": t, "angular_velocity_x_rad_s": np.sin(t)})
+    whole, _ = joined_sets(a_set("first", 2), RecordingSet("second", VEHICLE, (Run("planned", table),), None))
+    assert [r.name for r in whole.runs[2:]] == ["2-planned-1", "2-planned-2", "2-planned-3"]
+    assert [n for n in whole.held_out if n.startswith("2-")] == ["2-planned-2"]
+    assert np.concatenate([r.table["time_s"] for r in whole.runs[2:]]) == pytest.approx(t)
+
+
 def test_columns_that_one_set_lacks_are_named_and_left_out() -> None:
     rates = ("angular_velocity_x_rad_s",)
     whole, notes = joined_sets(a_set("first", 2, rates), a_set("second", 1, (*rates, "height_m")))
     assert all("height_m" not in r.table.columns for r in whole.runs)
-    assert any("Only set 2 has height_m" in n for n in notes)
+    assert any("Not all sets have height_m of set 2" in n for n in notes)
+
+
+def test_a_third_set_is_judged_with_the_others() -> None:
+    whole, _ = joined_sets(a_set("first", 1), a_set("second", 1), a_set("third", 1))
+    assert whole.name == "first+second+third"
+    assert [r.name for r in whole.runs] == ["1-run0", "2-run0", "3-run0"]
+    with pytest.raises(InputError, match="first and third differ in mass_kg"):
+        joined_sets(a_set("first", 1), a_set("second", 1), a_set("third", 1, mass_kg=9.0))
+
+
+def test_a_verdict_of_several_sets_finds_each_of_them(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "vehicle.yaml").write_text("", encoding="utf-8")
+    folder = tmp_path / "answer"
+    folder.mkdir()
+    assert [p.name for p in sets_of(folder, {"set": "first+second"})] == ["first", "second"]
+    with pytest.raises(InputError, match="the recording set third of this verdict"):
+        sets_of(folder, {"set": "first+third"})
 
 
 def test_another_vehicle_is_refused_by_the_key_that_differs() -> None:
@@ -64,7 +93,7 @@ def test_answers_say_what_was_settled_narrowed_or_left() -> None:
     ("words", "said"),
     [
         (("plan", "nowhere"), "no such file"),
-        (("plan", "nowhere", "--want", "mass_kg"), "expected a value of vehicle.yaml and a share"),
+        (("plan", "nowhere", "--want", "mass_kg"), "expected a value of vehicle.yaml, or an effect, and a share"),
         (("plan", "nowhere", "--limits", "room.yaml"), "no such file"),
         (("together", "nowhere", "elsewhere"), "nowhere"),
     ],

@@ -8,24 +8,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.changes.joint import Reference, joint_of, reference_of
+from rotorid.mismatch.changes.chain import (
+    ChainTerms,
+    Option,
+    options_of,
+    others_in_place,
+    speed_evidence,
+    speed_filters,
+    speed_rows,
+    squares_of_speeds,
+)
+from rotorid.mismatch.changes.joint import Joint, Reference, joined_at, joints_of, reference_of
 from rotorid.mismatch.changes.notes import notes_of
-from rotorid.mismatch.changes.problem import decide_changes
+from rotorid.mismatch.changes.of_instruments import (
+    InstrumentReference,
+    instrument_reference_of,
+    joint_of_instruments,
+)
+from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.findings import Estimate, Finding, Status
+from rotorid.mismatch.fitted import Fitted
+from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import parameters, statements_of
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, Rows
+from rotorid.mismatch.posterior.statements import Statement, parameters, statements_of
+from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 
-KEYS = {name: key for key, name in PARAMETER_NAMES.items()}
+KEYS = {name: key for key, name in NAMES.items()}
 
 
 @dataclass(frozen=True)
@@ -69,26 +86,41 @@ class Changes:
     """Of the longest stretch of each set, by channel."""
     notes: tuple[str, ...] = ()
     """What keeps the two sets from being compared fully, in sentences."""
+    kind: str = "flight"
+    """Of both sets: `flight`, `stand` or `bench`."""
 
 
 def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the first set of flights to the second."""
-    return changes_from(reference_of(base), new, prior)
+    if base.vehicle.kind == "flight":
+        return changes_from(reference_of(base), new, prior)
+    return changes_from(instrument_reference_of(base), new, prior)
 
 
-def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
+def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
     """What changed from the flights of a reference to another set of flights."""
-    joint, base = joint_of(reference, new), reference.recordings
-    usual = usual_spread(joint.base, joint.new, reference.known, joint.inertia)
-
-    def decide(flights: Evidence, other: Evidence, more: np.ndarray | float = 0.0) -> Found:
-        return decide_changes(flights, other, np.hypot(usual, more), prior)
-
-    found = decide(joint.base, joint.new, spread_of_flights(reference.runs, decide))
+    base = reference.recordings
+    if new.vehicle.kind != base.vehicle.kind:
+        raise InputError(
+            f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
+        )
+    if isinstance(reference, Reference):
+        joint, options = most_alike(reference, new, prior)
+        stretches = reference.recorded, joint.recorded
+        found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
+        stated = changes_in(options, prior)
+    else:
+        joint, of_speeds = joint_of_instruments(reference, new), None
+        found = joint.decide(joint.base, joint.new, yardstick(joint, reference.runs, prior), prior)
+        stated = statements_of(found)
+    limits = limits_of(found, joint.squares)
+    if of_speeds:
+        stated = (*stated, *changes_in(of_speeds[0], prior))
+        limits = (*limits, *limits_of(of_speeds[0][0].found, of_speeds[1]))
     vehicles = base.vehicle, new.vehicle
     changes = [
         Change(s.id, s.status, s.alternatives, s.probability, in_percent(s.id, s.parameters, *vehicles))
-        for s in statements_of(found)
+        for s in stated
         if s.status != "not_established"
     ]
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
@@ -96,11 +128,80 @@ def changes_from(reference: Reference, new: RecordingSet, prior: Prior = Prior()
         base=base.name,
         new=new.name,
         changes=(*mistakes_that_differ(reference.mistakes, joint.mistakes_of_new), *changes),
-        limits=tuple(limit for limit in limits_of(found, joint.squares) if limit.id not in changed),
+        limits=tuple(sorted((x for x in limits if x.id not in changed), key=lambda x: -x.share)),
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
         notes=notes_of(joint, base.name, new.name),
+        kind=new.vehicle.kind,
     )
+
+
+def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[Option]]:
+    """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
+
+    A mistake is one change more: corrected for it the two sets must be alike by more than it costs.
+    """
+    both = [(joint, flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
+    return max(both, key=lambda b: b[1][0].log_posterior - prior.effect_nats * len(b[0].mistakes_of_new))
+
+
+def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:
+    """The most probable changes of force, moment and sensors, and where the chain changed those without; best first."""
+    first = reference.chain if reference.found.commanded else None
+
+    def products_at(chain: ChainTerms | None) -> tuple[Evidence, Evidence]:
+        if chain is first:
+            return joint.base, joint.new
+        at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new)
+        return at.base, at.new
+
+    return options_of(first, products_at, yardstick(joint, reference.runs, prior), prior)
+
+
+def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarray:
+    """One-sigma (K,) by which each coefficient differs where nothing changed; `runs` are those of the first set."""
+    usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia, joint.form_sd)
+    usual = np.hypot(usual, joint.more_usual)
+
+    def decide(flights: Evidence, other: Evidence) -> Found:
+        return joint.decide(flights, other, usual, prior)
+
+    return np.hypot(usual, spread_of_flights(runs, decide))
+
+
+def decided_of_speeds(
+    found: Fitted, first: ChainTerms | None, both: tuple[Sequence[Segment], Sequence[Segment]], prior: Prior
+) -> tuple[list[Option], Mapping[str, np.ndarray]] | None:
+    """The changes between command and measured rotor speed, and what the columns amount to; None without both.
+
+    `first` is the chain of the first set's model, `both` the stretches of each set as recorded.
+    """
+    if first is None or found.commanded or any(s.command is None for own in both for s in own):
+        return None
+    base, now = speed_rows(both[0], found, first, first), first
+    for _ in range(2):
+        # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second.
+        filters = speed_filters([*base, *speed_rows(both[1], found, now, now)])
+        own = speed_evidence(base, filters, first, first)
+
+        def products_at(chain: ChainTerms, filters=filters, own=own) -> tuple[Evidence, Evidence]:
+            return own, speed_evidence(speed_rows(both[1], found, chain, first), filters, chain, first)
+
+        options = options_of(first, products_at, first.spread, prior)
+        now = options[0].chain
+    return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
+
+
+def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]:
+    """What is stated of the best option; a part of the chain in whose place another would do is one of a class."""
+    out = []
+    for stated in statements_of(options[0].found):
+        others = others_in_place(options, stated.id, prior)
+        if others and stated.status != "not_established":
+            members = tuple(sorted({stated.id, *stated.alternatives, *others}))
+            stated = replace(stated, status="ambiguous", alternatives=members)
+        out.append(stated)
+    return tuple(out)
 
 
 def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:
@@ -147,27 +248,63 @@ def in_percent(name: str, changes: tuple[Estimate, ...], base: Vehicle, new: Veh
     key = KEYS.get(name)
     if key is None:
         return changes
-    scale = believed_over(key, base, new)
+    scale, flown = believed_over(key, base, new), new.kind == "flight"
+
+    def relative(coefficient: float) -> float:
+        # Nothing accelerates on a stand: there a coefficient is the change itself.
+        return scale * (relative_change(key, coefficient, 0.0)[0] if flown else coefficient)
+
     ends = ("value", "low", "high")
-    return tuple(
-        replace(p, **{end: scale * relative_change(key, getattr(p, end), 0.0)[0] for end in ends}) for p in changes
-    )
+    return tuple(replace(p, **{end: relative(getattr(p, end)) for end in ends}) for p in changes)
 
 
 def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
     """The first vehicle's number over the second's, of a value whose column is in units of the first.
 
-    The column of a mass or an inertia is the force or moment itself, whatever was believed.
+    The column of a mass or an inertia is in flight the force or moment itself, whatever was believed.
     """
     if key == "arm":
         size = [float(np.linalg.norm(v.rotor_positions_m()[:, :2])) for v in (base, new)]
         return size[0] / size[1] if size[1] > 0 else 1.0
-    if key in ("thrust", "torque"):
+    if key in ("thrust", "torque") or (key == "mass" and new.kind != "flight"):
         return believed_value(base, key) / believed_value(new, key)
     return 1.0
 
 
 def mistakes_that_differ(base: tuple[Finding, ...], new: tuple[Finding, ...]) -> tuple[Change, ...]:
-    """Mistakes in the recordings of the second set that the first has not."""
-    known = {f.id for f in base}
-    return tuple(Change(f.id, f.status, f.alternatives, None, f.parameters) for f in new if f.id not in known)
+    """Mistakes in the recordings of the second set that the first has not, or has by another amount.
+
+    Where both have one in the same columns the difference is stated, if their 95 % intervals exclude zero.
+    """
+    known, out = {(f.id, f.channels): f for f in base}, []
+    for found in new:
+        first = known.get((found.id, found.channels))
+        if first is None:
+            out.append(Change(found.id, found.status, found.alternatives, None, found.parameters))
+        elif differs := differences_of(first, found):
+            out.append(Change(found.id, found.status, found.alternatives, None, differs))
+    return tuple(out)
+
+
+def differences_of(first: Finding, second: Finding) -> tuple[Estimate, ...]:
+    """By how much the parameters of a mistake differ in two sets; none where the intervals allow that they do not."""
+    before, out = {p.symbol: p for p in with_sign(first)}, []
+    for p in with_sign(second):
+        old = before.get(p.symbol)
+        if old is None:
+            continue
+        away, reach = p.value - old.value, float(np.hypot(p.high - p.low, old.high - old.low)) / 2.0
+        if abs(away) > reach:
+            out.append(replace(p, value=away, low=away - reach, high=away + reach))
+    return tuple(out)
+
+
+def with_sign(finding: Finding) -> tuple[Estimate, ...]:
+    """Parameters of a mistake, those of which a length alone is stated (late or early) with their sign."""
+    if finding.late_s is None:
+        return finding.parameters
+    away = [finding.late_s - p.value for p in finding.parameters]
+    return tuple(
+        replace(p, value=p.value + a, low=p.low + a, high=p.high + a)
+        for p, a in zip(finding.parameters, away, strict=True)
+    )

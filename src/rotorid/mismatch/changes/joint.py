@@ -1,24 +1,33 @@
 """Two sets of flights on the same columns: the sums of products of each, ready to be weighed against each other.
 
-Model, sensors' noise, whitening and the chain from command to rotor speed are the first set's. What they are wrong by
-is the same in both sets, and cancels between them.
+Model, sensors' noise and whitening are the first set's. What they are wrong by is the same in both sets, and cancels
+between them. The chain from command to rotor speed is the first set's, too, with a column for each of its parameters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.mismatch.absent import squares_of
-from rotorid.mismatch.changes.usual import of_environments
+from rotorid.mismatch.changes.chain import (
+    ChainTerms,
+    chain_columns,
+    chain_terms,
+    turning,
+)
+from rotorid.mismatch.changes.problem import decide_changes
+from rotorid.mismatch.changes.usual import FORM_SD, of_environments
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.prepare import Prepared, assemble_rows, prepare, prepare_like
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.regression import Regression, build
@@ -41,17 +50,29 @@ class Joint:
 
     base: Evidence
     new: Evidence
+    known: np.ndarray
+    """(K,) coefficients of the effects that the first set's model holds, 0 of all others."""
     inertia: np.ndarray
     """(C,) mass, or inertia, of the second vehicle.yaml over that of the first, in each channel."""
     flown_by_base: Mapping[str, float]
     flown_by_new: Mapping[str, float]
     """How far each set goes: 95th percentile of the magnitude of some regime variables."""
+    recordings: RecordingSet
+    """The second set, corrected for its mistakes."""
+    recorded: tuple[Segment, ...]
+    """Its stretches of flight as recorded."""
     rows_of_new: tuple[Rows, ...]
     mistakes_of_new: tuple[Finding, ...]
     """Mistakes in the recordings of the second set, corrected."""
     squares: dict[str, np.ndarray]
     """To the key of each effect and believed value what its columns amount to in the second set
     (`absent.squares_of`)."""
+    more_usual: np.ndarray | float = 0.0
+    """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual.usual_spread`."""
+    form_sd: float = FORM_SD
+    """Share of what effects contribute that their forms are wrong by."""
+    decide: Callable[[Evidence, Evidence, np.ndarray, Prior], Found] = decide_changes
+    """The most probable changes from one set's evidence to another's, given the usual spread (K,)."""
 
 
 @dataclass(frozen=True)
@@ -60,23 +81,25 @@ class Reference:
 
     recordings: RecordingSet
     found: Fitted
+    chain: ChainTerms | None
+    """From command to rotor speed; None where no commands are recorded."""
     terms: tuple[Term, ...]
+    """Of force, moment and sensors, and where rotor speeds are known from commands alone of the chain."""
     segments: tuple[Segment, ...]
     rows: tuple[Rows, ...]
     block_s: float
     """Length of a block of rows in both sets."""
     known: np.ndarray
     """(K,) coefficients of the effects that its model holds, 0 of all others."""
+    usual_of_chain: np.ndarray
+    """(K,) one-sigma of the chain's parameters between flights in which nothing changed, 0 of all others."""
     evidence: Evidence
     runs: tuple[Evidence, ...]
     """The same run by run."""
+    recorded: tuple[Segment, ...]
+    """Its stretches as recorded."""
     mistakes: tuple[Finding, ...]
     """Mistakes in its recordings, corrected."""
-
-    @property
-    def keys(self) -> list[str]:
-        """Keys of the terms."""
-        return [t.key for t in self.terms]
 
 
 def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
@@ -85,57 +108,138 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     found = fitted(prepare(base, cutoff_hz))
     model = found.model
     terms = [t for t in model.terms if not t.run]
-    keys = [t.key for t in terms]
     # As another set's stretches are made: what making them leaves out is left out of both.
-    segments = stretches_of(found, base)
-    rows = as_seen(assemble_rows(model.prepared, terms, segments, model.effects), model, keys)
-    block_s, known = block_seconds(rows, model.prepared.thinner.rate_hz), known_effects(model, keys)
-    regression = regression_of(rows, terms, model, block_s)
+    recorded = recorded_stretches(found, base)
+    chain = chain_terms(found, recorded)
+    segments, rows = rows_of(found, terms, chain, recorded)
+    of_chain = chain.terms if found.commanded else []
+    known = np.append(known_effects(model, [t.key for t in terms]), np.zeros(sum(t.size for t in of_chain)))
+    block_s = block_seconds(rows, model.prepared.thinner.rate_hz)
+    regression = regression_of(rows, [*terms, *of_chain], model, block_s)
     evidence = with_known_effects(evidence_from(regression), known)
+    usual = np.zeros(len(known))
+    if of_chain:
+        evidence = chain.named(evidence, chain)
+        usual[-len(chain.values) :] = chain.spread
     return Reference(
         recordings=base,
         found=found,
+        chain=chain,
         terms=tuple(terms),
         segments=tuple(segments),
         rows=tuple(rows),
         block_s=block_s,
         known=known,
+        usual_of_chain=usual,
         evidence=evidence,
         runs=by_run(evidence, regression),
+        recorded=tuple(recorded),
         mistakes=mistakes,
     )
 
 
-def joint_of(reference: Reference, new: RecordingSet) -> Joint:
-    """Two sets of flights on the same columns.
+def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
+    """Two sets of flights on the same columns: corrected for the second set's mistakes, and as recorded.
 
-    Each is compared with its own vehicle.yaml: what was changed on purpose and is written there is no change.
+    Each is compared with its own vehicle.yaml: what was changed on purpose and is written there is no change. Mistakes
+    that the first set has as well are corrected in both.
+
+    Raises
+    ------
+    InputError
+        No stretch of the second set has all that the first was fitted by.
     """
-    new, mistakes, _ = find_mistakes(replace(new, held_out=()))
-    found, terms, model = reference.found, list(reference.terms), reference.found.model
-    segments = stretches_of(found, new)
-    if not segments:
+    new = replace(new, held_out=())
+    corrected, mistakes, _ = find_mistakes(new)
+    known = {(m.id, m.channels) for m in reference.mistakes}
+    variants = (
+        [(corrected, mistakes)]
+        if all((m.id, m.channels) in known for m in mistakes)
+        else [(corrected, mistakes), (new, ())]
+    )
+    stretches = [(own, recorded_stretches(reference.found, own), found) for own, found in variants]
+    joints = [
+        joined_at(reference, own, recorded, reference.chain, found) for own, recorded, found in stretches if recorded
+    ]
+    if not joints:
         raise InputError(
             f"set {new.name}: no stretch has all that {reference.recordings.name} was fitted by; "
             "expected the same columns in both"
         )
-    rows = against_own(assemble_rows(model.prepared, terms, segments, model.effects), model, segments, new)
-    rows = as_seen(rows, model, reference.keys)
+    return joints
+
+
+def joined_at(
+    reference: Reference,
+    new: RecordingSet,
+    recorded: Sequence[Segment],
+    chain: ChainTerms | None,
+    mistakes: tuple[Finding, ...],
+) -> Joint:
+    """Two sets on the same columns, those of the second taken at a chain of its own."""
+    found, model = reference.found, reference.found.model
+    segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle)
+    terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     of_new = regression_of(rows, terms, model, reference.block_s)
-    held = replace(model, rows=rows, regression=of_new)
+    evidence = with_known_effects(evidence_from(of_new), reference.known)
     inertia, inertia_of_base = (
         inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
     )
     return Joint(
         base=reference.evidence,
-        new=with_known_effects(evidence_from(of_new), reference.known),
+        new=chain.named(evidence, reference.chain) if found.commanded else evidence,
+        known=reference.known,
+        more_usual=reference.usual_of_chain,
         inertia=inertia / inertia_of_base,
         flown_by_base=how_far(reference.segments, model.prepared),
         flown_by_new=how_far(segments, model.prepared),
+        recordings=new,
+        recorded=tuple(recorded),
         rows_of_new=tuple(rows),
         mistakes_of_new=mistakes,
-        squares=squares_of(held, [t for t in terms if t.kind in ("effect", "value")]),
+        squares=squares_of(
+            replace(model, rows=rows, regression=of_new), [t for t in terms if t.kind in ("effect", "value")]
+        ),
     )
+
+
+def rows_of(
+    found: Fitted,
+    terms: Sequence[Term],
+    chain: ChainTerms | None,
+    recorded: Sequence[Segment],
+    first: ChainTerms | None = None,
+    vehicle: Vehicle | None = None,
+) -> tuple[list[Segment], list[Rows]]:
+    """Stretches with the rotors turning, and their rows: columns of all terms and, known by commands, of the chain.
+
+    Parameters
+    ----------
+    found, terms
+        The first set's model, and the terms of its force, moment and sensors.
+    chain, first
+        The chain at which columns are taken, and that of the first set (the same where it is left out): what the rows
+        leave is that of the latter.
+    recorded
+        Stretches as recorded.
+    vehicle
+        What the set itself believes, where that is not what the first set believes. The columns stay those of the
+        first set's vehicle: columns that differ between the sets could be combined into differences
+        that no vehicle has.
+    """
+    model = found.model
+    turned = found if chain is None else turning(found, chain)
+    segments = as_flown(list(recorded), turned)
+    rows = assemble_rows(model.prepared, list(terms), segments, model.effects)
+    columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
+    rows = as_seen(against_own(rows, model, segments, vehicle), model, [t.key for t in terms])
+    if columns is not None:
+        away = chain.values - (first or chain).values
+        rows = [
+            replace(r, y=r.y + x @ away, x=np.concatenate([r.x, np.nan_to_num(x)], axis=2))
+            for r, x in zip(rows, columns, strict=True)
+        ]
+    return segments, rows
 
 
 def how_far(segments: Sequence[Segment], prepared: Prepared) -> dict[str, float]:
@@ -185,23 +289,18 @@ def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
     return replace(evidence, gram=gram, cross=cross)
 
 
-def against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], new: RecordingSet) -> list[Rows]:
-    """Rows of the second set with what its own vehicle leaves of every channel.
-
-    The columns stay those of the first set's vehicle: columns that differ between the sets could be combined into
-    differences that no vehicle has.
-    """
-    if new.vehicle == model.prepared.vehicle:
+def against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], vehicle: Vehicle | None) -> list[Rows]:
+    """Rows with what a set's own vehicle leaves of every channel."""
+    if vehicle in (None, model.prepared.vehicle):
         return rows
-    own = assemble_rows(replace(model.prepared, vehicle=new.vehicle), [], segments)
+    own = assemble_rows(replace(model.prepared, vehicle=vehicle), [], segments)
     return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
-def stretches_of(found: Fitted, new: RecordingSet) -> list[Segment]:
-    """Stretches of another set with the rotors turning as the first set's chain makes of their commands."""
-    prepared = replace(found.prepared, vehicle=new.vehicle)
-    own, _ = prepare_like(prepared, new)
-    return as_flown([s for s in own if comparable(s, found.model)], found)
+def recorded_stretches(found: Fitted, recordings: RecordingSet) -> list[Segment]:
+    """Stretches of a set that have all that the first set's model needs, as recorded."""
+    own, _ = prepare_like(replace(found.prepared, vehicle=recordings.vehicle), recordings)
+    return [s for s in own if comparable(s, found.model)]
 
 
 def as_seen(rows: list[Rows], model: WrenchModel, keys: list[str]) -> list[Rows]:

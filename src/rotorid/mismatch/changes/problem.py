@@ -15,10 +15,12 @@ and a controller's answer are wrong by is in b and cancels.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
+from rotorid.mismatch.instrument.columns import VALUE_NAMES
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
@@ -27,8 +29,14 @@ from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found, most_probable
 from rotorid.mismatch.rows import PARAMETER_NAMES
 
+NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
+"""Key of every believed value, of a flight or an instrument, to the contract's name."""
 LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 """Relative change of a value up to which it does not matter, and the largest."""
+LEAST_GAIN = 0.005
+"""The least one of a reading's gain."""
+UNCHANGED = "unchanged"
+"""Kind of a term that is common to both sets and did not change by assumption."""
 RIDGE = 1e-4
 """Ridge of the fit of all columns from which the leftover is learnt, in units of their length."""
 ROUNDS = 4
@@ -49,13 +57,37 @@ def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pri
     return small if gain > prior.leftover_nats else large
 
 
+def held(new: Evidence, keys: Collection[str]) -> Evidence:
+    """Evidence of the second set in which the terms `keys` did not change, by assumption."""
+    terms = (replace(t, kind=UNCHANGED) if t.key in keys else t for t in new.terms)
+    return replace(new, terms=tuple(terms))
+
+
+def evidence_for(base: Evidence, new: Evidence, found: Found, spread: np.ndarray) -> float:
+    """Log posterior of changes that were found between two sets, nats, less a constant of the first set alone.
+
+    By it variants of the second set are compared: as recorded, or corrected for a mistake.
+    """
+    unit = unit_of(base, new)
+    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
+    return joint(spectra, found, spread) - 0.5 * float(new.square.sum())
+
+
 def settled(
-    new: Evidence, spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, prior: Prior
+    new: Evidence,
+    spectra: tuple[Spectrum, Spectrum],
+    variance: np.ndarray,
+    spread: np.ndarray,
+    prior: Prior,
+    sizes: np.ndarray | None = None,
 ) -> Found:
-    """The most probable changes and their leftover, from a `variance` (C,) of the leftover."""
+    """The most probable changes and their leftover, from a `variance` (C,) of the leftover.
+
+    `sizes` (C, K, K) are products that the sizes of contributions are taken from where they are not those of `new`.
+    """
     starts = [()]
     for _ in range(ROUNDS):
-        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior), starts)
+        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior, sizes), starts)
         starts = [(), found.model]
         before, variance = variance, leftover_of(spectra, change_of(found))
         if np.array_equal(before, variance):
@@ -108,7 +140,12 @@ def change_of(found: Found) -> np.ndarray:
 
 
 def problem_of_changes(
-    new: Evidence, spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, prior: Prior
+    new: Evidence,
+    spectra: tuple[Spectrum, Spectrum],
+    variance: np.ndarray,
+    spread: np.ndarray,
+    prior: Prior,
+    sizes: np.ndarray | None = None,
 ) -> Problem:
     """The problem that two sets pose on the same columns, with a leftover of `variance` (C,) in each channel.
 
@@ -123,12 +160,12 @@ def problem_of_changes(
     # What one row says is little next to what flights differ by anyway: a change is wider than that.
     sd = np.hypot(sd, prior.value_reach * in_units(spread, unit))
     for key, effect in effects.items():
-        if effect in PARAMETER_NAMES.values() and (own := unit[columns_of[key]]).all():
+        if effect in NAMES.values() and (own := unit[columns_of[key]]).all():
             sd[columns_of[key]] = prior.freed_sd[0] / own
-    free = [columns_of[key] for key, effect in effects.items() if effect not in PARAMETER_NAMES.values()]
+    free = [columns_of[key] for key, effect in effects.items() if effect not in NAMES.values()]
     free = np.concatenate(free) if free else np.zeros(0, int)
     low[free], high[free] = -np.inf, np.inf
-    always = [columns_of[key] for key, t in terms.items() if t.kind != "effect"]
+    always = [columns_of[key] for key, t in terms.items() if t.kind not in ("effect", UNCHANGED)]
     return Problem(
         terms=terms,
         columns_of=columns_of,
@@ -152,7 +189,7 @@ def problem_of_changes(
         rows=rows,
         variance=variance,
         prior=prior,
-        channel_gram=new.gram.sum(axis=1) * np.outer(unit, unit),
+        channel_gram=(new.gram.sum(axis=1) if sizes is None else sizes) * np.outer(unit, unit),
     )
 
 
@@ -182,6 +219,7 @@ def as_change(term: EvidenceTerm) -> EvidenceTerm:
     """A believed value as something that may have changed, named as the contract names it; another term as it is."""
     if term.kind != "value":
         return term
-    name = PARAMETER_NAMES[term.key]
-    change = LinearParameter(name, "1", -MOST_CHANGE, MOST_CHANGE, LEAST_CHANGE)
+    name = NAMES[term.key]
+    least = LEAST_GAIN if term.key.startswith("gain") else LEAST_CHANGE
+    change = LinearParameter(name, "1", -MOST_CHANGE, MOST_CHANGE, least)
     return replace(term, kind="effect", effect=name, linear=(change,))

@@ -31,18 +31,21 @@ FEWEST_FLIGHTS = 3
 """Two good flights give one difference alone, of which no variance is known."""
 
 
-def usual_spread(base: Evidence, new: Evidence, known: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+def usual_spread(
+    base: Evidence, new: Evidence, known: np.ndarray, inertia: np.ndarray, form_sd: float = FORM_SD
+) -> np.ndarray:
     """One-sigma (K,) of each coefficient between two flights by values, noise and forms alone, in its unit.
 
     `known` (K,) are the coefficients of the effects that the first set's model holds; `inertia` (C,) is the mass, or
     the inertia, of the second vehicle.yaml over the first one's in each channel: residual noise grows with it.
+    `form_sd` is the share of what effects contribute that their forms are wrong by.
     """
     gram = base.gram.sum(axis=1)
     hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
     own = np.einsum("ckk->ck", gram)
     explained = np.einsum("k,ckl,l->c", known, gram, known)
     total = np.maximum(own.sum(axis=0), TINY)
-    form = FORM_SD * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
+    form = form_sd * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
     out = np.zeros(len(known))
     for term in base.terms:
         at = base.start[term.key] + np.arange(term.size)
@@ -77,14 +80,15 @@ def left_by_all(evidence: Evidence) -> np.ndarray:
     return out
 
 
-def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, Evidence], Found]) -> np.ndarray:
-    """One-sigma (K,) of each coefficient by which the good flights differ among themselves, in its unit.
+def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, Evidence], Found]) -> np.ndarray | float:
+    """One-sigma (K,) of each coefficient by which the good flights differ among themselves, in its unit; 0 of too few.
 
     Of a class each member gets what makes it contribute as much. A variance of n flights is widened by (n + 1)/(n − 1).
     """
-    number, squares = len(flights), np.zeros(flights[0].gram.shape[-1])
+    number = len(flights)
     if number < FEWEST_FLIGHTS:
-        return squares
+        return 0.0
+    squares = np.zeros(flights[0].gram.shape[-1])
     for k, flight in enumerate(flights):
         others = joined([f for j, f in enumerate(flights) if j != k])
         squares += differences(decide(others, flight), len(squares))

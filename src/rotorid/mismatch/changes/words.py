@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 from rotorid.mismatch.changes.compare import Change, Changes
-from rotorid.mismatch.findings import Estimate
+from rotorid.mismatch.changes.problem import NAMES
+from rotorid.mismatch.findings import CLAIMED, Estimate
+from rotorid.mismatch.instrument.columns import VALUE_NAMES
 from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.words import capital, effect_words, listed, number, parameter_words, percent_words
 
-VALUES = frozenset(PARAMETER_NAMES.values())
+VALUES = frozenset(NAMES.values())
+WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the largest load"}
+"""Kind of the sets to what shares are of."""
+SHARE = {"flight": "share_of_weight", "stand": "share_of_largest_load", "bench": "share_of_largest_load"}
+CALIBRATED = frozenset(
+    {
+        *(name for name in VALUE_NAMES.values() if name.startswith("reading_gain")),
+        "crosstalk",
+        "load_nonlinearity",
+        "creep",
+        "hysteresis",
+        "mount_tilt",
+        "sensor_origin",
+        "compliance",
+    }
+)
+"""Gains and effects that a calibration measures, by dead weights on one axis after the other."""
 MOST_LIMITS = 4
 """Things that did not change and are named with their limit; more are counted."""
 
@@ -18,7 +35,20 @@ def sentences(found: Changes) -> list[str]:
     out = [change_words(c) for c in found.changes]
     if not out:
         out.append(f"Nothing changed from {found.base} to {found.new} as far as these recordings can tell.")
-    return [*out, *([unchanged_words(found.limits)] if found.limits else []), *found.notes]
+    limits = [unchanged_words(found.limits, WHOLE[found.kind])] if found.limits else []
+    return [*out, *advice(found), *limits, *found.notes]
+
+
+def advice(found: Changes) -> list[str]:
+    """What to do about a stand or bench that changed: one sentence, or none where nothing surely did."""
+    if found.kind == "flight":
+        return []
+    ids = {i for c in found.changes if c.status in CLAIMED for i in (c.id, *c.alternatives)}
+    if ids & CALIBRATED:
+        return ["Calibrate it again before its readings are used: what was found is part of the calibration."]
+    if ids & {"tare_offset", "zero_drift"}:
+        return ["Zero it again before each run; the calibration itself has not changed."]
+    return []
 
 
 def change_words(change: Change) -> str:
@@ -50,14 +80,17 @@ def size_words(estimate: Estimate) -> str:
     return f"{estimate.symbol} by {number(estimate.value)} ± {number(half)} {estimate.unit}".removesuffix(" 1").rstrip()
 
 
-def unchanged_words(limits: tuple[UpperLimit, ...]) -> str:
-    """What did not change: believed values with their limits, then the effects that may have changed most."""
+def unchanged_words(limits: tuple[UpperLimit, ...], whole: str) -> str:
+    """What did not change: believed values with their limits, then the effects that may have changed most.
+
+    `whole` is what shares are of, in words.
+    """
     values = [
         f"{name_words(x.id)} by at most {percent_words(x.at_most)}" for x in limits if x.id in VALUES and x.at_most
     ]
     # A limit above the weight excludes nothing: the page has it in its table.
     others = [x for x in limits if x.id not in VALUES and 0 < x.share < 1]
-    named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of the weight" for x in others[:MOST_LIMITS]]
+    named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of {whole}" for x in others[:MOST_LIMITS]]
     if len(others) > MOST_LIMITS:
         named.append(f"{len(others) - MOST_LIMITS} others by less")
     return f"Not changed, with 95 % probability: {listed([*values, *named])}."
@@ -68,6 +101,7 @@ def as_json(found: Changes) -> dict:
     return {
         "base": found.base,
         "new": found.new,
+        "kind": found.kind,
         "sentences": sentences(found),
         "notes": list(found.notes),
         "changes": [
@@ -90,7 +124,7 @@ def as_json(found: Changes) -> dict:
                 "symbol": x.symbol,
                 "at_most": x.at_most,
                 "unit": x.unit,
-                "share_of_weight": x.share or None,
+                SHARE[found.kind]: x.share or None,
             }
             for x in found.limits
         ],

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, SUPPLY
-from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS
+from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
 from rotorid.mismatch import rules
 from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.analyse import throttle_or_thrust
@@ -81,6 +81,26 @@ def one_load(finding: Finding, setup: Setup) -> Finding:
     )
 
 
+def first_model(setup: Setup, terms: list[Term]) -> tuple[ReadingModel, ChainResult | None, tuple[Loading, ...] | None]:
+    """The model of the reading as the search ends, what lies between command and rotor speed, and the loads by that.
+
+    The loads are None where rotor speeds are measured, or no rotor turns: they stay as they were prepared.
+    """
+    measured = all(x.measured for x in setup.loadings)
+    chain = find_chain(setup)
+    loadings = None if chain is None or measured else moved(setup, chain)
+    model = fitted_model(setup, terms, loadings=loadings)
+    if loadings is not None and model.selection.active:
+        # What was found at the reading changes what the commands must explain: once more with it known.
+        others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
+        chain = find_chain(setup, others)
+        loadings = moved(setup, chain)
+        refused = same_curve(chain)
+        active = [k for k in model.selection.active if model.search.terms[k].effect not in refused]
+        model = fitted_model(setup, terms, active, loadings, refused)
+    return model, chain, loadings
+
+
 def analyse_instrument(recordings: RecordingSet) -> Analysis:
     """The whole analysis of a set of kind `stand` or `bench`.
 
@@ -91,17 +111,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     setup = set_up(known, recordings)
     terms, reasons = make_terms(setup)
     measured = all(x.measured for x in setup.loadings)
-    chain = find_chain(setup)
-    loadings = None if chain is None or measured else moved(setup, chain)
-    model = fitted_model(setup, terms, loadings=loadings)
-    if chain is not None and not measured and model.selection.active:
-        # What was found at the reading changes what the commands must explain: once more with it known.
-        others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
-        chain = find_chain(setup, others)
-        loadings = moved(setup, chain)
-        refused = same_curve(chain)
-        active = [k for k in model.selection.active if model.search.terms[k].effect not in refused]
-        model = fitted_model(setup, terms, active, loadings, refused)
+    model, chain, loadings = first_model(setup, terms)
 
     def values_in(model: ReadingModel, selection: Selection, refused: Collection[str] = ()) -> Values:
         size = sizes_of_values(model)

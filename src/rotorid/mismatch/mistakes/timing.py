@@ -730,6 +730,7 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
                     f"sensors': shifted."
                 ),
                 # A sensor whose stamps are early is seen as all others' delay: the id's parameter is a length of time.
+                late_s=amount,
                 parameters=(Estimate("T_d", abs(amount), "s", abs(amount) - 1.96 * sd, abs(amount) + 1.96 * sd),),
                 p_value=max(p for n, p in wrong if n in cluster),
                 channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in cluster),

@@ -98,6 +98,8 @@ def mode_of(
     `believed` are one-sigma and bounds of every column (`Problem.believed`). `exact` limits the noise of the regressors
     in every direction of these columns, else column by column: faster, to rank moves by.
     """
+    if not len(columns):
+        return Mode(0.0, np.zeros(0), np.zeros((0, 0)))
     grid = np.ix_(columns, columns)
     gram, (sd, low, high) = problem.gram[grid], (own[columns] for own in believed)
     bias = limited_bias(gram, problem.bias[grid]) if exact else problem.limited_bias[grid]

@@ -33,11 +33,11 @@ svg { width: 100%; max-width: 50rem; height: auto; background: #fff; }
 {{ values }}
 <h2>Not changed by more than</h2>
 <p>With 95 % probability. Each set is compared with its own vehicle.yaml.</p>
-<div class="wide"><table><tr><th>what</th><th class="number">at most</th><th class="number">of the weight</th></tr>
+<div class="wide"><table><tr><th>what</th><th class="number">at most</th><th class="number">of {{ whole }}</th></tr>
 {% for row in limits %}<tr><td>{{ row.name }}</td><td class="number">{{ row.at_most }}</td>
 <td class="number">{{ row.share }}</td></tr>{% endfor %}</table></div>
-<h2>What each believed vehicle leaves</h2>
-<p>Measured less simulated force and moment, one stretch of each set. What both sets have alike is no change.</p>
+<h2>{{ left }}</h2>
+<p>{{ measured }}, one stretch of each set. What both sets have alike is no change.</p>
 {{ residuals }}
 </body></html>
 """
@@ -45,7 +45,7 @@ svg { width: 100%; max-width: 50rem; height: auto; background: #fff; }
 
 def make_changes_page(found: Changes) -> str:
     """The page of a comparison."""
-    sentences = words.sentences(found)
+    sentences, flown = words.sentences(found), found.kind == "flight"
     return (
         Environment(autoescape=True, trim_blocks=True)
         .from_string(TEMPLATE)
@@ -53,8 +53,11 @@ def make_changes_page(found: Changes) -> str:
             policy=policy_for(),
             base=found.base,
             new=found.new,
-            changes=sentences[: max(1, len(found.changes))],
+            changes=sentences[: max(1, len(found.changes)) + len(words.advice(found))],
             notes=found.notes,
+            whole=words.WHOLE[found.kind],
+            left="What each believed vehicle leaves" if flown else "Reading less load",
+            measured="Measured less simulated force and moment" if flown else "Reading less the load that is believed",
             values=drawn(draw_values, found, {p.symbol: words.name_words(p.symbol) for p in found.values}),
             limits=[limit_row(limit) for limit in found.limits],
             residuals=drawn(draw_residuals, found, {c: channel_words(c) for c in found.residuals[0]}),

@@ -39,7 +39,12 @@ def draw_residuals(found: Changes, names: Mapping[str, str], path: Path) -> None
     channels = [c for c in found.residuals[0] if c in found.residuals[1]]
     fig, axes = style.figure(1.25 * max(1, len(channels)) + 0.4, max(1, len(channels)), 1, squeeze=False, sharex=True)
     for axis, channel in zip(axes[:, 0], channels, strict=False):
-        sets = zip(found.residuals, ("good flights", found.new), (style.BLUE, style.RED), strict=True)
+        sets = zip(
+            found.residuals,
+            ("good flights" if found.kind == "flight" else found.base, found.new),
+            (style.BLUE, style.RED),
+            strict=True,
+        )
         for residuals, name, colour in sets:
             time_s, values = thinned(residuals[channel])
             axis.plot(time_s, values, color=colour, lw=0.7, label=name)

@@ -219,7 +219,7 @@ def test_what_to_do_next_names_the_plan_and_no_number(kind: str, what: str) -> N
     made = analysis(findings=[CLASS], next_manoeuvre="fly fast", next_separates=("rotor_drag", "frame_drag"))
     verdict = verdict_of(made).model_copy(update={"kind": kind})
     said = next_text(verdict, made.recordings)
-    assert said.startswith("Fly fast. It is meant to tell rotor drag and ")
+    assert said.startswith("Fly fast. It is meant to distinguish rotor drag and ")
     assert f"<code>rotorid plan</code> says which {what} within your limits" in said
     assert not re.search(r"\d", said) and said in make_page(made, verdict)
 

@@ -1,0 +1,309 @@
+"""The chain from command to rotor speed in two sets: lag, delay, throttle curve, battery.
+
+What a small change of each of its parameters does is a column like any other: of the rotor speeds where they are
+measured, of force and moment where they are known from the commands alone. The chain holds the forms that the first
+set has, and one of every other id at the values that change nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.effects.contract import DELAY, LIMIT, Parameter
+from rotorid.mismatch.changes.problem import change_of, decide_changes, evidence_for, held
+from rotorid.mismatch.fitted import Fitted
+from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.posterior.evidence import Evidence, LinearParameter, evidence_from
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.prepare import assemble_rows
+from rotorid.mismatch.regression import autoregression, build
+from rotorid.mismatch.report_runs import as_flown
+from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.speedpath import Chain, candidate_forms, commanded_path
+
+SAME_TIME_SD, SAME_SHARE_SD = 0.03, 0.01
+"""One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number
+without unit (another charge of the battery)."""
+CHAIN_ROUNDS = 4
+"""Times that the chain's columns are taken, at most."""
+SAME_PHASE_SD = 0.29
+"""One-sigma of the instant between two samples at which commands are stamped, in samples: evenly spread over one."""
+STEP_S, STEP = 0.002, 0.01
+"""Changes of a time and of another parameter from which its column is taken."""
+START_S = 0.025
+"""By how much longer or shorter time constants are from which a change is sought, too."""
+OF_ROTORS = "offset:rotors"
+"""Start of the keys of offsets in time that are a delay of the commands: the chain has it."""
+
+
+@dataclass(frozen=True)
+class ChainTerms:
+    """The chain's forms with the parameters at which columns are taken, for the first set."""
+
+    chain: Chain
+    values: np.ndarray
+    """(P,) parameters of every form in order."""
+    rate_hz: float
+    """Of the stretches."""
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """All parameters, in the order of `values`."""
+        return [p for _, form in self.chain for p in form.parameters]
+
+    @property
+    def terms(self) -> list[Term]:
+        """A term for each form."""
+        sizes = [len(form.parameters) for _, form in self.chain]
+        return [
+            Term(key_of(effect, form.name), "effect", effect, size=size, prior_sd=(np.inf,) * size)
+            for (effect, form), size in zip(self.chain, sizes, strict=True)
+        ]
+
+    @property
+    def spread(self) -> np.ndarray:
+        """One-sigma (P,) of each parameter between two flights in which nothing changed, in its unit."""
+        times = np.array([p.unit == "s" for p in self.parameters])
+        least = np.array([p.negligible for p in self.parameters])
+        late = np.array([form.stage == DELAY for _, form in self.chain for _ in form.parameters])
+        usual = np.where(times, SAME_TIME_SD * np.abs(self.values), SAME_SHARE_SD)
+        return np.sqrt(usual**2 + least**2 + np.where(late, SAME_PHASE_SD / self.rate_hz, 0.0) ** 2)
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(P,) changes from which columns are taken, away from the upper bound."""
+        own = self.parameters
+        size = np.array([STEP_S if p.unit == "s" else STEP for p in own])
+        return np.where(self.values + size > [p.high for p in own], -size, size)
+
+    def at(self, values: np.ndarray) -> ChainTerms:
+        """The same forms with other parameters (P,), within their bounds."""
+        own = self.parameters
+        return replace(self, values=np.clip(values, [p.low for p in own], [p.high for p in own]))
+
+    def starts(self) -> list[tuple[str, ChainTerms]]:
+        """Chains to start from, each with the key of the form whose time constants are longer or shorter than here."""
+        out, at = [("", self)], 0
+        for term in self.terms:
+            own = np.arange(at, at + term.size)
+            times = [i for i in own if self.parameters[i].unit == "s"]
+            at += term.size
+            for away in (START_S, -START_S) if times else ():
+                values = self.values.copy()
+                values[times] += away
+                moved = self.at(values)
+                if not np.array_equal(moved.values, self.values):
+                    out.append((term.key, moved))
+        return out
+
+    def stepped(self) -> list[ChainTerms]:
+        """The chain with each parameter changed by its step."""
+        return [replace(self, values=self.values + row) for row in np.diag(self.steps)]
+
+    def named(self, evidence: Evidence, first: ChainTerms) -> Evidence:
+        """Evidence whose terms know the parameters' symbols, as changes from those of the first set."""
+        at, known = 0, {}
+        for term, (_, form) in zip(self.terms, self.chain, strict=True):
+            values = first.values[at : at + term.size]
+            known[term.key] = (
+                form.name,
+                tuple(
+                    LinearParameter(p.symbol, p.unit, p.low - v, p.high - v, p.negligible)
+                    for p, v in zip(form.parameters, values, strict=True)
+                ),
+            )
+            at += term.size
+        named = (
+            replace(t, form=known[t.key][0], linear=known[t.key][1]) if t.key in known else t for t in evidence.terms
+        )
+        offsets = {t.key for t in evidence.terms if t.key.startswith(OF_ROTORS)}
+        return held(replace(evidence, terms=tuple(named)), offsets)
+
+
+def key_of(effect: str, form: str) -> str:
+    """Key of a form's term."""
+    return f"{effect}/{form}"
+
+
+def chain_terms(found: Fitted, segments: Sequence[Segment]) -> ChainTerms | None:
+    """The chain of a set's model, and one form of every other id; None where no commands are recorded."""
+    if found.chain is None:
+        return None
+    result, _, full_voltage = found.chain
+    chain, values = list(result.fit.chain), [float(v) for v in result.fit.values]
+    held = {effect for effect, _ in chain}
+    for effect, form in candidate_forms(list(segments), full_voltage is not None):
+        if effect not in held and form.stage != LIMIT:
+            held.add(effect)
+            chain.append((effect, form))
+            values += form.neutral
+    kept = ChainTerms(tuple(chain), np.array(values), segments[0].rate_hz)
+    return kept.at(kept.values)
+
+
+def turning(found: Fitted, chain: ChainTerms) -> Fitted:
+    """The set's model with another chain."""
+    result, *full = found.chain
+    fit = replace(result.fit, chain=chain.chain, values=chain.values)
+    return replace(found, chain=(replace(result, fit=fit), *full))
+
+
+def change_of_chain(found: Found, chain: ChainTerms) -> np.ndarray:
+    """By how much the chain's parameters (P,) changed in a model, 0 of those that did not."""
+    change = change_of(found) * found.problem.unit
+    return np.concatenate([change[found.problem.columns_of[t.key]] for t in chain.terms])
+
+
+def chain_columns(
+    rows: Sequence[Rows], recorded: Sequence[Segment], found: Fitted, chain: ChainTerms
+) -> list[np.ndarray]:
+    """What a unit of each parameter of the chain leaves less in every channel of some stretches, (n, 12, P) each.
+
+    `rows` are those of the stretches with the rotors turning as `chain` makes of their commands.
+    """
+    prepared, effects = found.model.prepared, found.model.effects
+    columns = []
+    for other, step in zip(chain.stepped(), chain.steps, strict=True):
+        moved = assemble_rows(prepared, [], as_flown(list(recorded), turning(found, other)), effects)
+        columns.append([(r.y - m.y) / step for r, m in zip(rows, moved, strict=True)])
+    return [np.stack(own, axis=2) for own in zip(*columns, strict=True)]
+
+
+def speed_rows(segments: Sequence[Segment], found: Fitted, chain: ChainTerms, first: ChainTerms) -> list[Rows]:
+    """Rows of measured rotor speeds, rad/s: what the chain leaves of them, and a column for each of its parameters.
+
+    `first` is the first set's chain: what the rows leave is that of it.
+    """
+    result, full_speed, full_voltage = found.chain
+    shift_s, holds = result.fit.shift_s, result.fit.holds
+    out = []
+    for segment in segments:
+        now, *moved = (
+            commanded_path(segment, own.chain, own.values, shift_s, full_speed, full_voltage, holds)
+            for own in (chain, *chain.stepped())
+        )
+        x = np.stack([(other - now) / step for other, step in zip(moved, chain.steps, strict=True)], axis=2)
+        y = segment.motion.rotor_speed - now + x @ (chain.values - first.values)
+        out.append(Rows(segment.run, segment.motion.time_s, y, x))
+    return out
+
+
+def speed_evidence(rows: list[Rows], filters: dict[int, np.ndarray], chain: ChainTerms, first: ChainTerms) -> Evidence:
+    """The evidence of measured rotor speeds, one channel a rotor."""
+    rate_hz = chain.rate_hz
+    regression = build(rows, chain.terms, filters, lambda run, time_s: True, 1.0, rate_hz, by_channel=True)
+    return chain.named(evidence_from(regression), first)
+
+
+def speed_filters(rows: list[Rows]) -> dict[int, np.ndarray]:
+    """Whitening filters of what the chain leaves of each rotor's speed."""
+    return {k: autoregression([r.y[:, k] for r in rows]) for k in range(rows[0].y.shape[1])}
+
+
+def squares_of_speeds(rows: list[Rows], segments: Sequence[Segment], chain: ChainTerms) -> dict[str, np.ndarray]:
+    """To the key of each form what its columns amount to (k, k), as mean squares of shares of the thrust."""
+    out, at, count = {}, 0, sum(len(r.y) for r in rows)
+    for term in chain.terms:
+        own = [
+            2.0 * r.x[:, :, at : at + term.size] / np.maximum(s.motion.rotor_speed, 1.0)[:, :, None]
+            for r, s in zip(rows, segments, strict=True)
+        ]
+        out[term.key] = sum(np.einsum("nci,ncj->ij", x, x) / x.shape[1] for x in own) / count
+        at += term.size
+    return out
+
+
+@dataclass(frozen=True)
+class Option:
+    """Changes found with the chain's columns taken where they lead to."""
+
+    found: Found
+    chain: ChainTerms
+    log_posterior: float
+    """Nats, less a constant of the first set."""
+
+
+Products = Callable[[ChainTerms | None], tuple[Evidence, Evidence]]
+"""Evidence of both sets with the second one's columns taken at a chain."""
+
+
+def option_of(
+    first: ChainTerms,
+    start: ChainTerms,
+    products_at: Products,
+    spread: np.ndarray,
+    prior: Prior,
+    same: Collection[str] = (),
+) -> Option:
+    """The most probable changes with the columns of the chain taken anew at what was found (Gauss and Newton).
+
+    Parameters
+    ----------
+    first, start
+        The first set's chain, and the one at which the columns are taken first.
+    products_at
+        Evidence of both sets.
+    spread
+        One-sigma (K,) of each coefficient between flights in which nothing changed.
+    same
+        Keys of the chain's forms that did not change, by assumption.
+    """
+    now = start
+    for _ in range(CHAIN_ROUNDS):
+        option = decided_at(now, products_at, spread, prior, same)
+        chain = first.at(first.values + change_of_chain(option.found, first))
+        if np.all(np.abs(chain.values - now.values) < first.spread):
+            break
+        now = chain
+    return option
+
+
+def decided_at(
+    chain: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior, same: Collection[str] = ()
+) -> Option:
+    """The most probable changes with the columns taken at a chain."""
+    base, new = products_at(chain)
+    found = decide_changes(base, held(new, same), spread, prior)
+    return Option(found, chain, evidence_for(base, new, found, spread))
+
+
+def options_of(first: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior) -> list[Option]:
+    """The most probable changes, and those without each form of the chain that changed in them; the best first.
+
+    `first` is None where the chain's columns are not among those compared. Each is sought from several chains: a delay
+    of some samples is not seen from where there is none, nor from where a lag in its place has led to.
+    """
+    if first is None:
+        return [decided_at(None, products_at, spread, prior)]
+    kept: dict[tuple[float, ...], tuple[Evidence, Evidence]] = {}
+
+    def remembered(chain: ChainTerms) -> tuple[Evidence, Evidence]:
+        key = tuple(chain.values)
+        if key not in kept:
+            kept[key] = products_at(chain)
+        return kept[key]
+
+    def best(same: frozenset[str] = frozenset()) -> Option:
+        starts = [chain for key, chain in first.starts() if key not in same]
+        tried = (option_of(first, start, remembered, spread, prior, same) for start in starts)
+        return max(tried, key=lambda o: o.log_posterior)
+
+    plain = best()
+    others = [best(frozenset({t.key})) for t in first.terms if t.key in plain.found.model]
+    return sorted([plain, *others], key=lambda o: -o.log_posterior)
+
+
+def others_in_place(options: Sequence[Option], effect: str, prior: Prior) -> frozenset[str]:
+    """Ids of the chain that changed in an option nearly as probable as the best one, in which `effect` did not."""
+    best = options[0]
+    out = set()
+    for option in options[1:]:
+        ids = {option.found.problem.terms[key].effect for key in option.found.model}
+        if effect not in ids and best.log_posterior - option.log_posterior < prior.open_nats:
+            own = {best.found.problem.terms[key].effect for key in best.found.model}
+            out |= ids - own
+    return frozenset(out)
