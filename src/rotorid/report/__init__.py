@@ -1,4 +1,4 @@
-"""What is written for a reader: a verdict's files and page, figures, the report's chapters, where it came from."""
+"""What is written for a reader: a verdict's files and page, figures of the report (its chapters are in notebooks/)."""
 
 OPEN = (
     "codehash",

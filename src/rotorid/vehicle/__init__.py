@@ -1,4 +1,4 @@
-"""Vehicles in motion: rigid body, rotors, mixing, integration, simulation in windows."""
+"""Vehicles in motion: rigid body, rotors, mixing, simulation, controllers; exporters to other tools (`exports`)."""
 
 OPEN = (
     "attitude",
