@@ -69,6 +69,7 @@ EFFECT = Effect(
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
     of_the_rig=True,
+    remedy="calibrate",
     source="thesis 2.5 and 2.8: the PLA bench",
     sign="positive k_ij: a load along +j reads further towards +i, by k_ij times its square",
     validity=(

@@ -337,6 +337,10 @@ class Effect:
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     curves_thrust: bool = False
     """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
+    differs_between_runs: Literal["", "zero", "drift", "of other axes"] = ""
+    """What of a reading it is that differs from run to run of one day where nothing changed; empty for nothing."""
+    remedy: Literal["", "calibrate", "zero"] = ""
+    """What to do about an instrument that came to have it; empty where it is not the instrument's."""
     curve_of_load: bool = False
     """Whether it bends a reading by the load alone, as any other such curve does on one rotor that does not tilt."""
     shows: Literal["", "in what takes time", "after a change of load"] = ""

@@ -92,6 +92,7 @@ EFFECT = Effect(
     sentence="after each change of load the reading creeps on in the same direction",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    remedy="calibrate",
     source="catalogue B2",
     sign=(
         "positive c: the reading goes on in the direction of the change of load, by c of it in the end, and "

@@ -186,6 +186,7 @@ EFFECT = Effect(
     sentence="at the same load the reading differs between loading and unloading",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    remedy="calibrate",
     source="catalogue B3",
     sign=(
         "positive h: at the same load the reading is higher by h while the load rises (towards +) and lower "

@@ -79,6 +79,7 @@ EFFECT = Effect(
     sentence="the reading's error grows with the load on the same axis, faster than in proportion",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    remedy="calibrate",
     source="catalogue B4",
     sign=(
         "positive a_2 of the square raises the reading under a load of either sign; positive a of the odd "

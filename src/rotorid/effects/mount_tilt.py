@@ -66,6 +66,7 @@ EFFECT = Effect(
     sentence="sensor and load are not aligned as stated, so a part of the load shows on the other axes",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    remedy="calibrate",
     source="catalogue B9",
     sign=(
         "positive δ: the sensor stands turned by δ about its own axis against the stated one (right-handed), "

@@ -46,6 +46,7 @@ EFFECT = Effect(
     sentence="the moments are off in proportion to the force",
     forms=lambda vehicle: (),
     reading_forms=reading_forms,
+    remedy="calibrate",
     source="catalogue B14",
     sign=(
         "d points from where the sensor really takes moments to where it is stated to; positive d_x with a "

@@ -53,8 +53,9 @@ FEWEST_RUNS = 3
 """Runs that each set must have for its runs to be the environments in which a coefficient must be the same."""
 TARE_NOISE = 0.5
 """One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples."""
-WANDERS = {"": "", "tare_offset": "constant", "zero_drift": "linear in time", "crosstalk": ""}
-"""Effects by which readings differ from run to run, with how the names of their forms begin."""
+WANDERS = {"zero": ("constant", "b_{own}"), "drift": ("linear in time", "b_{own}")}
+OF_OTHER_AXES = "of other axes", ("", "C_{own},{load}")
+"""To what differs from run to run (`Effect.differs_between_runs`) how the names of its forms begin, and its symbol."""
 MOUNTED_RAD = 0.001
 """One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree."""
 WIDE = 20.0
@@ -428,15 +429,18 @@ def wandering_columns(
 ) -> list[list[int]]:
     """Columns of a constant, of time, of the channel's own load and of each other load, all forms of each together."""
     own = AXES[channel]
-    wanted = [("tare_offset", f"b_{own}"), ("zero_drift", f"b_{own}"), ("", f"gain_{'xyz'[channel % 3]}")]
-    wanted += [("crosstalk", f"C_{own},{AXES[source]}") for source in loaded if source != channel]
+    roles = {effect.id: effect.differs_between_runs for effect in catalogue().values()}
+    wanted = [(role, form, symbol.format(own=own)) for role, (form, symbol) in WANDERS.items()]
+    wanted.append(("", "", f"gain_{'xyz'[channel % 3]}"))
+    role, (form, symbol) = OF_OTHER_AXES
+    wanted += [(role, form, symbol.format(own=own, load=AXES[source])) for source in loaded if source != channel]
     out = []
-    for effect, symbol in wanted:
+    for role, form, symbol in wanted:
         found = []
         for term in terms:
-            if term.kind == "value" and not effect and term.key in ("gain", symbol):
+            if term.kind == "value" and not role and term.key in ("gain", symbol):
                 found.append(evidence.start[term.key])
-            elif term.kind == "effect" and term.effect == effect and term.form.name.startswith(WANDERS[effect]):
+            elif term.kind == "effect" and role and roles.get(term.effect) == role and term.form.name.startswith(form):
                 names = [term.form.parameters[i].symbol for i in term.form.linear]
                 found += [evidence.start[term.key] + k for k, name in enumerate(names) if name == symbol]
         if found:

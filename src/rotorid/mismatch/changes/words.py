@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.changes.compare import Change, Changes
 from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.findings import CLAIMED, Estimate
@@ -13,19 +14,8 @@ VALUES = frozenset(NAMES.values())
 WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the largest load"}
 """Kind of the sets to what shares are of."""
 SHARE = {"flight": "share_of_weight", "stand": "share_of_largest_load", "bench": "share_of_largest_load"}
-CALIBRATED = frozenset(
-    {
-        *(name for name in VALUE_NAMES.values() if name.startswith("reading_gain")),
-        "crosstalk",
-        "load_nonlinearity",
-        "creep",
-        "hysteresis",
-        "mount_tilt",
-        "sensor_origin",
-        "compliance",
-    }
-)
-"""Gains and effects that a calibration measures, by dead weights on one axis after the other."""
+GAINS = frozenset(name for name in VALUE_NAMES.values() if name.startswith("reading_gain"))
+"""Values that a calibration measures, by dead weights on one axis after the other."""
 MOST_LIMITS = 4
 """Things that did not change and are named with their limit; more are counted."""
 
@@ -44,9 +34,10 @@ def advice(found: Changes) -> list[str]:
     if found.kind == "flight":
         return []
     ids = {i for c in found.changes if c.status in CLAIMED for i in (c.id, *c.alternatives)}
-    if ids & CALIBRATED:
+    remedies = {effect.remedy for effect in catalogue().values() if effect.id in ids}
+    if ids & GAINS or "calibrate" in remedies:
         return ["Calibrate it again before its readings are used: what was found is part of the calibration."]
-    if ids & {"tare_offset", "zero_drift"}:
+    if "zero" in remedies:
         return ["Zero it again before each run; the calibration itself has not changed."]
     return []
 
