@@ -477,8 +477,9 @@ def mounted_anew(terms: Sequence[Term], setup: Setup) -> np.ndarray:
     The forms in which a coefficient stands have it in equal shares, so that their sum has it once.
     """
     scale = dict(zip(AXES, scales(setup.instrument.largest), strict=True))
+    (role, _), roles = OF_OTHER_AXES, {effect.id: effect.differs_between_runs for effect in catalogue().values()}
     symbols = [
-        [t.form.parameters[i].symbol for i in t.form.linear] if t.effect == "crosstalk" else [""] * t.size
+        [t.form.parameters[i].symbol for i in t.form.linear] if roles.get(t.effect) == role else [""] * t.size
         for t in terms
     ]
     every = [symbol for own in symbols for symbol in own]
