@@ -29,7 +29,7 @@ from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
-from rotorid.mismatch.findings import Estimate, Finding, Status
+from rotorid.mismatch.findings import CLAIMED, Estimate, Finding, Status
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence
@@ -197,7 +197,7 @@ def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]
     out = []
     for stated in statements_of(options[0].found):
         others = others_in_place(options, stated.id, prior)
-        if others and stated.status != "not_established":
+        if others and stated.status in CLAIMED:
             members = tuple(sorted({stated.id, *stated.alternatives, *others}))
             stated = replace(stated, status="ambiguous", alternatives=members)
         out.append(stated)
