@@ -80,6 +80,11 @@ class Finding:
     """Of one that is claimed: why the gate keeps it out of the files; empty where it is delivered."""
 
     @property
+    def which(self) -> tuple[str, tuple[str, ...]]:
+        """What distinguishes it from another mistake of a set: its id, of a clock also the columns stamped by it."""
+        return self.id, () if self.late_s is None else self.channels
+
+    @property
     def delivered(self) -> bool:
         """Whether it may stand in one of the files."""
         return self.status in CLAIMED and not self.withheld

@@ -77,3 +77,8 @@ def test_a_clock_that_was_early_and_is_late_changed_by_both():
 
 def test_a_clock_that_both_sets_have_late_did_not_change():
     assert mistakes_that_differ((late(0.009, 0.003),), (late(0.011, 0.003),)) == ()
+
+
+def test_a_vibration_in_other_columns_is_no_change():
+    first, second = (Finding("vibration", "established", channels=(c,)) for c in ("moment_x", "moment_y"))
+    assert mistakes_that_differ((first,), (second,)) == ()

@@ -274,11 +274,11 @@ def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
 def mistakes_that_differ(base: tuple[Finding, ...], new: tuple[Finding, ...]) -> tuple[Change, ...]:
     """Mistakes in the recordings of the second set that the first has not, or has by another amount.
 
-    Where both have one in the same columns the difference is stated, if their 95 % intervals exclude zero.
+    Where both have one the difference is stated, if their 95 % intervals exclude zero.
     """
-    known, out = {(f.id, f.channels): f for f in base}, []
+    known, out = {f.which: f for f in base}, []
     for found in new:
-        first = known.get((found.id, found.channels))
+        first = known.get(found.which)
         if first is None:
             out.append(Change(found.id, found.status, found.alternatives, None, found.parameters))
         elif differs := differences_of(first, found):

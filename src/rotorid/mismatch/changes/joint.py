@@ -151,11 +151,9 @@ def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
     """
     new = replace(new, held_out=())
     corrected, mistakes, _ = find_mistakes(new)
-    known = {(m.id, m.channels) for m in reference.mistakes}
+    known = {m.which for m in reference.mistakes}
     variants = (
-        [(corrected, mistakes)]
-        if all((m.id, m.channels) in known for m in mistakes)
-        else [(corrected, mistakes), (new, ())]
+        [(corrected, mistakes)] if all(m.which in known for m in mistakes) else [(corrected, mistakes), (new, ())]
     )
     stretches = [(own, recorded_stretches(reference.found, own), found) for own, found in variants]
     joints = [
