@@ -80,5 +80,9 @@ def test_a_clock_that_both_sets_have_late_did_not_change():
 
 
 def test_a_vibration_in_other_columns_is_no_change():
-    first, second = (Finding("vibration", "established", channels=(c,)) for c in ("moment_x", "moment_y"))
+    sizes = [(Estimate("f", f_hz, "Hz", f_hz - 0.1, f_hz + 0.1),) for f_hz in (80.0, 90.0)]
+    first, second = (
+        Finding("vibration", "established", channels=(c,), parameters=own)
+        for c, own in zip(("moment_x", "moment_y"), sizes, strict=True)
+    )
     assert mistakes_that_differ((first,), (second,)) == ()

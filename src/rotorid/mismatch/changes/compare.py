@@ -272,16 +272,16 @@ def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
 
 
 def mistakes_that_differ(base: tuple[Finding, ...], new: tuple[Finding, ...]) -> tuple[Change, ...]:
-    """Mistakes in the recordings of the second set that the first has not, or has by another amount.
+    """Mistakes in the recordings of the second set that the first has not, or clocks that it has late by another time.
 
-    Where both have one the difference is stated, if their 95 % intervals exclude zero.
+    Where both have one of those the difference is stated, if their 95 % intervals exclude zero.
     """
     known, out = {f.which: f for f in base}, []
     for found in new:
         first = known.get(found.which)
         if first is None:
             out.append(Change(found.id, found.status, found.alternatives, None, found.parameters))
-        elif differs := differences_of(first, found):
+        elif found.late_s is not None and (differs := differences_of(first, found)):
             out.append(Change(found.id, found.status, found.alternatives, None, differs))
     return tuple(out)
 
