@@ -28,7 +28,7 @@ def compare(
     Flights of one vehicle, or recordings of one stand or bench: there the answer is whether to calibrate it again.
     Each set is held against its own vehicle.yaml: what was changed on purpose and is written there is no change. With
     three or more good flights their differences among themselves are the yardstick.
-    Not compared yet: the chain from command to rotor speed where speeds are not measured.
+    Not compared yet: what lies between command and rotor speed on a stand.
 
     Examples:
 

@@ -108,7 +108,7 @@ class SessionLimits(BaseModel):
     duration_s: float = Field(600.0, ge=30, le=14400)
     """Of all steps together."""
     load_share: float = Field(1.0, gt=0, le=1.5)
-    """Largest load of a bench, or speed of a stand's rotors, beside the largest of the set."""
+    """Largest load of a bench, or speed of a stand's rotors, over the largest of the set."""
     wait_s: float = Field(60.0, ge=5, le=3600)
     """How long a load is held, or its absence."""
     tilt_deg: float = Field(15.0, ge=0, le=60)

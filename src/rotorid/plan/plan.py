@@ -234,7 +234,7 @@ def chosen_pieces(
 
 
 def expecting_quick(known: Known, limits: Limits) -> Known:
-    """The set as the engine would whiten it beside a quick flight: the first of QUICK that the limits allow."""
+    """The set as the engine would whiten it next to a quick flight: the first of QUICK that the limits allow."""
     world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
     for share in SIZES:
         options = {p.name: p for p in candidates(smaller(limits, share), share * yaw_acceleration(vehicle))}

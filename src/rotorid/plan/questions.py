@@ -26,7 +26,7 @@ from rotorid.recordings import RecordingSet
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One competing model: the terms of its id beside what all of them share, and their coefficients on this set."""
+    """One competing model: the terms of its id, given what all of them share, and their coefficients on this set."""
 
     id: str
     keys: tuple[str, ...]

@@ -127,7 +127,9 @@ def known_instrument(recordings: RecordingSet) -> KnownInstrument:
             continue
         question = question_of(holder, finding, ids)
         if question is None:
-            unanswerable.append((ids, "it lies between command and rotor speed; record the speeds beside the commands"))
+            unanswerable.append(
+                (ids, "it lies between command and rotor speed; record the speeds next to the commands")
+            )
         else:
             questions.append(question)
     return replace(holder, questions=tuple(questions), unanswerable=tuple(unanswerable))

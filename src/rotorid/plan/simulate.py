@@ -28,9 +28,9 @@ from rotorid.vehicle.mixer import allocation_matrix
 
 DAMPING = 0.8
 FASTER = 5.0
-"""Rotors and filters beside the attitude loop."""
+"""Bandwidth of rotors and filters over that of the attitude loop."""
 SLOWER = 0.2
-"""The position loop beside the attitude loop, where its bandwidth is not stated."""
+"""Bandwidth of the position loop over that of the attitude loop, where its bandwidth is not stated."""
 EDGE = 8
 """Samples by which a flight is longer on both sides while its derivatives are taken."""
 ROUNDS = 6

@@ -29,7 +29,7 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     Raises
     ------
     InputError
-        The sets are not of one vehicle as believed, or share no columns beside the time.
+        The sets are not of one vehicle as believed, or share no columns but the time.
     """
     others = tuple(in_thirds(s) for s in others)
     sets = (first, *others)

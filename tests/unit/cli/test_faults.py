@@ -72,7 +72,8 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The bundled example."""
     folder = tmp_path_factory.mktemp("sets") / "example"
-    shutil.copytree(SOURCE / "rotorid" / "examples", folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    bundled = SOURCE / "rotorid" / "cli" / "examples"
+    shutil.copytree(bundled, folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     return folder
 
 

@@ -43,7 +43,7 @@ def test_a_verdict_states_no_separation_that_the_plan_would_not(verdict: Path) -
     assert said["predicted_separation_sigma"] in (None, plan["predicted_separation_sigma"])
     sigmas = [o["sigma"] for q in plan["questions"] for o in q["outcomes"]]
     assert plan["predicted_separation_sigma"] == min(sigmas) > 3.0
-    # The standard flight stands beside it, as long and expected to do no better.
+    # The standard flight stands next to it, as long and expected to do no better.
     (standard,) = [f for f in (plan, *plan["others"]) if f["flight"] == "standard"]
     assert [f["flight"] for f in plan["others"]] != [] and standard["duration_s"] <= plan["limits"]["duration_s"]
     assert standard["predicted_separation_sigma"] <= plan["predicted_separation_sigma"]

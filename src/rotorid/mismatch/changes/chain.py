@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.contract import DELAY, LIMIT, Parameter
-from rotorid.mismatch.changes.problem import change_of, decide_changes, evidence_for, held
+from rotorid.mismatch.changes.problem import change_of, held, weighed_changes
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.evidence import Evidence, LinearParameter, evidence_from
@@ -42,7 +42,7 @@ OF_ROTORS = "offset:rotors"
 
 @dataclass(frozen=True)
 class ChainTerms:
-    """The chain's forms with the parameters at which columns are taken, for the first set."""
+    """The forms of a chain, and the parameters at which their columns are taken."""
 
     chain: Chain
     values: np.ndarray
@@ -60,7 +60,7 @@ class ChainTerms:
         """A term for each form."""
         sizes = [len(form.parameters) for _, form in self.chain]
         return [
-            Term(key_of(effect, form.name), "effect", effect, size=size, prior_sd=(np.inf,) * size)
+            Term(f"{effect}/{form.name}", "effect", effect, size=size, prior_sd=(np.inf,) * size)
             for (effect, form), size in zip(self.chain, sizes, strict=True)
         ]
 
@@ -124,21 +124,16 @@ class ChainTerms:
         return held(replace(evidence, terms=tuple(named)), offsets)
 
 
-def key_of(effect: str, form: str) -> str:
-    """Key of a form's term."""
-    return f"{effect}/{form}"
-
-
 def chain_terms(found: Fitted, segments: Sequence[Segment]) -> ChainTerms | None:
     """The chain of a set's model, and one form of every other id; None where no commands are recorded."""
     if found.chain is None:
         return None
     result, _, full_voltage = found.chain
     chain, values = list(result.fit.chain), [float(v) for v in result.fit.values]
-    held = {effect for effect, _ in chain}
+    taken = {effect for effect, _ in chain}
     for effect, form in candidate_forms(list(segments), full_voltage is not None):
-        if effect not in held and form.stage != LIMIT:
-            held.add(effect)
+        if effect not in taken and form.stage != LIMIT:
+            taken.add(effect)
             chain.append((effect, form))
             values += form.neutral
     kept = ChainTerms(tuple(chain), np.array(values), segments[0].rate_hz)
@@ -267,8 +262,8 @@ def decided_at(
 ) -> Option:
     """The most probable changes with the columns taken at a chain."""
     base, new = products_at(chain)
-    found = decide_changes(base, held(new, same), spread, prior)
-    return Option(found, chain, evidence_for(base, new, found, spread))
+    found, log_posterior = weighed_changes(base, held(new, same), spread, prior)
+    return Option(found, chain, log_posterior)
 
 
 def options_of(first: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior) -> list[Option]:
@@ -298,12 +293,11 @@ def options_of(first: ChainTerms | None, products_at: Products, spread: np.ndarr
 
 
 def others_in_place(options: Sequence[Option], effect: str, prior: Prior) -> frozenset[str]:
-    """Ids of the chain that changed in an option nearly as probable as the best one, in which `effect` did not."""
+    """Ids that changed, in place of `effect`, in an option nearly as probable as the best one."""
+
+    def ids(option: Option) -> set[str]:
+        return {option.found.problem.terms[key].effect for key in option.found.model}
+
     best = options[0]
-    out = set()
-    for option in options[1:]:
-        ids = {option.found.problem.terms[key].effect for key in option.found.model}
-        if effect not in ids and best.log_posterior - option.log_posterior < prior.open_nats:
-            own = {best.found.problem.terms[key].effect for key in best.found.model}
-            out |= ids - own
-    return frozenset(out)
+    near = [ids(o) for o in options[1:] if best.log_posterior - o.log_posterior < prior.open_nats]
+    return frozenset().union(*(own - ids(best) for own in near if effect not in own))

@@ -281,30 +281,15 @@ def mistakes_that_differ(base: tuple[Finding, ...], new: tuple[Finding, ...]) ->
         first = known.get(found.which)
         if first is None:
             out.append(Change(found.id, found.status, found.alternatives, None, found.parameters))
-        elif found.late_s is not None and (differs := differences_of(first, found)):
-            out.append(Change(found.id, found.status, found.alternatives, None, differs))
+        elif later := later_by(first, found):
+            out.append(Change(found.id, found.status, found.alternatives, None, (later,)))
     return tuple(out)
 
 
-def differences_of(first: Finding, second: Finding) -> tuple[Estimate, ...]:
-    """By how much the parameters of a mistake differ in two sets; none where the intervals allow that they do not."""
-    before, out = {p.symbol: p for p in with_sign(first)}, []
-    for p in with_sign(second):
-        old = before.get(p.symbol)
-        if old is None:
-            continue
-        away, reach = p.value - old.value, float(np.hypot(p.high - p.low, old.high - old.low)) / 2.0
-        if abs(away) > reach:
-            out.append(replace(p, value=away, low=away - reach, high=away + reach))
-    return tuple(out)
-
-
-def with_sign(finding: Finding) -> tuple[Estimate, ...]:
-    """Parameters of a mistake, those of which a length alone is stated (late or early) with their sign."""
-    if finding.late_s is None:
-        return finding.parameters
-    away = [finding.late_s - p.value for p in finding.parameters]
-    return tuple(
-        replace(p, value=p.value + a, low=p.low + a, high=p.high + a)
-        for p, a in zip(finding.parameters, away, strict=True)
-    )
+def later_by(first: Finding, second: Finding) -> Estimate | None:
+    """By how much more a clock is late in the second set; None of other mistakes, or where intervals allow zero."""
+    if first.late_s is None or second.late_s is None:
+        return None
+    (old,), (new,) = first.parameters, second.parameters
+    away, reach = second.late_s - first.late_s, float(np.hypot(new.high - new.low, old.high - old.low)) / 2.0
+    return replace(new, value=away, low=away - reach, high=away + reach) if abs(away) > reach else None

@@ -54,8 +54,9 @@ FEWEST_RUNS = 3
 TARE_NOISE = 0.5
 """One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples."""
 WANDERS = {"zero": ("constant", "b_{own}"), "drift": ("linear in time", "b_{own}")}
-OF_OTHER_AXES = "of other axes", ("", "C_{own},{load}")
 """To what differs from run to run (`Effect.differs_between_runs`) how the names of its forms begin, and its symbol."""
+OF_OTHER_AXES = "of other axes", ("", "C_{own},{load}")
+"""The same of a load on another axis."""
 MOUNTED_RAD = 0.001
 """One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree."""
 WIDE = 20.0
@@ -424,12 +425,16 @@ def between(estimates: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.where(number > 1, found, 0.0)
 
 
+def role_of(effect: str) -> str:
+    """What of a reading an id says that differs from run to run; empty for nothing, and for what is no id."""
+    return catalogue()[effect].differs_between_runs if effect in catalogue() else ""
+
+
 def wandering_columns(
     terms: Sequence[Term], evidence: Evidence, loaded: Sequence[int], channel: int
 ) -> list[list[int]]:
     """Columns of a constant, of time, of the channel's own load and of each other load, all forms of each together."""
     own = AXES[channel]
-    roles = {effect.id: effect.differs_between_runs for effect in catalogue().values()}
     wanted = [(role, form, symbol.format(own=own)) for role, (form, symbol) in WANDERS.items()]
     wanted.append(("", "", f"gain_{'xyz'[channel % 3]}"))
     role, (form, symbol) = OF_OTHER_AXES
@@ -440,7 +445,7 @@ def wandering_columns(
         for term in terms:
             if term.kind == "value" and not role and term.key in ("gain", symbol):
                 found.append(evidence.start[term.key])
-            elif term.kind == "effect" and role and roles.get(term.effect) == role and term.form.name.startswith(form):
+            elif term.kind == "effect" and role and role_of(term.effect) == role and term.form.name.startswith(form):
                 names = [term.form.parameters[i].symbol for i in term.form.linear]
                 found += [evidence.start[term.key] + k for k, name in enumerate(names) if name == symbol]
         if found:
@@ -477,9 +482,9 @@ def mounted_anew(terms: Sequence[Term], setup: Setup) -> np.ndarray:
     The forms in which a coefficient stands have it in equal shares, so that their sum has it once.
     """
     scale = dict(zip(AXES, scales(setup.instrument.largest), strict=True))
-    (role, _), roles = OF_OTHER_AXES, {effect.id: effect.differs_between_runs for effect in catalogue().values()}
+    role, _ = OF_OTHER_AXES
     symbols = [
-        [t.form.parameters[i].symbol for i in t.form.linear] if roles.get(t.effect) == role else [""] * t.size
+        [t.form.parameters[i].symbol for i in t.form.linear] if role_of(t.effect) == role else [""] * t.size
         for t in terms
     ]
     every = [symbol for own in symbols for symbol in own]

@@ -43,34 +43,33 @@ ROUNDS = 4
 
 
 def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior) -> Found:
-    """The most probable changes between two sets on the same columns.
+    """The most probable changes between two sets on the same columns; as `weighed_changes`."""
+    return weighed_changes(base, new, spread, prior)[0]
+
+
+def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior) -> tuple[Found, float]:
+    """The most probable changes between two sets on the same columns, and their log posterior.
 
     `spread` (K,) is the one-sigma of each coefficient between flights in which nothing changed, in its unit. The
     leftover is learnt from both sets, from two ends: all that differs between them is leftover, and none of it is.
     Where both ends are about as probable the larger leftover is believed, as in one flight (`posterior.search.decide`).
+
+    The log posterior, nats, less a constant of the first set alone, is what variants of the second set are compared by:
+    as recorded or corrected for a mistake, with the columns of one chain or of another.
     """
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     nothing, all_of_it = np.zeros(len(unit)), difference_of(spectra)
     large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
-    gain = joint(spectra, small, spread) - joint(spectra, large, spread)
-    return small if gain > prior.leftover_nats else large
+    of_large, of_small = (joint(spectra, found, spread) for found in (large, small))
+    chosen, value = (small, of_small) if of_small - of_large > prior.leftover_nats else (large, of_large)
+    return chosen, value - 0.5 * float(new.square.sum())
 
 
 def held(new: Evidence, keys: Collection[str]) -> Evidence:
     """Evidence of the second set in which the terms `keys` did not change, by assumption."""
     terms = (replace(t, kind=UNCHANGED) if t.key in keys else t for t in new.terms)
     return replace(new, terms=tuple(terms))
-
-
-def evidence_for(base: Evidence, new: Evidence, found: Found, spread: np.ndarray) -> float:
-    """Log posterior of changes that were found between two sets, nats, less a constant of the first set alone.
-
-    By it variants of the second set are compared: as recorded, or corrected for a mistake.
-    """
-    unit = unit_of(base, new)
-    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    return joint(spectra, found, spread) - 0.5 * float(new.square.sum())
 
 
 def settled(
