@@ -28,10 +28,13 @@ ROUNDS = 3
 """Rounds in which the leftover is learnt from what the model leaves."""
 
 
-def absent(model: WrenchModel) -> tuple[UpperLimit, ...]:
-    """Upper limits of the ids that the fitted runs were tested for and that are not at work, the largest first."""
+def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
+    """Upper limits of the ids that the fitted runs were tested for and that are not at work, the largest first.
+
+    `found` is the posterior at the chosen model (`chosen_already`).
+    """
     effects = [t for t in model.regression.terms if t.kind == "effect"]
-    return limits_of(chosen_already(model), squares_of(model, effects))
+    return limits_of(found, squares_of(model, effects))
 
 
 def chosen_already(model: WrenchModel) -> Found:

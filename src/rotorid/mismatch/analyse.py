@@ -15,7 +15,7 @@ from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_
 from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
-from rotorid.mismatch.absent import absent
+from rotorid.mismatch.absent import absent, chosen_already
 from rotorid.mismatch.absorbed import absorbed_findings
 from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
 from rotorid.mismatch.decided import Decided, Watch, unwatched
@@ -39,6 +39,7 @@ from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.payload_windows import loads, on_board
 from rotorid.mismatch.posterior.limits import UpperLimit
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
+from rotorid.mismatch.probability import with_probabilities
 from rotorid.mismatch.refitted import refitted, values_alone
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.regression import Fit
@@ -117,9 +118,10 @@ def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float, watc
     findings, to_state = with_square_term(findings, to_state, model)
     if found.commanded:
         to_state = stated_of_commands(findings, to_state)
-    findings = together(findings)
+    chosen = chosen_already(model)
+    findings = with_probabilities(together(findings), chosen)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
-    limits = tuple(limit for limit in absent(model) if limit.id not in stated_ids)
+    limits = tuple(limit for limit in absent(model, chosen) if limit.id not in stated_ids)
     choice = Choice(recordings, split, found, to_state, scale, tuple(findings), limits, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.

@@ -32,6 +32,8 @@ def ledger(analysis: Analysis, verdict: Verdict) -> list[dict]:
 def of_finding(finding: Finding, analysis: Analysis) -> dict:
     """What decided on one id."""
     numbers: dict = {"p_value": finding.p_value} if finding.p_value < 1.0 else {}
+    if finding.probability is not None:
+        numbers["probability"] = finding.probability
     if finding.id in analysis.shares:
         numbers["share"] = analysis.shares[finding.id]
     if finding.gain is not None:
@@ -41,12 +43,12 @@ def of_finding(finding: Finding, analysis: Analysis) -> dict:
     if finding.status == "absorbed":
         return entry("absorbed_by_values", finding.id, numbers, finding.sentence)
     if finding.status == "suggested":
-        return entry("report_runs", finding.id, numbers, finding.objection)
+        return entry("suggested", finding.id, numbers, finding.objection)
     if finding.id not in analysis.without:
         return entry("mistakes_first", finding.id, numbers, finding.sentence)
     if finding.status == "ambiguous":
         return entry("class", finding.id, numbers, f"these data cannot distinguish {', '.join(finding.alternatives)}")
-    return entry("established", finding.id, numbers, "it passed every rule and is confirmed on the held-out runs")
+    return entry("established", finding.id, numbers, "it passed every rule")
 
 
 def entry(rule: str, on: str, numbers: dict | None = None, sentence: str = "") -> dict:

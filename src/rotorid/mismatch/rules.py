@@ -199,11 +199,7 @@ ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading
 
 # Statuses
 
-WORSE = rule("worse_on_report_runs", "An effect with which a channel is worse on the held-out runs is suggested.")
-NOT_BETTER = rule(
-    "not_better_on_report_runs",
-    "An effect with which no channel is significantly better on held-out runs is suggested.",
-)
+NOT_BETTER = rule("not_better", "An effect or value with which no channel is significantly better is suggested.")
 BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than the unmodelled residual is suggested.")
 SLIGHT = rule(
     "slight",

@@ -392,7 +392,7 @@ def _either(finding: Finding, analysis: Analysis) -> str:
 
 
 def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = (), why: str = "") -> str:
-    """A wrong value, or with `why` one that the held-out runs do not confirm."""
+    """A wrong value, or with `why` one that is only suggested."""
     believed, refitted, low, high = values
     words, unit = parameter_words(name)
     space = f" {unit}" if unit else ""

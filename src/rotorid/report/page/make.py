@@ -388,6 +388,10 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
             f" On held-out flight the error of the {channel_words(e.channels[0]) if e.channels else 'main channel'} "
             f"is {number(gain)} times what it is without this effect{between}."
         )
+        if low is not None and low > 1.0:
+            notes[0] += " It is larger with it: the fitted flights state this effect, the held-out ones contradict it."
+        elif high is not None and high >= 1.0:
+            notes[0] += " The held-out flights do not confirm it."
     others = [effect_words(i) for i in e.alternatives if i != e.id]
     if others:
         notes.append(
