@@ -10,12 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotorid.mismatch.posterior.evidence import evidence_from
-from rotorid.mismatch.posterior.leftover import spectrum_of
+from rotorid.mismatch.posterior.chosen import posterior_at
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
-from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.problem import problem_of
-from rotorid.mismatch.posterior.score import Posterior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import Regression, build
@@ -23,9 +19,6 @@ from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.wrench import WrenchModel, block_seconds
 from rotorid.recordings import Vehicle
-
-ROUNDS = 3
-"""Rounds in which the leftover is learnt from what the model leaves."""
 
 
 def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
@@ -38,7 +31,7 @@ def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
 
 
 def chosen_already(model: WrenchModel) -> Found:
-    """The posterior at the model that was chosen, with the leftover that this model leaves."""
+    """The posterior at the model of a flight that was chosen."""
     rate_hz = model.prepared.thinner.rate_hz
     regression = build(
         model.rows,
@@ -50,14 +43,8 @@ def chosen_already(model: WrenchModel) -> Found:
         model.contributions.noisy,
         *compared_alone(model.terms, model.rows),
         by_channel=True,
-    ).without_winds()
-    evidence, prior = evidence_from(regression), Prior()
-    spectrum, active = spectrum_of(evidence), tuple(sorted(model.selection.active))
-    variance = spectrum.variance_of_leftover(np.zeros(len(spectrum.unit)))
-    for _ in range(ROUNDS):
-        posterior = Posterior(problem_of(evidence, spectrum, variance, prior))
-        variance = posterior.leftover_of(active, spectrum)
-    return Found(posterior, active, posterior(active))
+    )
+    return posterior_at(regression.without_winds(), model.selection.active)
 
 
 def squares_of(model: WrenchModel, terms: Sequence[Term]) -> dict[str, np.ndarray]:

@@ -20,6 +20,7 @@ from rotorid.mismatch.words import (
     number,
     on_the_ground,
     parameter_words,
+    percent,
     percent_words,
     plus_minus,
     regime_words,
@@ -374,8 +375,12 @@ def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
 def _left_out(finding: Finding, share: float | None) -> str:
     """An established effect, or a fault of the recording, with its numbers and the share of the error that it takes."""
     named, sentence, parameters = capital(effect_words(finding.id)), finding.sentence.rstrip("."), _parameters(finding)
-    carries = "" if share is None else f", {100 * share:.0f} % of the error that goes"
-    numbers = f" ({parameters}{carries})" if parameters else f" ({carries[2:]})" if carries else ""
+    said = [
+        parameters,
+        "" if finding.probability is None else f"probability {percent(finding.probability)}",
+        "" if share is None else f"{100 * share:.0f} % of the error that goes",
+    ]
+    numbers = f" ({', '.join(filter(None, said))})" if any(said) else ""
     if _concerns_the_recording(finding):
         return f"{named}: {sentence}{numbers}."
     kept_out = f" It is not delivered: {finding.withheld}." if finding.withheld else ""
@@ -385,6 +390,7 @@ def _left_out(finding: Finding, share: float | None) -> str:
 def _either(finding: Finding, analysis: Analysis) -> str:
     names = [effect_words(i) for i in dict.fromkeys((finding.id, *finding.alternatives))]
     text = f"{capital('either ' if len(names) > 1 else '')}{listed(names, 'or')} was left out"
+    text += "" if finding.probability is None else f" (probability {percent(finding.probability)})"
     text += "; this recording cannot show which" if len(names) > 1 else "; this recording cannot settle it"
     # The next experiment is made for one class; it need not help with another.
     helps = analysis.next_manoeuvre and (not analysis.next_separates or finding.id in analysis.next_separates)

@@ -189,6 +189,11 @@ def percent_words(share: float) -> str:
     return f"{100 * share:.2g} %" if share < 0.995 else f"{float(f'{100 * share:.2g}'):.0f} %"
 
 
+def percent(probability: float) -> str:
+    """A probability as a percentage, 99.9 at most."""
+    return f"{min(99.9, 100 * probability):.3g} %"
+
+
 def sure(p_value: float) -> str:
     """How sure a p-value makes one: never more than 99.9 %, which no model of noise deserves."""
     if p_value < 1e-3:

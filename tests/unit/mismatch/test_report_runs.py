@@ -91,7 +91,8 @@ def test_what_is_chosen_does_not_depend_on_the_runs_held_out():
 @pytest.mark.parametrize("size_m_s2", [1.5, 30.0])
 def test_the_runs_held_out_change_no_status_and_report_what_they_contradict(size_m_s2):
     plain, other = analysed(0.0), analysed(size_m_s2)
-    assert [(f.id, f.status) for f in plain.findings] == [(f.id, f.status) for f in other.findings]
+    said = [[(f.id, f.status, f.probability) for f in a.findings] for a in (plain, other)]
+    assert said[0] == said[1]
     assert {f.id: f.status for f in other.findings}["rotor_drag"] == "established"
     assert plain.suggested_values == other.suggested_values
     gains = [{f.id: f for f in a.findings}["rotor_drag"].gain for a in (plain, other)]
@@ -275,4 +276,5 @@ def test_what_is_chosen_for_a_bench_does_not_depend_on_the_runs_held_out():
     chosen = [[(f.id, f.values, f.parameters) for f in a.findings if f.status in AT_WORK] for a in (plain, other)]
     assert chosen[0] == chosen[1] and [c[0] for c in chosen[0]] == ["crosstalk"]
     assert plain.improved == other.improved and plain.refitted == other.refitted and plain.values == other.values
-    assert [f.status for f in plain.findings] == [f.status for f in other.findings]
+    assert [(f.status, f.probability) for f in plain.findings] == [(f.status, f.probability) for f in other.findings]
+    assert {f.id: f.probability for f in plain.findings}["crosstalk"] > 0.99

@@ -8,7 +8,7 @@ from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.findings import CLAIMED, Estimate
 from rotorid.mismatch.instrument.columns import VALUE_NAMES
 from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.words import capital, effect_words, listed, number, parameter_words, percent_words
+from rotorid.mismatch.words import capital, effect_words, listed, number, parameter_words, percent, percent_words
 
 VALUES = frozenset(NAMES.values())
 WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the largest load"}
@@ -51,11 +51,6 @@ def change_words(change: Change) -> str:
     surely = "" if change.probability is None else f" (probability {percent(change.probability)})"
     verb = "may have changed" if change.status == "suggested" else "changed"
     return f"{capital(names)} {verb}{size}{surely}."
-
-
-def percent(probability: float) -> str:
-    """A probability as a percentage, 99.9 at most."""
-    return f"{min(99.9, 100 * probability):.3g} %"
 
 
 def name_words(name: str) -> str:

@@ -38,7 +38,7 @@ from rotorid.mismatch.instrument.columns import VALUE_NAMES, make_terms
 from rotorid.mismatch.instrument.curved_gain import curved_gains
 from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.mistakes import find_mistakes
-from rotorid.mismatch.instrument.model import ReadingModel, active_values, fitted_model
+from rotorid.mismatch.instrument.model import ReadingModel, active_values, chosen_already, fitted_model
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
@@ -46,6 +46,7 @@ from rotorid.mismatch.instrument.setup import Setup, set_up
 from rotorid.mismatch.leave_one_out import first_s, on_traces, without_values
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import parts_of
+from rotorid.mismatch.probability import with_probabilities
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import Selection
@@ -148,6 +149,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
 
     plain = values_of(Selection([], model.selection.fit))
     findings += absorbed_findings(model, values, findings)
+    findings = with_probabilities(findings, chosen_already(model))
     fit, moved_values = settled(model, values, model.selection.active)
     to_state = values if measured else stated_of_commands(findings, values)
     choice = Choice(

@@ -17,6 +17,8 @@ from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of, term_columns
 from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
+from rotorid.mismatch.posterior.chosen import posterior_at
+from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.regression import (
     MOST_ATTENUATION,
     Regression,
@@ -151,6 +153,15 @@ def kept_values(search: Search, active: Sequence[str]) -> list[str]:
     """Terms that are in every model next to the effects, less believed values that a form at work absorbs."""
     taken = {v for k in active for v in search.terms[k].form.takes_up}
     return [k for k in search.always if k not in taken]
+
+
+def chosen_already(model: ReadingModel) -> Found:
+    """The posterior at the model of a stand or bench that was chosen."""
+    rate_hz, filters = model.setup.rate_hz, model.regression.filters
+    block_s = model.rows_per_block / rate_hz
+    return posterior_at(
+        build(model.rows, model.terms, filters, everything, block_s, rate_hz, by_channel=True), model.selection.active
+    )
 
 
 def everything(run: str, time_s: float) -> bool:

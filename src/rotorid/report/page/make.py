@@ -39,6 +39,7 @@ from rotorid.mismatch.words import (
     listed,
     number,
     parameter_words,
+    percent,
     percent_words,
     plus_minus,
     regime_words,
@@ -381,6 +382,8 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
     form = form_of(finding)
     bounds = {p.symbol: p for p in form.parameters} if form else {}
     notes = [capital(sure(e.p_value)) + "." if e.p_value is not None else ""]
+    if e.probability is not None:
+        notes = [f"Probability {percent(e.probability)}."]
     if e.held_out_gain is not None and e.held_out_gain.rmse_ratio is not None:
         gain, (low, high) = e.held_out_gain.rmse_ratio, e.held_out_gain.interval_95
         between = f" (95 % interval {number(low)} to {number(high)})" if low is not None and high is not None else ""
