@@ -33,13 +33,14 @@ def test_an_effect_at_work_stays_established_and_one_that_is_not_there_does_not(
     assert ground.rule == "probability" and "its probability is" in ground.sentence
 
 
-def test_of_two_that_are_collinear_neither_is_established_and_their_class_is():
+def test_a_claim_with_collinear_rivals_becomes_a_class_with_them():
     same = found([0.05, 0.0, 0.0], ["rotor_drag"], alike=10.0)
-    (alone,) = with_probabilities(claims("rotor_drag"), same)
     members = ("frame_drag", "ground_effect", "rotor_drag")
+    (alone,) = with_probabilities(claims("rotor_drag"), same)
     (as_class,) = with_probabilities([Finding("rotor_drag", "ambiguous", alternatives=members)], same)
-    assert alone.probability < 0.99 and alone.status in ("suggested", "not_established")
-    assert as_class.status == "ambiguous" and as_class.probability > 0.99
+    for one in (alone, as_class):
+        assert one.status == "ambiguous" and one.probability > 0.99
+        assert "rotor_drag" in one.alternatives and set(one.alternatives) <= set(members)
 
 
 @pytest.mark.parametrize(("size", "status"), [(0.15, "not_established"), (0.235, "suggested"), (0.4, "established")])
