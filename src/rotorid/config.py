@@ -395,9 +395,6 @@ class Decisions(Section):
         description="Shell patterns on the names in workflow/plantings.tsv of those kept [names]."
     )
     studies: bool = Field(description="Whether the studies of real recordings are kept, too [true, false].")
-    chooser: Literal["search", "posterior"] = Field(
-        description="Who chooses the effects of a flight while it is judged; the posterior on this bench alone [name]."
-    )
 
 
 class Rules(Section):

@@ -36,7 +36,7 @@ def hashes_of_evidence():
     return {
         "drawing": bench.joint([CODE.of(path) for path in CONCEALING]),
         "planting": CODE.of("proof/rotorid_proof/plantings/sow.py"),
-        "engine": bench.joint([*judging, CONFIG.decisions.chooser]),
+        "engine": bench.joint(judging),
     }
 
 
@@ -56,7 +56,6 @@ rule collect_evidence:
         folder=EVIDENCE,
         public="results/recordings",
         hashes=hashes_of_evidence(),
-        chooser=CONFIG.decisions.chooser,
         code=code_of("collect_evidence"),
     log:
         "results/logs/collect_evidence.log",

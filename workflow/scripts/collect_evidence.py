@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rotorid.mismatch.choosing import KEPT, POSTERIOR
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.report import read_report
 from rotorid.report import log
@@ -86,18 +85,14 @@ class Sets:
             return Made(recordings, {"answer": json.loads(answer.read_text(encoding="utf-8"))})
 
 
-CHOOSERS = {"search": KEPT, "posterior": POSTERIOR}
-
-
-def main(items: Sequence[Item], folder: str, public: str, hashes: Mapping[str, str], chooser: str, out: str) -> None:
+def main(items: Sequence[Item], folder: str, public: str, hashes: Mapping[str, str], out: str) -> None:
     """Keep the evidence of `items` in `folder`, the most informative first, and write the names of its files to `out`.
 
-    `hashes` are those of the code that draws (`drawing`), plants (`planting`) and judges (`engine`); the `chooser`
-    chooses the effects of a flight.
+    `hashes` are those of the code that draws (`drawing`), plants (`planting`) and judges (`engine`).
     """
     sets = Sets(Path(public), hashes["drawing"], hashes["planting"])
     wanted = [item for item in in_order(items) if sets.available(item)]
-    stems = collect(wanted, Path(folder), sets.make, sets.source_of, hashes["engine"], CHOOSERS[chooser], log.progress)
+    stems = collect(wanted, Path(folder), sets.make, sets.source_of, hashes["engine"], log.progress)
     Path(out).write_text(json.dumps({"engine": hashes["engine"], "kept": stems}, indent=1) + "\n", encoding="utf-8")
 
 
@@ -108,6 +103,5 @@ if __name__ == "__main__":
             folder=snakemake.params.folder,
             public=snakemake.params.public,
             hashes=snakemake.params.hashes,
-            chooser=snakemake.params.chooser,
             out=snakemake.output.kept,
         )

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rotorid.mismatch.choosing import Choosing, chosen_by
+from rotorid.mismatch.absent import evidence_of
 from rotorid.mismatch.decided import Decided
 from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.posterior.evidence import Evidence, evidence_of
+from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.verdict import WrongValue, effect_verdict
 from rotorid.recordings import RecordingSet
 from rotorid.report.deliver import analysis_of, verdict_of
@@ -42,7 +42,6 @@ def collect(
     make: Make,
     source_of: Callable[[Item], str],
     engine: str,
-    how: Choosing,
     progress: Callable[[str], None],
 ) -> list[str]:
     """Keep the evidence of every item in `folder`; names of the files of all of them, made now or before.
@@ -59,8 +58,6 @@ def collect(
         Hash of what a set is made from: another hash is another set.
     engine
         Hash of the code that judges.
-    how
-        Who chooses the effects while it judges: another one's evidence is other evidence, and `engine` says so.
     progress
         Called with one line a set judged.
     """
@@ -78,8 +75,7 @@ def collect(
             progress(f"{name}: could not be made")
             continue
         start = time.perf_counter()
-        with chosen_by(how):
-            verdict, decided = judged(made.recordings)
+        verdict, decided = judged(made.recordings)
         kept = Kept(
             label=item.label,
             key=key,
@@ -90,7 +86,7 @@ def collect(
             verdict=verdict,
             selection=None if decided is None else selection_of(decided),
         )
-        evidence: Evidence | None = None if decided is None else evidence_of(decided.found)
+        evidence: Evidence | None = None if decided is None else evidence_of(decided.found.model)
         write(folder, kept, evidence, made.truth)
         progress(f"{name}: {kept.seconds:.0f} s")
     return stems

@@ -6,7 +6,6 @@ OPEN = (
     "changes",
     "changes.compare",
     "changes.words",
-    "choosing",
     "comparison",
     "consistency",
     "decided",

@@ -7,10 +7,12 @@ distance from the centre of mass.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from rotorid.mismatch.posterior.chosen import posterior_at
+from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.prepare import training_rule
@@ -32,8 +34,18 @@ def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
 
 def chosen_already(model: WrenchModel) -> Found:
     """The posterior at the model of a flight that was chosen."""
+    return posterior_at(by_channel(model), model.selection.active)
+
+
+def evidence_of(model: WrenchModel) -> Evidence:
+    """What a decision on a flight needs, and what was chosen."""
+    return replace(evidence_from(by_channel(model)), active=tuple(model.selection.active))
+
+
+def by_channel(model: WrenchModel) -> Regression:
+    """The regression of a flight with its products channel by channel."""
     rate_hz = model.prepared.thinner.rate_hz
-    regression = build(
+    return build(
         model.rows,
         model.terms,
         model.regression.filters,
@@ -43,8 +55,7 @@ def chosen_already(model: WrenchModel) -> Found:
         model.contributions.noisy,
         *compared_alone(model.terms, model.rows),
         by_channel=True,
-    )
-    return posterior_at(regression.without_winds(), model.selection.active)
+    ).without_winds()
 
 
 def squares_of(model: WrenchModel, terms: Sequence[Term]) -> dict[str, np.ndarray]:

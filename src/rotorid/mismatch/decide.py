@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
@@ -25,10 +25,6 @@ from rotorid.mismatch.select import (
     Selection,
 )
 from rotorid.mismatch.unknowns import UNKNOWNS
-
-if TYPE_CHECKING:
-    from rotorid.mismatch.posterior.choose import PosteriorSearch
-    from rotorid.mismatch.posterior.statements import Statement
 
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
@@ -104,14 +100,10 @@ class TermReport(NamedTuple):
     parameters: tuple[Estimate, ...]
     channels: tuple[str, ...]
     alternatives: Collection[str]
-    statement: Statement | None = None
-    """What the posterior states, where it decided."""
 
     @property
     def status(self) -> Status:
         """Its status."""
-        if self.statement is not None:
-            return self.statement.status
         return "ambiguous" if self.alternatives else "established"
 
 
@@ -130,8 +122,6 @@ def findings_of(search: Search, selection: Selection, report_of: Callable[[str],
             Finding(
                 id=term.effect,
                 status=own.status,
-                probability=None if own.statement is None else own.statement.probability,
-                objection="" if own.statement is None else own.statement.objection,
                 form=term.form,
                 values=tuple(float(v) for v in own.values),
                 equation=term.form.equation,
@@ -156,7 +146,7 @@ def findings_of(search: Search, selection: Selection, report_of: Callable[[str],
 def wrench_findings(
     contributions: Contributions,
     regression: Regression,
-    search: Search | PosteriorSearch,
+    search: Search,
     selection: Selection,
     noise: np.ndarray,
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
@@ -185,9 +175,7 @@ def wrench_findings(
                 for p, v, a, b in zip(term.form.parameters, values, low, high, strict=True)
             )
         names = tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels)
-        stated = selection.statements.get(key)
-        others = search.alternatives(key, selection.active) if stated is None else stated.alternatives
-        return TermReport(values, parameters, names, others, stated)
+        return TermReport(values, parameters, names, search.alternatives(key, selection.active))
 
     return findings_of(search, selection, report_of)
 

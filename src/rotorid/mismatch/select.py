@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from rotorid.mismatch.findings import Reason
 from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
-
-if TYPE_CHECKING:
-    from rotorid.mismatch.posterior.statements import Statement
 
 ENTER_P = 5e-5
 """A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
@@ -80,8 +76,6 @@ class Selection:
     p_values: dict[str, float] = field(default_factory=dict)
     trail: list[str] = field(default_factory=list)
     not_established: dict[str, str] = field(default_factory=dict)
-    statements: Mapping[str, Statement] = field(default_factory=dict)
-    """Key of an active term to what the posterior states of it; empty where no posterior decided."""
 
 
 @dataclass(frozen=True)

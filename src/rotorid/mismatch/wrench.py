@@ -13,13 +13,11 @@ from rotorid.effects.contract import Form
 from rotorid.effects.scale import rotor_radius_m
 from rotorid.effects.steady_wind import through_drag
 from rotorid.mismatch import rules
-from rotorid.mismatch.choosing import choosing
 from rotorid.mismatch.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import coefficient_of, coefficients, relative_change
 from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.posterior.choose import PosteriorSearch
 from rotorid.mismatch.prepare import Prepared, assemble_rows, form_terms, training_rule
 from rotorid.mismatch.regression import (
     AGREEMENT,
@@ -83,7 +81,7 @@ class WrenchModel:
     terms: list[Term]
     rows: list[Rows]
     regression: Regression
-    search: Search | PosteriorSearch
+    search: Search
     selection: Selection
     noise: np.ndarray
     """Noise of each of the twelve channels in the band of the rows, as the search took it."""
@@ -245,7 +243,6 @@ def searched(
         rate,
         noisy,
         *compared_alone(terms, rows),
-        by_channel=choosing().by_channel,
     )
     contributions = Contributions(rows, noisy, rate)
     per = max(2, int(rate))
@@ -264,13 +261,13 @@ def searched(
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
     known = np.zeros(12) if known_sizes is None else known_sizes
     ask = Questions(sizes_of, seconds.sizes, known)
-    search = choosing().search(regression.without_winds(), ask)
+    search = Search(regression.without_winds(), ask)
     selection = search.run(start)
     if search.widened:
         regression = regression.with_room(VALUE_LIMITS[1])
     if (wide := search.values_alone(selection)) is not None:
         regression = regression.with_room(VALUE_LIMITS[1])
-        search = choosing().search(wide, ask)
+        search = Search(wide, ask)
         selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 

@@ -11,14 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.mismatch.absent import evidence_of
 from rotorid.mismatch.analyse import analyse, with_noise_held_out
-from rotorid.mismatch.choosing import KEPT, POSTERIOR, chosen_by
 from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.mismatch.evidence import contribution, ratio_of, weighed
 from rotorid.mismatch.findings import Trace
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.ledger import ledger, text_of
-from rotorid.mismatch.posterior.evidence import evidence_of
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
@@ -60,25 +59,15 @@ def analysed(size_m_s2: float):
 
 def test_who_watches_is_told_what_the_fitted_runs_decide_and_nothing_of_the_others():
     told = []
-    with chosen_by(KEPT):
-        for size in (0.0, 1.5):
-            analyse(disturbed(size), watch=told.append)
+    for size in (0.0, 1.5):
+        analyse(disturbed(size), watch=told.append)
     plain, other = told
     assert "rotor_drag" in {f.id for f in plain.findings if f.status == "established"}
     assert "rotor_drag" not in {f.id for f in plain.outside}
     assert [f.id for f in plain.findings] == [f.id for f in other.findings] and plain.values == other.values
-    a, b = evidence_of(plain.found), evidence_of(other.found)
+    a, b = evidence_of(plain.found.model), evidence_of(other.found.model)
     np.testing.assert_array_equal(a.gram, b.gram)
     assert a.active == b.active and any(key.startswith("rotor_drag/") for key in a.active)
-
-
-def test_the_posterior_in_the_place_of_the_search_finds_the_drag_and_says_how_sure_it_is():
-    told = []
-    with chosen_by(POSTERIOR):
-        analyse(disturbed(0.0), watch=told.append)
-    (drag,) = [f for f in told[0].findings if f.id == "rotor_drag"]
-    assert drag.status == "established" and drag.probability > 0.99
-    assert not [f.id for f in told[0].findings if f.status in ("established", "ambiguous") and f is not drag]
 
 
 def test_what_is_chosen_does_not_depend_on_the_runs_held_out():

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from rotorid.mismatch.choosing import KEPT
 from rotorid_proof.decisions import truths
 from rotorid_proof.decisions.bench import rows_of
 from rotorid_proof.decisions.collect import Made, collect
@@ -166,7 +165,7 @@ def test_a_collection_goes_on_where_it_stopped_and_one_bad_set_does_not_end_it(t
     wanted = items(3, 5.0, "somewhere")
 
     def go(engine):
-        collect(wanted, tmp_path, make, lambda item: "source", engine, KEPT, lambda line: None)
+        collect(wanted, tmp_path, make, lambda item: "source", engine, lambda line: None)
         return [name[-1] for name in made]
 
     assert go("now") == ["0", "1", "2"]

@@ -7,16 +7,12 @@ saw them; it needs no recording and no code of an effect, so it can be kept in a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
 from rotorid.mismatch.regression import Regression
 from rotorid.mismatch.rows import Term
-
-if TYPE_CHECKING:
-    from rotorid.mismatch.fitted import Fitted
 
 
 @dataclass(frozen=True)
@@ -128,11 +124,6 @@ def term_of(term: Term) -> EvidenceTerm:
         resolution=float(term.form.resolution),
         of_reading=tuple((linear.index(p), linear.index(s)) for p, s in term.form.of_reading),
     )
-
-
-def evidence_of(found: Fitted) -> Evidence:
-    """What the last search on a flight saw, and what it chose."""
-    return replace(evidence_from(found.model.search.regression), active=tuple(found.model.selection.active))
 
 
 def evidence_from(regression: Regression) -> Evidence:

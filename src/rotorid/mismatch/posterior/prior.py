@@ -46,5 +46,3 @@ class Prior:
     channel may be what is wrong with that one's form. Chosen on 22 drawn flights (docs/proof/README.md)."""
     open_nats: float = 5.0
     """Nats that a model with another id in its place may be worse for that id to be looked at."""
-    beside_nats: float = 3.0
-    """Nats that a model with one effect more may be worse for what is stated to be uncertain by what it changes."""
