@@ -31,7 +31,7 @@ from rotorid.mismatch.evidence import weighed
 from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, RunWind, Trace
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
-from rotorid.mismatch.leave_one_out import without_each, without_values
+from rotorid.mismatch.leave_one_out import without_each
 from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, full_speed, stretches
@@ -52,7 +52,6 @@ from rotorid.mismatch.value_sides import sides_of_values
 from rotorid.mismatch.values import (
     changed_vehicle,
     contract_values,
-    names_of,
     only_throttle,
     speed_for_coefficients,
     stated_of_commands,
@@ -212,7 +211,6 @@ def account(
         traces=traces,
         between_sensors=between,
         without=without_each(found, seen, values, fit, findings, (*traces, *between)),
-        without_values=without_values(model, seen, values, moved, names_of(stated), (*traces, *between)),
         noise_floor=noise_floors(prepared, found),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(seen.segments, seen.prepared),

@@ -1,9 +1,9 @@
 """Whether what an effect explains is enough to state it, and what the held-out runs say of it.
 
-A selected effect stays established if on the fitted runs at least one channel is better with it (the whole interval of
-the ratio below 1), its main parameter is away from nothing, and what it contributes is more than what the model leaves
-over. Else it is too small to matter: not established, or suggested where it is not known to be at work. The held-out
-runs change no status: from them come the gain that is reported and the shares.
+A selected effect stays established if what it contributes to the fitted runs is more than what the model leaves over,
+if it takes a share of the error or gains much in some channel, and if its main parameter is away from nothing. Else it
+is too small to matter: not established, or suggested where it is not known to be at work. The held-out runs change no
+status: from them come the gain that is reported and the shares.
 """
 
 from __future__ import annotations
@@ -57,34 +57,16 @@ class Contribution:
     beyond_leftover: bool = True
     """Whether it contributes more than the model leaves over in some channel that it acts on."""
 
-    @property
-    def not_better(self) -> str:
-        """That no channel is better; empty where one is, or where nothing is known."""
-        worse = bool(self.ratios) and self.ratios[0].high >= 1.0
-        return "no channel is significantly better with it" if rules.NOT_BETTER(worse) else ""
-
-    @property
-    def objection(self) -> str:
-        """Why the effect is not established; empty where it is."""
-        if why := self.not_better:
-            return why
-        return "it is smaller than what the model leaves over" if rules.BELOW_LEFTOVER(not self.beyond_leftover) else ""
-
 
 def weighed(analysis: Analysis) -> Analysis:
-    """The analysis with the statuses of its effects and values that the fitted runs allow, and with the gains on the
-    held-out ones."""
+    """The analysis with the statuses of its effects that the fitted runs allow, and with the gains on the held-out
+    ones."""
     part = fitted_part(analysis)
     fitted, held = ([sign * part(t.run, t.time_s) > 0 for t in analysis.compared] for sign in (1, -1))
     shares = effect_shares(analysis, fitted)
-    findings = tuple(judged(f, analysis, fitted, held, shares.get(f.id, 0.0)) for f in analysis.findings)
-    against: dict[str, str] = {}
-    for names, left in analysis.without_values.items():
-        if why := contribution(analysis, left, fitted).not_better:
-            against |= {n: why for n in names if n not in against}
-    doubtful = {n: (analysis.values[n], why) for n, why in against.items()}
-    values = {n: v for n, v in analysis.values.items() if n not in doubtful}
-    return replace(analysis, findings=findings, values=values, suggested_values=doubtful)
+    return replace(
+        analysis, findings=tuple(judged(f, analysis, fitted, held, shares.get(f.id, 0.0)) for f in analysis.findings)
+    )
 
 
 def with_shares(analysis: Analysis) -> Analysis:
@@ -138,11 +120,14 @@ def judged(
         # What acts in a window of one run alone (a gust) belongs to that run and is reported there.
         windows = [in_windows(t, finding.windows) for t in analysis.compared]
         reported = contribution(analysis, without, windows, acts_on)
-    nothing = rules.MAY_BE_NOTHING(not away_from_nothing(finding))
-    reason = found.objection or ("every number of it may be nothing" if nothing else "")
     slight = found.ratios and found.ratios[0].value > LARGE_GAIN
-    if rules.SLIGHT(bool(not reason and share < LEAST_SHARE and slight and not finding.windows)):
-        reason = f"it carries {100 * share:.1f} % of the error that goes"
+    reason = ""
+    if rules.BELOW_LEFTOVER(not found.beyond_leftover):
+        reason = "it is smaller than what the model leaves over"
+    elif rules.MAY_BE_NOTHING(not away_from_nothing(finding)):
+        reason = "every number of it may be nothing"
+    elif rules.SLIGHT(bool(share < LEAST_SHARE and slight and not finding.windows)):
+        reason = f"it takes {100 * share:.1f} % of the error that goes"
     best = reported.ratios[0] if reported.ratios else None
     finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))
     return lowered(finding, reason) if reason else finding

@@ -161,10 +161,8 @@ class Analysis:
     """Two sensors of one quantity compared (`accelerometer_x` … `gyroscope_z`): effects are judged by them, too."""
     without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
     """To the id of a stated effect what is left of every trace of `compared` without it, all else fitted anew."""
-    without_values: Mapping[tuple[str, ...], tuple[np.ndarray, ...]] = field(default_factory=dict)
-    """To the names of a wrong value, and of every two, the same with them as believed."""
     suggested_values: Mapping[str, tuple[tuple[float, float, float, float], str]] = field(default_factory=dict)
-    """Values with which no channel is better, or that an open class would change: as in `values`, and why."""
+    """Values that an open class would change: as in `values`, and why."""
     shares: Mapping[str, float] = field(default_factory=dict)
     """To the id of a stated effect the part of the error that goes on the runs held out which goes without it."""
     effect_sizes: Mapping[str, Size] = field(default_factory=dict)

@@ -6,14 +6,13 @@ runs that neither was fitted to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 
 from rotorid.effects.catalogue import ids_of
-from rotorid.mismatch.delivered import FittedModel, Values, delivered_fit, residuals_of
+from rotorid.mismatch.delivered import Values, residuals_of
 from rotorid.mismatch.findings import CLAIMED, Finding, Trace
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.regression import Fit
@@ -61,39 +60,6 @@ def without_each(
             steady = np.zeros(3) if seen.wind is None else np.array([*seen.wind, 0.0])
             calm = [replace(s, motion=replace(s.motion, wind=steady)) for s in seen.segments]
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, calm, fit))
-    return out
-
-
-def without_values(
-    model: FittedModel,
-    seen: FittedModel,
-    values: Values,
-    moved: Values,
-    names: Mapping[str, Sequence[str]],
-    traces: Sequence[Trace],
-) -> dict[tuple[str, ...], tuple[np.ndarray, ...]]:
-    """To the names of every wrong value, and of every two, the residual (n,) of every trace with them as believed.
-
-    Two that make up for each other (a torque and the inertia that it turns) each look needed given the other.
-
-    Parameters
-    ----------
-    model, seen
-        What was chosen, and the same with the rows of every run.
-    values, moved
-        The values called wrong, and those that were corrected within their trust.
-    names
-        Name of a value to the keys of `values` that it stands for.
-    traces
-        Those of the analysis.
-    """
-    out = {}
-    for gone in [*combinations(names, 1), *combinations(names, 2)]:
-        keys = {k for name in gone for k in names[name]}
-        others = {k: v for k, v in values.items() if k not in keys}
-        fit = delivered_fit(model, [*others, *moved, *model.selection.active], others)[1]
-        left = residuals_of(seen, scaled_by_run(seen, fit))
-        out[gone] = on_traces(traces, seen.rows, left)
     return out
 
 

@@ -199,7 +199,6 @@ ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading
 
 # Statuses
 
-NOT_BETTER = rule("not_better", "An effect or value with which no channel is significantly better is suggested.")
 BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than the unmodelled residual is suggested.")
 SLIGHT = rule(
     "slight",

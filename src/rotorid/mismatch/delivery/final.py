@@ -75,7 +75,6 @@ def as_delivered(offered: Offered) -> Analysis:
             suggested_values=words.suggested_values,
             instead=words.instead,
             not_testable=words.not_testable,
-            without_values=words.without_values,
         )
     reasons, of_name = gated.withheld_values, names_of(offered.stated, offered.names)
     fell_back = [fell_back_note(key, why, offered.names) for key, why in gated.fell_back.items()]

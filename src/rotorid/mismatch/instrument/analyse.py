@@ -43,7 +43,7 @@ from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.leave_one_out import first_s, on_traces, without_values
+from rotorid.mismatch.leave_one_out import first_s, on_traces
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.probability import with_probabilities
@@ -52,7 +52,7 @@ from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import Selection
 from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.values import changed_vehicle, contract_values, names_of, stated_of_commands
+from rotorid.mismatch.values import changed_vehicle, contract_values, stated_of_commands
 from rotorid.mismatch.within_trust import in_words, settled
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -244,9 +244,6 @@ def account(
         notes=(*choice.remarks, *notes_of(setup)),
         corrected=in_words(moved_values, VALUE_NAMES),
         without=without_each(model, seen, choice.values, own_chain, list(findings), traces),
-        without_values=without_values(
-            model, seen, choice.values, moved_values, names_of(choice.stated, VALUE_NAMES), traces
-        ),
     )
 
 
