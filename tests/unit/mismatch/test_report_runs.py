@@ -88,17 +88,17 @@ def test_the_runs_held_out_change_no_status_and_report_what_they_contradict(size
     assert gains[0][2] < 1.0 and gains[1][0] > gains[0][0]
 
 
-def test_what_is_smaller_than_the_leftover_of_the_fitted_runs_does_not_stand():
+def test_what_takes_no_share_of_the_error_of_the_fitted_runs_does_not_stand():
     analysis = analysed(0.0)
     draw = np.random.default_rng(0)
     alike = tuple(t.after + 1e-3 * t.after.std() * draw.standard_normal(len(t.after)) for t in analysis.compared)
     judged = weighed(replace(analysis, without={**analysis.without, "rotor_drag": alike}))
     found = {f.id: f for f in judged.findings}["rotor_drag"]
-    assert found.status == "not_established" and "smaller than" in found.sentence and found.probability > 0.99
+    assert found.status == "not_established" and "takes 0.0 %" in found.sentence and found.probability > 0.99
     unsure = tuple(replace(f, probability=0.9) if f.id == "rotor_drag" else f for f in analysis.findings)
     judged = weighed(replace(analysis, findings=unsure, without={**analysis.without, "rotor_drag": alike}))
     found = {f.id: f for f in judged.findings}["rotor_drag"]
-    assert found.status == "suggested" and "smaller than" in found.objection
+    assert found.status == "suggested" and "takes 0.0 %" in found.objection
 
 
 @pytest.mark.parametrize("size_m_s2", [0.0, 1.5, 30.0])
@@ -218,7 +218,7 @@ def test_an_error_of_a_sensor_is_judged_by_what_two_sensors_say():
     )
     every = [np.ones(len(time_s), bool)] * 2
     found = contribution(analysis, (noise, noise + missed), every, ("force_z",))
-    assert found.ratios[0].channel == "accelerometer_z" and found.ratios[0].high < 0.8 and not found.objection
+    assert found.ratios[0].channel == "accelerometer_z" and found.ratios[0].high < 0.8 and found.beyond_leftover
 
 
 def test_noise_of_the_runs_held_out_counts_where_nothing_is_stated():
