@@ -36,6 +36,7 @@ OPEN = (
     "posterior.search",
     "posterior.statements",
     "prepare",
+    "probability",
     "regime",
     "regression",
     "rows",

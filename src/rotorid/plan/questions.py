@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.mismatch.absent import chosen_already
 from rotorid.mismatch.analyse import findings_inside, findings_outside
 from rotorid.mismatch.findings import CLAIMED, Finding
 from rotorid.mismatch.fitted import Fitted, fitted
@@ -15,6 +16,7 @@ from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ
 from rotorid.mismatch.next_flight import CURVES, beyond_flying
 from rotorid.mismatch.prepare import Prepared, parts_of, prepare
+from rotorid.mismatch.probability import with_probabilities
 from rotorid.mismatch.regression import Regression
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import COST_PER_PARAMETER
@@ -86,7 +88,8 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
     prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     delivered, _ = settled(found.model, found.values, found.model.selection.active)
-    findings = (*mistakes, *findings_outside(found, prepared), *findings_inside(found, prepared, delivered))
+    inside = with_probabilities(findings_inside(found, prepared, delivered), chosen_already(found.model))
+    findings = (*mistakes, *findings_outside(found, prepared), *inside)
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:
@@ -94,7 +97,7 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
         if found.commanded and finding.id in CURVES and finding.status in CLAIMED:
             # Whichever was found: known from commands alone the other would do as well.
             ids = tuple(sorted({*ids, *CURVES}))
-        if not ids and finding.id in suggested and finding.status == "established":
+        if not ids and finding.id in suggested and finding.status in ("established", "suggested"):
             ids = (finding.id,)
         if not ids or frozenset(ids) in seen:
             continue

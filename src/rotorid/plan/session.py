@@ -20,9 +20,16 @@ from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
 from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.mistakes import find_mistakes
-from rotorid.mismatch.instrument.model import ReadingModel, everything, fitted_model, whole_reading
+from rotorid.mismatch.instrument.model import (
+    ReadingModel,
+    chosen_already,
+    everything,
+    fitted_model,
+    whole_reading,
+)
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
 from rotorid.mismatch.prepare import parts_of
+from rotorid.mismatch.probability import with_probabilities
 from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.split import split_runs
@@ -121,7 +128,8 @@ def known_instrument(recordings: RecordingSet) -> KnownInstrument:
     model = with_plainer_forms(model, among)
     holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
-    for finding in (*reading_findings(model), *(() if chain is None else chain.findings)):
+    inside = with_probabilities(reading_findings(model), chosen_already(model))
+    for finding in (*inside, *(() if chain is None else chain.findings)):
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if not ids or any(set(ids) == set(q.ids) for q in questions):
             continue
