@@ -34,7 +34,7 @@ from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
 from rotorid.mismatch.split import split_runs
 from rotorid.plan.limits import SessionLimits
-from rotorid.plan.plan import Tried, chosen_pieces
+from rotorid.plan.plan import Tried, chosen_pieces, share_reached
 from rotorid.plan.questions import Question, question_of
 from rotorid.plan.separation import Information, Separation, of_set, separations, smallest_separation
 from rotorid.recordings import RecordingSet, Run
@@ -43,6 +43,7 @@ from rotorid.recordings import columns as c
 REST_S = 2.0
 """Unloaded before and after every step."""
 MOST_STEPS = 40
+STANDARD = "slow steps"
 STEP_S = 0.3
 """A change of the load from one level to the next takes this long."""
 
@@ -82,16 +83,13 @@ class KnownInstrument:
 
 
 @dataclass(frozen=True)
-class SessionPlan:
-    """What to do next on a stand or bench, and what is expected of it."""
+class SessionForecast:
+    """A session, and what is expected of it next to the set at hand."""
 
-    set: str
-    kind: str
-    limits: SessionLimits
+    name: str
+    """`chosen`, `second` (the best without the chosen one's first step), or `standard`."""
     steps: tuple[Step, ...]
-    table: pd.DataFrame
     questions: tuple[tuple[tuple[str, ...], tuple[Separation, ...]], ...]
-    unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -102,6 +100,23 @@ class SessionPlan:
     def sigma(self) -> float | None:
         """Smallest separation expected over all questions; None where nothing is compared."""
         return smallest_separation(self.questions)
+
+    def reached(self, target_sigma: float) -> float:
+        """Share of the way to all goals."""
+        return share_reached([s.sigma for _, found in self.questions for s in found], (), target_sigma)
+
+
+@dataclass(frozen=True)
+class SessionPlan(SessionForecast):
+    """What to do next on a stand or bench, and what else was considered."""
+
+    set: str
+    kind: str
+    limits: SessionLimits
+    table: pd.DataFrame
+    others: tuple[SessionForecast, ...] = ()
+    """What else was considered as a whole, the better one first."""
+    unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
 
     @property
     def settles(self) -> bool:
@@ -290,13 +305,34 @@ def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Inform
     return Information(gram, None, step.duration_s)
 
 
+def forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> SessionForecast:
+    """What is expected of steps taken."""
+    # What is mounted alike, and what is done alike, follows each other.
+    taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
+    before = of_set(known)
+    after = before
+    for t in taken:
+        after = after + t.information
+    questions = tuple((q.ids, tuple(separations(known, q, before, after))) for q in known.questions)
+    return SessionForecast(name, tuple(t.piece for t in taken), questions)
+
+
+def standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]:
+    """What is loaded without a plan: slowly up and down in every place, mounted level, as often as time allows."""
+    once = [t for t in tried if t.information is not None and t.piece.name.startswith(STANDARD)]
+    once = [t for t in once if t.piece.tilt_rad == (0.0, 0.0)]
+    seconds = sum(t.flown_s for t in once)
+    return once * min(int(limits.duration_s / seconds), MOST_STEPS // len(once)) if once else []
+
+
 def plan_session(
     known: KnownInstrument, limits: SessionLimits, progress: Callable[[str], None] = lambda text: None
 ) -> SessionPlan:
     """The steps that settle most in the time allowed; none where nothing is open or nothing helps."""
-    kind, name = known.recordings.vehicle.kind, known.recordings.name
+    about = {"set": known.recordings.name, "kind": known.recordings.vehicle.kind, "limits": limits}
+    about |= {"unanswerable": known.unanswerable}
     if not known.questions:
-        return SessionPlan(name, kind, limits, (), pd.DataFrame(), (), known.unanswerable)
+        return SessionPlan("chosen", (), (), **about, table=pd.DataFrame())
     terms, tried = asked(known), []
     for step in options(known, limits):
         try:
@@ -305,19 +341,18 @@ def plan_session(
             tried.append(Tried(step, None, step.duration_s, str(error)))
         progress(f"computed: {step.name}")
     taken, _ = chosen_pieces(known, limits, tried, MOST_STEPS)
-    # What is mounted alike, and what is done alike, follows each other.
-    taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
-    before = of_set(known)
-    after = before
-    for t in taken:
-        after = after + t.information
-    found = [(q.ids, tuple(separations(known, q, before, after))) for q in known.questions]
-    steps = tuple(t.piece for t in taken)
-    parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(steps)]
+    found = [forecast(known, "chosen", taken)]
+    rest = [t for t in tried if taken and t.piece is not taken[0].piece]
+    if second := chosen_pieces(known, limits, rest, MOST_STEPS)[0] if rest else []:
+        found.append(forecast(known, "second", second))
+    if usual := standard_steps(tried, limits):
+        found.append(forecast(known, "standard", usual))
+    found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
+    best, *others = found
+    parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(best.steps)]
     table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
     readings = [n for n in table.columns if n in c.FORCE + c.MOMENT]
-    table = table.drop(columns=readings)
-    return SessionPlan(name, kind, limits, steps, table, tuple(found), known.unanswerable)
+    return SessionPlan(**vars(best), **about, table=table.drop(columns=readings), others=tuple(others))
 
 
 def words_of_steps(steps: Sequence[Step]) -> list[str]:

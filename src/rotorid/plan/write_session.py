@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.plan.by_hand import by_hand
-from rotorid.plan.session import SessionPlan, words_of_steps
+from rotorid.plan.session import SessionForecast, SessionPlan, words_of_steps
 from rotorid.plan.write import outcome, questions_as_data, words_of
 from rotorid.recordings import columns as c
 from rotorid.report.plots.style import BLUE, GREY, ORANGE, RED, figure, use
@@ -30,6 +30,11 @@ def text(plan: SessionPlan) -> list[str]:
             f"Not all would be settled: the smallest separation is {plan.sigma:.1f} standard errors of "
             f"{plan.limits.target_sigma:g}. More time, load or tilt in the limits may do it."
         )
+    for other in plan.others:
+        if other.sigma is not None:
+            name = "The standard session" if other.name == "standard" else "The next best session"
+            words = ", ".join(dict.fromkeys(s.name for s in other.steps))
+            out.append(f"{name} ({words}), {other.duration_s:.0f} s: {other.sigma:.1f} standard errors at the least.")
     for ids, what in plan.unanswerable:
         out.append(f"No schedule with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
@@ -52,23 +57,38 @@ def summary(plan: SessionPlan) -> dict:
             "settles": plan.settles,
             "duration_s": plan.duration_s,
             "predicted_separation_sigma": plan.sigma,
-            "steps": [
-                {
-                    "run": f"step{i + 1:02d}",
-                    "name": s.name,
-                    "words": s.words,
-                    "duration_s": s.duration_s,
-                    "roll_deg": float(np.degrees(s.tilt_rad[0])),
-                    "pitch_deg": float(np.degrees(s.tilt_rad[1])),
-                }
-                for i, s in enumerate(plan.steps)
-            ],
+            "steps": steps_as_data(plan),
             "questions": questions_as_data(plan.questions, plan.limits.target_sigma),
+            "others": [
+                {
+                    "name": other.name,
+                    "duration_s": other.duration_s,
+                    "predicted_separation_sigma": other.sigma,
+                    "steps": steps_as_data(other),
+                    "questions": questions_as_data(other.questions, plan.limits.target_sigma),
+                }
+                for other in plan.others
+            ],
             "not_by_loading": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
             "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
             "limits": plan.limits.model_dump(mode="json"),
         }
     )
+
+
+def steps_as_data(session: SessionForecast) -> list[dict]:
+    """The steps of a session, in the order in which they are recorded."""
+    return [
+        {
+            "run": f"step{i + 1:02d}",
+            "name": s.name,
+            "words": s.words,
+            "duration_s": s.duration_s,
+            "roll_deg": float(np.degrees(s.tilt_rad[0])),
+            "pitch_deg": float(np.degrees(s.tilt_rad[1])),
+        }
+        for i, s in enumerate(session.steps)
+    ]
 
 
 def draw(plan: SessionPlan, path: Path) -> None:

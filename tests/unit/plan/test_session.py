@@ -1,5 +1,6 @@
 """Sessions of stands and benches: schedules, what a step would hold, and what a session settles."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -123,5 +124,10 @@ def test_a_session_settles_an_open_question_and_is_written(known, tmp_path: Path
     table = pd.read_csv(tmp_path / "plan" / "session.csv")
     assert table["run"].nunique() == len(plan.steps)
     assert not [n for n in table.columns if n.startswith(("force", "moment"))]
+    assert {other.name for other in (plan, *plan.others)} == {"chosen", "second", "standard"}
+    assert all(plan.reached(6.0) >= other.reached(6.0) - 0.01 for other in plan.others)
     said = write_session.text(plan)
+    assert any(line.startswith("The standard session (slow steps along z") for line in said)
+    written = json.loads((tmp_path / "plan" / "plan.json").read_text())["others"]
+    assert [o["name"] for o in written] == [o.name for o in plan.others] and all(o["steps"] for o in written)
     assert said[0].startswith(f"Record {len(plan.steps)} runs") and any(line.startswith("By hand") for line in said)
