@@ -40,6 +40,9 @@ UNCHANGED = "unchanged"
 RIDGE = 1e-4
 """Ridge of the fit of all columns from which the leftover is learnt, in units of their length."""
 ROUNDS = 4
+HIDDEN_NATS = 1e4
+"""Nats that a change costs without the parameter that makes its form that form (a payload without a mass): none may be
+stated. Two such forms share what one alone should have where their columns have different noise."""
 
 
 def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior) -> Found:
@@ -150,9 +153,10 @@ def problem_of_changes(
 
     Every effect may have changed, in any direction, and every value.
     """
+    prior = replace(prior, small_nats=HIDDEN_NATS)
     gram, cross = products_of_changes(spectra, variance, spread)
     unit, size, rows = spectra[1].unit, len(spectra[1].unit), spectra[1].rows
-    terms = {t.key: replace(as_change(t), must_show=()) for t in new.terms}
+    terms = {t.key: as_change(t) for t in new.terms}
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
