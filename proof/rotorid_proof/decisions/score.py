@@ -80,8 +80,10 @@ def statements(said: Said) -> list[tuple[frozenset[str], float]]:
     """Classes that a decision states, each with its probability; several of one class once, by the surest."""
     found: dict[frozenset[str], float] = {}
     for effect in said.get("effects", ()):
+        if effect["status"] not in PROBABILITY_OF:
+            continue  # at work or not, it is said not to matter
         stated = effect.get("probability")
-        probability = PROBABILITY_OF.get(effect["status"], 0.0) if stated is None else stated
+        probability = PROBABILITY_OF[effect["status"]] if stated is None else stated
         others = effect["alternatives"] if effect["status"] == "ambiguous" else ()
         members = frozenset({effect["id"], *others})
         found[members] = max(probability, found.get(members, 0.0))

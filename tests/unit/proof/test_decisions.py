@@ -220,4 +220,6 @@ def test_selection_is_said_with_a_word_of_its_own():
 
 @pytest.mark.parametrize("status", ["not_established", "absorbed"])
 def test_what_is_not_claimed_is_no_statement(status):
-    assert score_drawn(said(effect("payload", status)), ANSWER).counts.said_99 == 0
+    for probability in (None, 1.0):
+        unclaimed = {**effect("payload", status), "probability": probability}
+        assert score_drawn(said(unclaimed), ANSWER).counts.said_99 == 0
