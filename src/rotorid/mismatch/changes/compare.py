@@ -25,8 +25,8 @@ from rotorid.mismatch.changes.of_instruments import (
     instrument_reference_of,
     joint_of_instruments,
 )
-from rotorid.mismatch.changes.problem import NAMES
-from rotorid.mismatch.changes.usual import spread_of_flights, usual_spread
+from rotorid.mismatch.changes.problem import NAMES, change_of
+from rotorid.mismatch.changes.usual import form_spread, spread_of_flights, usual_spread
 from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.decide import relative_change
 from rotorid.mismatch.findings import CLAIMED, Estimate, Finding, Status
@@ -155,7 +155,15 @@ def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Opt
         at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new)
         return at.base, at.new
 
-    return options_of(first, products_at, yardstick(joint, reference.runs, prior), prior)
+    spread = yardstick(joint, reference.runs, prior)
+    options = options_of(first, products_at, spread, prior)
+    found = options[0].found
+    if len(found.model) > 1:
+        # What changed is known by its form, too, and what its form is wrong by is no second change.
+        change = change_of(found) * found.problem.unit
+        spread = np.hypot(spread, form_spread(joint.new, change, joint.form_sd))
+        options = options_of(first, products_at, spread, prior)
+    return options
 
 
 def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarray:

@@ -40,19 +40,30 @@ def usual_spread(
     the inertia, of the second vehicle.yaml over the first one's in each channel: residual noise grows with it.
     `form_sd` is the share of what effects contribute that their forms are wrong by.
     """
-    gram = base.gram.sum(axis=1)
     hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
-    own = np.einsum("ckk->ck", gram)
-    explained = np.einsum("k,ckl,l->c", known, gram, known)
-    total = np.maximum(own.sum(axis=0), TINY)
-    form = form_sd * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
-    out = np.zeros(len(known))
+    out = form_spread(base, known, form_sd)
     for term in base.terms:
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
             out[at] = np.hypot(SAME_SD if term.key in OF_THE_AIR else SAME_BODY_SD, hidden[at])
-        elif term.kind == "effect":
-            out[at] = form[at]
+    return out
+
+
+def form_spread(evidence: Evidence, known: np.ndarray, form_sd: float) -> np.ndarray:
+    """One-sigma (K,) of each effect's coefficient, in its unit, that other effects' forms look like.
+
+    Effects of coefficients `known` (K,) are wrong by a share `form_sd` of what they contribute to each channel.
+    """
+    gram = evidence.gram.sum(axis=1)
+    own = np.einsum("ckk->ck", gram)
+    explained = np.einsum("k,ckl,l->c", known, gram, known)
+    total = np.maximum(own.sum(axis=0), TINY)
+    form = form_sd * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
+    effects = [t for t in evidence.terms if t.kind == "effect"]
+    out = np.zeros(len(known))
+    for term in effects:
+        at = evidence.start[term.key] + np.arange(term.size)
+        out[at] = form[at]
     return out
 
 
