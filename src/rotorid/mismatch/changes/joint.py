@@ -20,11 +20,12 @@ from rotorid.mismatch.changes.chain import (
     turning,
 )
 from rotorid.mismatch.changes.problem import decide_changes
-from rotorid.mismatch.changes.usual import FORM_SD, of_environments
+from rotorid.mismatch.changes.usual import of_environments
 from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.search import Found

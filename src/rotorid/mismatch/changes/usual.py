@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.leftover import FULL_RIDGE, TINY
 from rotorid.mismatch.posterior.score import places, scored
@@ -25,8 +26,6 @@ SAME_SD, SAME_BODY_SD = 0.01, 0.003
 its density by a hundredth), and of mass, inertia and arm."""
 OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
-FORM_SD = 0.02
-"""Share of what the first set's effects contribute to a channel that may differ there by their forms."""
 FEWEST_FLIGHTS = 3
 """Two good flights give one difference alone, of which no variance is known."""
 
