@@ -90,7 +90,7 @@ def main(
     limits: str,
     code: str = "",
     most: int | None = None,
-    draws: tuple[int, ...] = (5, 6),
+    draws: tuple[int, ...] = (7, 8),
 ) -> None:
     """Write `table` (a row a set) and `summary`; rows are kept in `so_far` as they come.
 
