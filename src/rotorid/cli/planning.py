@@ -56,7 +56,7 @@ def plan(
             if flight:
                 said, files, picture = flight_plan(source, content, allowed, wishes, out or folder / "plan", step)
             else:
-                said, files, picture = session_plan(source, allowed, out or folder / "plan", step)
+                said, files, picture = session_plan(source, content, allowed, out or folder / "plan", step)
             onto_page(folder / "report.html", source.name, said, picture)
         for line in said:
             typer.echo(line)
@@ -71,18 +71,24 @@ def flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder
     from rotorid.recordings.sufficient import sufficient
 
     suggested = [e["id"] for e in content["effects"] if e["status"] == "suggested"]
-    made = make_plan(known(sufficient(source), suggested), allowed, wishes, step)
+    made = make_plan(known(sufficient(source), suggested, claimed_in(content)), allowed, wishes, step)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.pieces else None
 
 
-def session_plan(source, allowed, folder: Path, step):
+def claimed_in(content: dict) -> set[str]:
+    """Ids that a verdict claims, and the members of its classes."""
+    claims = [e for e in content["effects"] if e["status"] in ("established", "ambiguous")]
+    return {i for e in claims for i in (e["id"], *e["alternatives"])}
+
+
+def session_plan(source, content: dict, allowed, folder: Path, step):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.session import known_instrument, plan_session
     from rotorid.plan.write_session import text, write
     from rotorid.recordings.sufficient import sufficient
 
-    made = plan_session(known_instrument(sufficient(source)), allowed, step)
+    made = plan_session(known_instrument(sufficient(source), claimed_in(content)), allowed, step)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.steps else None
 

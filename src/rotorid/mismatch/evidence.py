@@ -138,9 +138,7 @@ def lowered(finding: Finding, reason: str) -> Finding:
     if finding.probability is None or finding.probability < SURE:
         return replace(finding, status="suggested", objection=reason)
     sentence = f"{catalogue()[finding.id].name} is not established: {reason}"
-    return replace(
-        finding, status="not_established", objection=reason, sentence=sentence, rule="too_small", alternatives=()
-    )
+    return replace(finding, status="not_established", sentence=sentence, rule="too_small", alternatives=())
 
 
 def in_windows(trace: Trace, windows: tuple[tuple[str, float, float], ...]) -> np.ndarray:

@@ -74,7 +74,7 @@ def widths(known: Known, before: Information, after: Information, wishes: dict[s
             out.append(Width(name, SHARE, *sizes, wished))
     for key in model.selection.active:
         term = model.search.terms[key]
-        if not term.form.linear or term.run:
+        if not term.form.linear or term.run or term.effect in UNKNOWNS:
             continue
         for index, column in zip(term.form.linear, regression.columns([key]), strict=True):
             parameter = term.form.parameters[index]

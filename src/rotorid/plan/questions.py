@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,8 +72,16 @@ class Known:
         return self.fitted.model.search.regression if self.whitened is None else self.whitened
 
 
-def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: float = HIGHEST_CUTOFF_HZ) -> Known:
+def known(
+    recordings: RecordingSet,
+    suggested: Sequence[str] = (),
+    claimed: Collection[str] | None = None,
+    cutoff_hz: float = HIGHEST_CUTOFF_HZ,
+) -> Known:
     """The set fitted, and its open questions: classes left open, and ids in `suggested` that may as well be nothing.
+
+    Of ids that the verdict on the set does not claim (`claimed`, all members of its classes) nothing is asked: they are
+    too small to matter.
 
     Raises
     ------
@@ -93,6 +101,8 @@ def known(recordings: RecordingSet, suggested: Sequence[str] = (), cutoff_hz: fl
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:
+        if claimed is not None and finding.id not in {*claimed, *suggested}:
+            continue
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if found.commanded and finding.id in CURVES and finding.status in CLAIMED:
             # Whichever was found: known from commands alone the other would do as well.

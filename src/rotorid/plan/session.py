@@ -7,7 +7,7 @@ columns that every competing effect would have in it; separations are predicted 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -124,8 +124,11 @@ class SessionPlan(SessionForecast):
         return self.sigma is not None and self.sigma >= self.limits.target_sigma
 
 
-def known_instrument(recordings: RecordingSet) -> KnownInstrument:
-    """The set fitted as `rotorid.mismatch.instrument.analyse` does, and its open questions."""
+def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None = None) -> KnownInstrument:
+    """The set fitted as `rotorid.mismatch.instrument.analyse` does, and its open questions.
+
+    Of ids that the verdict on the set does not claim (`claimed`) nothing is asked.
+    """
     recordings, mistakes, _ = find_mistakes(recordings)
     part, _ = parts_of(recordings, split_runs(recordings))
     setup = set_up(part, recordings)
@@ -146,6 +149,8 @@ def known_instrument(recordings: RecordingSet) -> KnownInstrument:
     inside = with_probabilities(reading_findings(model), chosen_already(model))
     for finding in (*inside, *(() if chain is None else chain.findings)):
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
+        if claimed is not None and finding.id not in claimed:
+            continue
         if not ids or any(set(ids) == set(q.ids) for q in questions):
             continue
         question = question_of(holder, finding, ids)
