@@ -55,7 +55,7 @@ def draw(plan: Plan, path: Path) -> None:
         ax.tick_params(axis="x", which="minor", bottom=False)
         most = max(s.interval_95[1] for s in found)
         ax.set(xlabel="separation [standard errors]", ylim=(-0.6, len(found) - 0.4), xlim=(-0.3, 1.3 * most))
-        ax.set_title("Ring: so far. Dot: with this flight. Line: wanted")
+        ax.set_title("Ring: so far. Dot: with this flight. Line: wanted", loc="right")
     else:
         ax.set_axis_off()
     fig.savefig(path, format="png")

@@ -124,7 +124,7 @@ def draw(plan: SessionPlan, path: Path) -> None:
     axes[1].set_xscale("symlog", linthresh=3)
     most = max(s.interval_95[1] for s in found)
     axes[1].set(xlabel="separation [standard errors]", ylim=(-0.6, len(found) - 0.4), xlim=(-0.3, 1.3 * most))
-    axes[1].set_title("Ring: so far. Dot: with this session. Line: wanted")
+    axes[1].set_title("Ring: so far. Dot: with this session. Line: wanted", loc="right")
     fig.savefig(path, format="png")
 
 
