@@ -75,4 +75,6 @@ EFFECT = Effect(
     separating_manoeuvre="a static six-face calibration",
     separating_columns=("position",),
     kind="sensor",
+    # MEMS: half a milli-g a kelvin and a few from turn-on to turn-on (InvenSense MPU-6000, product specification 6.2).
+    between_flights={"m/s2": 0.05, "rad": 0.003},
 )

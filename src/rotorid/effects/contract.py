@@ -10,8 +10,8 @@ Frames: world north-east-down, body forward-right-down. All functions take n ins
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -337,6 +337,8 @@ class Effect:
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     curves_thrust: bool = False
     """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
+    between_flights: Mapping[str, float] = field(default_factory=dict)
+    """To a unit the one-sigma of its parameters of that unit between two flights in which nothing changed."""
     differs_between_runs: Literal["", "zero", "drift", "of other axes"] = ""
     """What of a reading it is that differs from run to run of one day where nothing changed; empty for nothing."""
     remedy: Literal["", "calibrate", "zero"] = ""

@@ -1,6 +1,7 @@
 """By how much flights of one vehicle differ in which nothing changed: the yardstick of a change.
 
-- A believed value differs a little from flight to flight (air, battery, temperature).
+- A believed value differs a little from flight to flight (air, battery, temperature), and so does the zero of a sensor
+  (`Effect.between_flights`).
 - The form of an effect is a few per cent wrong; seen at other speeds that looks like a little of another effect.
 - What differs between the good flights themselves (a load that swings, a hand that moved the battery) may differ again
   by as much. It is found by the very decision that finds changes, one good flight against the others.
@@ -13,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.leftover import FULL_RIDGE, TINY
@@ -42,6 +44,9 @@ def usual_spread(
     hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
     out = form_spread(base, known, form_sd)
     for term in base.terms:
+        if term.effect in catalogue() and (usual := catalogue()[term.effect].between_flights):
+            at = base.start[term.key] + np.arange(len(term.linear))
+            out[at] = np.hypot(out[at], [usual.get(p.unit, 0.0) for p in term.linear])
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
             out[at] = np.hypot(SAME_SD if term.key in OF_THE_AIR else SAME_BODY_SD, hidden[at])
