@@ -60,7 +60,7 @@ SETS = {
     "air": lambda: with_table(
         recorded(1, 2, flight={"drag": 0.35, "wind": (3.0, 1.0), "duration_s": 15}, vehicle=quad(**LIMITS)), pushed
     ),
-    "mass": lambda: recorded(29, 30, flight={"drag": 0.014, "duration_s": 12}, vehicle=quad(mass_kg=0.5, **LIMITS)),
+    "mass": lambda: recorded(17, 18, flight={"drag": 0.0115, "duration_s": 12}, vehicle=quad(mass_kg=0.5, **LIMITS)),
     "gyroscope": lambda: with_table(recorded(5, 6, flight={"duration_s": 10}, vehicle=quad(**LIMITS)), turned),
     "pitch": lambda: recorded(7, 8, flight={"drag": 0.02, "duration_s": 12}, vehicle=weak_pitch()),
 }
