@@ -95,7 +95,7 @@ def read(
     Raises
     ------
     InputError
-        A path is neither; two have the same name.
+        A path is neither.
     """
     from rotorid.recordings import read_set
     from rotorid.recordings.importers.logfile import is_bag

@@ -79,6 +79,6 @@ EFFECT = Effect(
     confusers=("inertia_products",),
     separating_manoeuvre="record ten seconds at rest before take-off",
     kind="sensor",
-    # MEMS: its zero from turn-on to turn-on once the start has been averaged; a board on rubber turns a little.
+    # Assumed: a zero that was averaged before take-off, and a board on rubber that turns a little.
     between_flights={"rad/s": 0.01, "rad": 0.003},
 )

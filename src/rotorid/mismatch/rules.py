@@ -199,12 +199,12 @@ ONE_LOAD = rule("one_load", "On one rotor that does not tilt, thrust and reading
 
 # Statuses
 
-BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than the unmodelled residual is suggested.")
+BELOW_LEFTOVER = rule("below_leftover", "An effect smaller than the unmodelled residual is not established.")
 SLIGHT = rule(
     "slight",
-    "An effect with next to no share of the explained error and no large gain in any channel is suggested.",
+    "An effect with next to no share of the explained error and no large gain in any channel is not established.",
 )
-MAY_BE_NOTHING = rule("may_be_nothing", "An effect without a significant parameter is suggested.")
+MAY_BE_NOTHING = rule("may_be_nothing", "An effect without a significant parameter is not established.")
 
 
 def markdown() -> str:

@@ -99,10 +99,10 @@ def known(
     inside = with_probabilities(findings_inside(found, prepared, delivered), chosen_already(found.model))
     findings = (*mistakes, *findings_outside(found, prepared), *inside)
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
+    if claimed is not None:
+        findings = tuple(f for f in findings if f.id in claimed or f.id in suggested)
     questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:
-        if claimed is not None and finding.id not in {*claimed, *suggested}:
-            continue
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if found.commanded and finding.id in CURVES and finding.status in CLAIMED:
             # Whichever was found: known from commands alone the other would do as well.

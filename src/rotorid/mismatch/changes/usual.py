@@ -44,12 +44,12 @@ def usual_spread(
     hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
     out = form_spread(base, known, form_sd)
     for term in base.terms:
-        if term.effect in catalogue() and (usual := catalogue()[term.effect].between_flights):
-            at = base.start[term.key] + np.arange(len(term.linear))
-            out[at] = np.hypot(out[at], [usual.get(p.unit, 0.0) for p in term.linear])
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
             out[at] = np.hypot(SAME_SD if term.key in OF_THE_AIR else SAME_BODY_SD, hidden[at])
+        elif term.effect in catalogue() and term.linear:
+            usual = catalogue()[term.effect].between_flights
+            out[at] = np.hypot(out[at], [usual.get(p.unit, 0.0) for p in term.linear])
     return out
 
 
@@ -63,11 +63,11 @@ def form_spread(evidence: Evidence, known: np.ndarray, form_sd: float) -> np.nda
     explained = np.einsum("k,ckl,l->c", known, gram, known)
     total = np.maximum(own.sum(axis=0), TINY)
     form = form_sd * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
-    effects = [t for t in evidence.terms if t.kind == "effect"]
     out = np.zeros(len(known))
-    for term in effects:
-        at = evidence.start[term.key] + np.arange(term.size)
-        out[at] = form[at]
+    for term in evidence.terms:
+        if term.kind == "effect":
+            at = evidence.start[term.key] + np.arange(term.size)
+            out[at] = form[at]
     return out
 
 
