@@ -338,8 +338,14 @@ def believed(sheet: Sheet, rng, kit: Kit):
 def make(family: str, seed: int):
     """The set of a family and a seed, its truth and its noise-free tables."""
     sheet, kit = drafted(family, seed)
-    craft = sheet.craft
     vehicle, off = believed(sheet, np.random.default_rng([seed, 22]), kit)
+    return finished(sheet, kit, vehicle, off, *recorded(sheet, kit, vehicle, seed), seed)
+
+
+def recorded(sheet: Sheet, kit: Kit, vehicle: dict, seed: int):
+    """Tables of the runs as written, as perfect instruments would have written them, rms values by channel, windows of
+    mistakes, and what a blade-element rotor's parts amount to."""
+    craft = sheet.craft
     tables, ideals, channels, windows = {}, {}, {}, []
     lag = max(sheet.nature.lag + sheet.nature.second, 0.02)
     flown = replace(craft, slow=min(craft.slow, 0.045 / lag))
@@ -357,7 +363,7 @@ def make(family: str, seed: int):
             except Strayed:
                 continue
         else:
-            raise Strayed(f"{family}, seed {seed}: not held in any size of flight")
+            raise Strayed(f"seed {seed}, {name}: not held in any size of flight")
         flight["sag"] = sheet.nature.sag
         a, b = record(flight, kit, craft.hover, rng)
         ideals[name], tables[name] = (edited(x, sheet, i, rng, kit) for x in (a, b))
@@ -374,7 +380,7 @@ def make(family: str, seed: int):
             same.choice(3)
             first = int(same.uniform(0.3, 0.6) * len(t))
             windows.append({"id": "sensor_dropout", "run": name, "start_s": t[first], "stop_s": t[first] + 2.5})
-    return finished(sheet, kit, vehicle, off, tables, ideals, channels, windows, parts, seed)
+    return tables, ideals, channels, windows, parts
 
 
 def blade_parts(craft: Craft, flight: dict) -> dict[str, float]:

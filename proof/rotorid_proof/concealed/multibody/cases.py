@@ -383,9 +383,14 @@ def believed(draft: Draft, rng: np.random.Generator, grade: logger.Grade) -> tup
 def make(family: str, seed: int):
     """The set of a family and a seed, its truth and its noise-free tables."""
     draft, grade, runs = drafted(family, seed)
-    quad = draft.quad
     vehicle_file, off = believed(draft, np.random.default_rng([seed, 2]), grade)
-    tables, ideals, channels, flown = {}, {}, {}, {}
+    return finished(draft, grade, vehicle_file, off, *recorded(draft, grade, runs, vehicle_file, seed), seed)
+
+
+def recorded(draft: Draft, grade: logger.Grade, runs, vehicle_file: dict, seed: int):
+    """Tables of the runs as written, as perfect instruments would have written them, and rms values by channel."""
+    quad = draft.quad
+    tables, ideals, channels = {}, {}, {}
     for i, (kinds, seconds) in enumerate(runs):
         name = f"run{i + 1:02d}"
         for agility in (0.9, 0.65, 0.45):
@@ -400,14 +405,13 @@ def make(family: str, seed: int):
             except Lost:
                 continue
         else:
-            raise Lost(f"{family}, seed {seed}: not held in any size of flight")
+            raise Lost(f"seed {seed}, {name}: not held in any size of flight")
         ideals[name], tables[name] = logger.record(flight, grade, quad.hover, noise, rng)
-        flown[name] = flight
         a, b = residuals(ideals[name], vehicle_file), residuals(tables[name], vehicle_file)
         channels[name] = {
             c: {"noise_rms": rms(b[c] - a[c]), "mismatch_rms": rms(a[c]), "before_rms": rms(b[c])} for c in a
         }
-    return finished(draft, grade, vehicle_file, off, tables, ideals, channels, seed)
+    return tables, ideals, channels
 
 
 def finished(draft, grade, vehicle_file, off, tables, ideals, channels, seed):

@@ -35,6 +35,9 @@ LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 """Relative change of a value up to which it does not matter, and the largest."""
 LEAST_GAIN = 0.005
 """The least one of a reading's gain."""
+CHANGE_REACH = 10.0
+"""One-sigma of a change at least, in units of what noise and the usual difference of flights leave unknown of it: it
+then shrinks by a hundredth."""
 UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
 RIDGE = 1e-4
@@ -160,8 +163,9 @@ def problem_of_changes(
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
-    # What one row says is little next to what flights differ by anyway: a change is wider than that.
-    sd = np.hypot(sd, prior.value_reach * in_units(spread, unit))
+    # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change.
+    known = np.diag(gram) > 0
+    sd[known] = np.maximum(sd[known], CHANGE_REACH / np.sqrt(np.diag(gram)[known]))
     for key, effect in effects.items():
         if effect in NAMES.values() and (own := unit[columns_of[key]]).all():
             sd[columns_of[key]] = prior.freed_sd[0] / own
