@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.findings import CLAIMED
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.select import Search
 from rotorid.recordings.templates import read
 from rotorid.vehicle.control.swings import swings

@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.prepare import assemble_rows, prepare, training_rule
+from rotorid.mismatch.prepare import assemble_rows, prepare
 from rotorid.mismatch.regime import regime_variables
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES
+from rotorid.mismatch.split import training_rule
 from rotorid.mismatch.values import believed_value
 from rotorid.recordings import RecordingSet
 

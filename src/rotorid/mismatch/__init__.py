@@ -35,6 +35,7 @@ OPEN = (
     "posterior.prior",
     "posterior.search",
     "posterior.statements",
+    "posterior.status",
     "prepare",
     "probability",
     "regime",

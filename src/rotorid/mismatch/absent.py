@@ -15,9 +15,9 @@ from rotorid.mismatch.posterior.chosen import posterior_at
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.prepare import training_rule
 from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.split import training_rule
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.wrench import WrenchModel, block_seconds
 from rotorid.recordings import Vehicle

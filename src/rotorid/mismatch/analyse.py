@@ -17,7 +17,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch import rules, within_trust
 from rotorid.mismatch.absent import absent, chosen_already
 from rotorid.mismatch.absorbed import absorbed_findings
-from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
+from rotorid.mismatch.decide import coefficients, exchangeable, throttle_or_thrust, wrench_findings
 from rotorid.mismatch.decided import Decided, Watch, unwatched
 from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
@@ -28,7 +28,7 @@ from rotorid.mismatch.delivery.stated import restated
 from rotorid.mismatch.delivery.usable import own_faults, question_of
 from rotorid.mismatch.dependence import dependence
 from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, RunWind, Trace
+from rotorid.mismatch.findings import Analysis, Finding, RunWind, Trace
 from rotorid.mismatch.fitted import Fitted, fitted
 from rotorid.mismatch.gusts import gust_finding
 from rotorid.mismatch.leave_one_out import without_each
@@ -38,7 +38,8 @@ from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, full_speed, stretches
 from rotorid.mismatch.next_flight import next_flight
 from rotorid.mismatch.payload_windows import loads, on_board
 from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.prepare import Prepared, parts_of, prepare
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
+from rotorid.mismatch.prepare import Prepared, prepare
 from rotorid.mismatch.probability import with_probabilities
 from rotorid.mismatch.refitted import refitted, values_alone
 from rotorid.mismatch.regime import regime_variables
@@ -47,7 +48,7 @@ from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.speedpath import CommandChain, SpeedResult, commanded_path
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.split import parts_of, split_runs
 from rotorid.mismatch.value_sides import sides_of_values
 from rotorid.mismatch.values import (
     changed_vehicle,
@@ -465,15 +466,6 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
             f = replace(f, status="ambiguous", alternatives=tuple(sorted({f.id, load.id, *f.alternatives})))
         out.append(f)
     return out
-
-
-def throttle_or_thrust(finding: Finding) -> Finding:
-    """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
-    same = catalogue()[finding.id].same_on_commands if finding.id in catalogue() else ""
-    if not rules.THROTTLE_OR_THRUST(bool(same) and finding.status in CLAIMED):
-        return finding
-    both = tuple(sorted({finding.id, same, *finding.alternatives}))
-    return replace(finding, status="ambiguous", alternatives=both)
 
 
 def make_traces(

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, with_status
+from rotorid.mismatch.findings import Analysis, Finding, with_status
+from rotorid.mismatch.posterior.status import CLAIMED
 
 if TYPE_CHECKING:
     from rotorid.mismatch.verdict import Channel, Errors, Location

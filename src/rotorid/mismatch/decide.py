@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -12,7 +13,8 @@ from scipy.stats import t as student
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch import rules
 from rotorid.mismatch.contributions import Contributions
-from rotorid.mismatch.findings import Estimate, Finding, Status
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.mismatch.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression
 from rotorid.mismatch.rows import CHANNELS, Rows
 from rotorid.mismatch.select import (
@@ -314,6 +316,15 @@ def exchangeable(
         if as_well := [changes for still, changes in found if still < most]:
             out[key] = as_well
     return out
+
+
+def throttle_or_thrust(finding: Finding) -> Finding:
+    """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
+    same = catalogue()[finding.id].same_on_commands if finding.id in catalogue() else ""
+    if not rules.THROTTLE_OR_THRUST(bool(same) and finding.status in CLAIMED):
+        return finding
+    both = tuple(sorted({finding.id, same, *finding.alternatives}))
+    return replace(finding, status="ambiguous", alternatives=both)
 
 
 def relative_change(key: str, coefficient: float, sd: float, measured_moment: bool = False) -> tuple[float, float]:

@@ -16,8 +16,9 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch import rules
 from rotorid.mismatch.comparison import VOTES_FROM
-from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
+from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.posterior.statements import SURE
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.shares import fitted_part
 from rotorid.mismatch.sizes import effect_sizes, scales
 

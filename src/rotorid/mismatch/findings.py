@@ -11,16 +11,13 @@ import numpy as np
 
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Instrument, Loading
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Split, Vehicle
 from rotorid.recordings.doubts import Doubt
 
 if TYPE_CHECKING:
     from rotorid.mismatch.posterior.limits import UpperLimit
     from rotorid.mismatch.sizes import Size
-
-CLAIMED = ("established", "ambiguous")
-"""Statuses of what is held to be at work."""
-Status = Literal["established", "ambiguous", "suggested", "absorbed", "not_established"]
 
 
 class Reason(str):
@@ -33,17 +30,6 @@ class Reason(str):
         made = super().__new__(cls, text)
         made.rule = rule
         return made
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A fitted number with its 95 % interval."""
-
-    symbol: str
-    value: float
-    unit: str
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)

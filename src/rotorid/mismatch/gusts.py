@@ -17,11 +17,13 @@ from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.mismatch import rules
 from rotorid.mismatch.bursts import gust_terms, windows
 from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import Prepared, assemble_rows, training_rule
+from rotorid.mismatch.posterior.status import Estimate
+from rotorid.mismatch.prepare import Prepared, assemble_rows
 from rotorid.mismatch.regression import Fit, Regression, build
 from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.split import training_rule
 from rotorid.mismatch.wrench import (
     WrenchModel,
     after_residual,

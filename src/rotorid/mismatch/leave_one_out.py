@@ -13,8 +13,9 @@ import numpy as np
 
 from rotorid.effects.catalogue import ids_of
 from rotorid.mismatch.delivered import Values, residuals_of
-from rotorid.mismatch.findings import CLAIMED, Finding, Trace
+from rotorid.mismatch.findings import Finding, Trace
 from rotorid.mismatch.fitted import Fitted
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.report_runs import rows_of, scaled_by_run
 from rotorid.mismatch.rows import CHANNELS, Rows

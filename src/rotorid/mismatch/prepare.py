@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -41,14 +40,12 @@ from rotorid.mismatch.rows import (
 from rotorid.mismatch.rows import (
     measured_moment as moment_of,
 )
-from rotorid.mismatch.split import HELD_OUT_SHARE, split_runs
+from rotorid.mismatch.split import split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS, empirical_effects
 from rotorid.mismatch.voltmeter import without_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
-GAP_S = 2.0
-"""Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
 LOWEST_TO_MEAN = 1.08
@@ -62,39 +59,6 @@ PIECE_SAMPLES, SMOOTHED = 256, 9
 are averaged."""
 MOST_NOISE_SAMPLES = 8192
 """Samples of a column that its noise level is read from."""
-
-
-def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float], bool | None]:
-    """Whether a block is fitted (True), held out (False) or in the gap between (None).
-
-    Whole runs where there are several; of a single run the last third, after a gap of GAP_S.
-    """
-    if split.held_out != split.training:
-        return lambda run, time_s: run in split.training
-    border = split.border_s
-    if border is None:
-        start = min(s.motion.time_s[0] for s in segments)
-        stop = max(s.motion.time_s[-1] for s in segments)
-        border = start + (stop - start) * (1 - HELD_OUT_SHARE)
-
-    def rule(run: str, time_s: float) -> bool | None:
-        if abs(time_s - border) < GAP_S / 2:
-            return None
-        return bool(time_s < border)
-
-    return rule
-
-
-def parts_of(recordings: RecordingSet, split: Split) -> tuple[RecordingSet, RecordingSet]:
-    """The set with its fitted runs alone, and with the runs held out; of a single run its two parts, a gap between."""
-    if split.held_out != split.training:
-        fitted, held = ([r for r in recordings.runs if r.name in names] for names in (split.training, split.held_out))
-    else:
-        (run,) = recordings.runs
-        early = run.time_s < split.border_s - GAP_S / 2
-        late = run.time_s >= split.border_s + GAP_S / 2
-        fitted, held = ([Run(run.name, run.table[mask].reset_index(drop=True))] for mask in (early, late))
-    return tuple(replace(recordings, runs=tuple(runs), held_out=()) for runs in (fitted, held))
 
 
 def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) -> float:

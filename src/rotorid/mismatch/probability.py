@@ -10,9 +10,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.findings import CLAIMED, Finding
+from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
+from rotorid.mismatch.posterior.status import CLAIMED
 
 
 def with_probabilities(findings: Iterable[Finding], found: Found) -> list[Finding]:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from rotorid.mismatch.consistency import by_share, carrying, quoted
-from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, one_per_class, with_status
+from rotorid.mismatch.findings import Analysis, Finding, one_per_class, with_status
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 from rotorid.mismatch.sizes import Size, channel_size, metres_words, scales, share_words
 from rotorid.mismatch.words import (
     capital,

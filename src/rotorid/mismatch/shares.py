@@ -9,10 +9,10 @@ import numpy as np
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.findings import Analysis, Finding
-from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz, build_segments, full_speed
-from rotorid.mismatch.prepare import training_rule
+from rotorid.mismatch.readings import form_reading
 from rotorid.mismatch.rows import project
+from rotorid.mismatch.split import training_rule
 
 GROUPS = ("force", "moment", "accelerometer", "gyroscope")
 

@@ -10,11 +10,14 @@ model describes it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 from math import comb
 
 import numpy as np
 
+from rotorid.mismatch.motion import Segment
 from rotorid.recordings import RecordingSet, Run, Split
 from rotorid.recordings import columns as c
 
@@ -25,6 +28,8 @@ WORTH_MOVING = 0.05
 LEAST_SHARE = 0.5
 """Of its even share: with less of some kind held out, or fitted, up to half of the runs are held out instead."""
 NEAR_GROUND_M = 0.3
+GAP_S = 2.0
+"""Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 
 
 def split_runs(recordings: RecordingSet) -> Split:
@@ -42,6 +47,39 @@ def split_runs(recordings: RecordingSet) -> Split:
     else:
         held = [names[k] for k in chosen_runs(recordings)]
     return Split(tuple(n for n in names if n not in held), tuple(held))
+
+
+def training_rule(split: Split, segments: list[Segment]) -> Callable[[str, float], bool | None]:
+    """Whether a block is fitted (True), held out (False) or in the gap between (None).
+
+    Whole runs where there are several; of a single run the last third, after a gap of GAP_S.
+    """
+    if split.held_out != split.training:
+        return lambda run, time_s: run in split.training
+    border = split.border_s
+    if border is None:
+        start = min(s.motion.time_s[0] for s in segments)
+        stop = max(s.motion.time_s[-1] for s in segments)
+        border = start + (stop - start) * (1 - HELD_OUT_SHARE)
+
+    def rule(run: str, time_s: float) -> bool | None:
+        if abs(time_s - border) < GAP_S / 2:
+            return None
+        return bool(time_s < border)
+
+    return rule
+
+
+def parts_of(recordings: RecordingSet, split: Split) -> tuple[RecordingSet, RecordingSet]:
+    """The set with its fitted runs alone, and with the runs held out; of a single run its two parts, a gap between."""
+    if split.held_out != split.training:
+        fitted, held = ([r for r in recordings.runs if r.name in names] for names in (split.training, split.held_out))
+    else:
+        (run,) = recordings.runs
+        early = run.time_s < split.border_s - GAP_S / 2
+        late = run.time_s >= split.border_s + GAP_S / 2
+        fitted, held = ([Run(run.name, run.table[mask].reset_index(drop=True))] for mask in (early, late))
+    return tuple(replace(recordings, runs=tuple(runs), held_out=()) for runs in (fitted, held))
 
 
 def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rotorid.mismatch.decide import WIDEST_TRUST, coefficients
-from rotorid.mismatch.prepare import assemble_rows, training_rule
+from rotorid.mismatch.prepare import assemble_rows
 from rotorid.mismatch.regression import VALUE_LIMITS, Regression, build
 from rotorid.mismatch.rows import winds_last
 from rotorid.mismatch.select import VALUE_FLOOR
+from rotorid.mismatch.split import training_rule
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.wrench import SURE_Z, WrenchModel, after_residual, block_seconds, chosen, model_filters
 from rotorid.recordings.signal.kernels import low_pass

@@ -15,7 +15,8 @@ from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import SMALLEST_CHANGE, VALUE_Z
 from rotorid.mismatch.delivered import Values
-from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding
+from rotorid.mismatch.findings import Analysis, Finding
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 from rotorid.mismatch.rows import PARAMETER_NAMES
 from rotorid.mismatch.words import effect_words, listed
 from rotorid.mismatch.wrench import WrenchModel

@@ -18,7 +18,7 @@ from rotorid.mismatch.contributions import Contributions
 from rotorid.mismatch.decide import coefficient_of, coefficients, relative_change
 from rotorid.mismatch.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import Prepared, assemble_rows, form_terms, training_rule
+from rotorid.mismatch.prepare import Prepared, assemble_rows, form_terms
 from rotorid.mismatch.regression import (
     AGREEMENT,
     VALUE_LIMITS,
@@ -40,6 +40,7 @@ from rotorid.mismatch.speedpath import (
     commanded_path,
     smoothed_acceleration,
 )
+from rotorid.mismatch.split import training_rule
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle

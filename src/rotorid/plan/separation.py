@@ -23,9 +23,10 @@ from rotorid.mismatch.absent import scales
 from rotorid.mismatch.comparison import ENVIRONMENT_S
 from rotorid.mismatch.motion import Segment
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.prepare import assemble_rows, prepare_like, training_rule
+from rotorid.mismatch.prepare import assemble_rows, prepare_like
 from rotorid.mismatch.regression import Regression, autoregression, build, ridge_inverse
 from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.split import training_rule
 from rotorid.mismatch.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
 from rotorid.plan.between import interval as chain_interval
 from rotorid.plan.between import squares

@@ -28,11 +28,10 @@ from rotorid.mismatch.instrument.model import (
     whole_reading,
 )
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
-from rotorid.mismatch.prepare import parts_of
 from rotorid.mismatch.probability import with_probabilities
 from rotorid.mismatch.regression import Regression, build
 from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.split import parts_of, split_runs
 from rotorid.plan.limits import SessionLimits
 from rotorid.plan.plan import Tried, chosen_pieces, share_reached
 from rotorid.plan.questions import Question, question_of

@@ -15,7 +15,8 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.mismatch.comparison import ENVIRONMENT_S
-from rotorid.mismatch.findings import CLAIMED, Analysis, Finding
+from rotorid.mismatch.findings import Analysis, Finding
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.split import split_runs
 from rotorid.recordings import RecordingSet, Run
 

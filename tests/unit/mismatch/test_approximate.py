@@ -12,9 +12,10 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.loading import forms_of, rotation_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.approximate import hats, later, without_leftovers_of_forms
-from rotorid.mismatch.instrument.columns import OFFSET, form_reading, make_terms
+from rotorid.mismatch.instrument.columns import OFFSET, make_terms
 from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model, reading_model
 from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
+from rotorid.mismatch.readings import form_reading
 from rotorid.mismatch.voltmeter import is_noise
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from tests.unit.mismatch.test_instrument import instrument_for, stand_loading, stand_vehicle

@@ -11,10 +11,11 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import settling
 from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.columns import form_reading, make_terms
+from rotorid.mismatch.instrument.columns import make_terms
 from rotorid.mismatch.instrument.model import kept_values, reading_model
 from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
+from rotorid.mismatch.readings import form_reading
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.recordings import RecordingSet, Run, Vehicle
 

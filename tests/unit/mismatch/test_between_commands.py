@@ -9,8 +9,7 @@ from rotorid.effects.contract import Motion, SpeedPath
 from rotorid.effects.motor_lag import lagged
 from rotorid.mismatch.instrument.chain import find_chain, moved_between_samples, unknown_courses
 from rotorid.mismatch.instrument.setup import set_up, with_speed
-from rotorid.mismatch.prepare import parts_of
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 DT_S, TAU_S = 0.01, 0.03

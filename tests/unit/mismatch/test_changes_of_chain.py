@@ -11,8 +11,9 @@ import pytest
 from rotorid.mismatch.changes.chain import chain_terms
 from rotorid.mismatch.changes.compare import changes_in, decided_of_speeds, mistakes_that_differ
 from rotorid.mismatch.changes.notes import command_notes
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.mismatch.speedpath import CommandChain
 
 from .test_speedpath import FULL, recorded, searched

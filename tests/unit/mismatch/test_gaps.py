@@ -7,8 +7,8 @@ import pytest
 
 from rotorid.effects.amplifier_filter import EFFECT as AMPLIFIER
 from rotorid.effects.loading import forms_of
-from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.instrument.setup import pieces_of, set_up
+from rotorid.mismatch.readings import form_reading
 from rotorid.recordings import Run
 
 from .test_instrument import RATE_HZ, bench_set

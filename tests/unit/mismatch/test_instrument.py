@@ -12,11 +12,12 @@ from rotorid.effects.loading import Instrument, Loading, at_sensor, forms_of, ro
 from rotorid.errors import InputError
 from rotorid.mismatch.delivery.files import read_instruments
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.columns import form_reading, value_column
+from rotorid.mismatch.instrument.columns import value_column
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import size_of_columns
 from rotorid.mismatch.instrument.sampling import step_of
 from rotorid.mismatch.instrument.setup import set_up
+from rotorid.mismatch.readings import form_reading
 from rotorid.mismatch.rows import Rows
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_vehicle
 from rotorid.report.deliver import deliver

@@ -11,7 +11,6 @@ import pytest
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.prepare import (
     DEFAULT_TRUST,
-    GAP_S,
     form_terms,
     make_terms,
     prepare,
@@ -19,9 +18,9 @@ from rotorid.mismatch.prepare import (
     representative,
     sensor_noise,
     split_runs,
-    training_rule,
     white_level,
 )
+from rotorid.mismatch.split import GAP_S, training_rule
 from rotorid.recordings import RecordingSet, Run, Split
 from rotorid.recordings import columns as c
 

@@ -18,8 +18,7 @@ from rotorid.mismatch.evidence import contribution, ratio_of, weighed
 from rotorid.mismatch.findings import Trace
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.ledger import ledger, text_of
-from rotorid.mismatch.prepare import parts_of
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.report.deliver import verdict_of
 from tests.unit.mismatch.flights import Flight

@@ -5,12 +5,12 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.loading import bracketed
-from rotorid.mismatch.findings import Estimate
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.chain import find_chain
 from rotorid.mismatch.instrument.columns import make_terms
 from rotorid.mismatch.instrument.decide import wider
 from rotorid.mismatch.instrument.setup import set_up
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.mismatch.sentences import _wrong, surest
 from rotorid.recordings import RecordingSet, Run, Vehicle
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.mismatch.values import without_scale_of_curve
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from rotorid.mismatch.decide import coefficients, relative_change
 from rotorid.mismatch.fitted import Fitted, fitted
-from rotorid.mismatch.prepare import parts_of, prepare
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.prepare import prepare
+from rotorid.mismatch.split import parts_of, split_runs
 from rotorid.mismatch.value_sides import sides_of_values
 from rotorid.mismatch.within_trust import settled
 

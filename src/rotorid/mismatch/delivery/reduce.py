@@ -16,9 +16,10 @@ from rotorid.mismatch.delivered import Values
 from rotorid.mismatch.fitted import Fitted
 from rotorid.mismatch.leave_one_out import chain_without, without_wind
 from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import assemble_rows, training_rule
+from rotorid.mismatch.prepare import assemble_rows
 from rotorid.mismatch.regression import build
 from rotorid.mismatch.select import Selection
+from rotorid.mismatch.split import training_rule
 from rotorid.mismatch.two_sensors import compared_alone
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.wrench import WrenchModel, block_seconds, path_segments

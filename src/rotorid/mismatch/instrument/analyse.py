@@ -17,14 +17,13 @@ from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
 from rotorid.mismatch import rules
 from rotorid.mismatch.absorbed import absorbed_findings
-from rotorid.mismatch.analyse import throttle_or_thrust
-from rotorid.mismatch.decide import wrong_values
+from rotorid.mismatch.decide import throttle_or_thrust, wrong_values
 from rotorid.mismatch.delivered import Values, residuals_of
 from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
 from rotorid.mismatch.delivery.gate import Gated, Offer
 from rotorid.mismatch.delivery.parts import claimed
 from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
+from rotorid.mismatch.findings import Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
 from rotorid.mismatch.instrument.chain import (
     ChainResult,
@@ -45,12 +44,12 @@ from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
 from rotorid.mismatch.leave_one_out import first_s, on_traces
 from rotorid.mismatch.next_flight import next_flight
-from rotorid.mismatch.prepare import parts_of
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.probability import with_probabilities
 from rotorid.mismatch.regression import Fit
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.select import Selection
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.split import parts_of, split_runs
 from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.mismatch.values import changed_vehicle, contract_values, stated_of_commands
 from rotorid.mismatch.within_trust import in_words, settled

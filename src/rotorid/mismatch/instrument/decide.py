@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch import rules
 from rotorid.mismatch.decide import TermReport, estimates, findings_of
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.findings import Finding
 from rotorid.mismatch.instrument.approximate import LeftOfForm
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
@@ -18,6 +18,7 @@ from rotorid.mismatch.instrument.model import (
     doubt_of_form,
     nonlinear_deviation,
 )
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.mismatch.rows import Term
 from rotorid.mismatch.unknowns import UNKNOWNS
 

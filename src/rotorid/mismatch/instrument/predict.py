@@ -12,8 +12,8 @@ from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.errors import InputError
 from rotorid.mismatch.delivery.files import Instruments, instruments_of
 from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.instrument.setup import full_voltage_of, loaded_by, with_speed
+from rotorid.mismatch.readings import form_reading
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import speeds_of_commands
 
