@@ -11,7 +11,7 @@ from typing import Literal
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
-from rotorid.mismatch.findings import Analysis, Finding, one_per_class
+from rotorid.mismatch.decision.findings import Analysis, Finding, one_per_class
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import Vehicle
 

@@ -10,10 +10,10 @@ from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import Effect, Form, not_testable_reason
 from rotorid.effects.loading import NO_ROTORS, Instrument, Loading, forms_of, weight
 from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
-from rotorid.mismatch.prepare import form_terms
-from rotorid.mismatch.readings import form_reading
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.model.prepare import form_terms
+from rotorid.mismatch.plant.readings import form_reading
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "gain": 0.03}

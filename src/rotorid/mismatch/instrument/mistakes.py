@@ -12,7 +12,7 @@ from itertools import permutations
 import numpy as np
 
 from rotorid.effects.loading import CHANNELS
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.instrument.setup import Setup, loaded_by, set_up, with_speed
 from rotorid.mismatch.mistakes import dropout
 from rotorid.mismatch.posterior.status import Estimate

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes.signals import scaled, sensor_columns
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet
