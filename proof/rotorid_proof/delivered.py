@@ -11,10 +11,10 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.delivery.parts import delivered, improved_vehicle
 from rotorid.mismatch.delivery.usable import question_of
-from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.verdict import Verdict
+from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_set
 from rotorid.report.deliver import analysis_of, verdict_of
 from rotorid.vehicle.exports import export_vehicle

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, fields
 import numpy as np
 import pandas as pd
 
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import Known, Question, best_of
 from rotorid.plan.separation import Separation

@@ -21,7 +21,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from rotorid.errors import InputError
 from rotorid.io.text.wording import LONGEST, explained
-from rotorid.mismatch.rules import RULES
+from rotorid.mismatch.decision.rules import RULES
 from rotorid.vehicle.control.readings import READING_S
 
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
@@ -398,7 +398,7 @@ class Decisions(Section):
 
 
 class Rules(Section):
-    """Rules of the mismatch stage (`rotorid.mismatch.rules`)."""
+    """Rules of the mismatch stage (`rotorid.mismatch.decision.rules`)."""
 
     off: list[Text] = Field(description="Rules that are left out of every verdict [names].")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.mismatch.verdict import Verdict
+from rotorid.mismatch.tell.verdict import Verdict
 from tests.invariance.changes import Changed
 
 CLAIMED = ("established", "ambiguous")

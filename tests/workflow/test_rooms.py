@@ -66,12 +66,17 @@ def imported(path: Path) -> Iterator[str]:
             yield from (name if name in MODULES else base for name in inside if name in MODULES or base in MODULES)
 
 
-def opened(name: str) -> tuple[str, ...]:
-    """`OPEN` of a room: the modules that others may import; `plots.*` stands for all of a package."""
+def stated(name: str, what: str) -> tuple[str, ...]:
+    """A tuple of names that a package states, `OPEN` or `ROOMS`; empty where it states none."""
     for node in ast.parse(MODULES[name].read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "OPEN":
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == what:
             return ast.literal_eval(node.value)
     return ()
+
+
+def opened(name: str) -> tuple[str, ...]:
+    """`OPEN` of a room: the modules that others may import; `plots.*` stands for all of a package."""
+    return stated(name, "OPEN")
 
 
 def past_the_facade(name: str) -> bool:
@@ -94,6 +99,29 @@ def test_a_room_imports_from_lower_ones_and_by_their_facades_alone(name: str) ->
     below = ASIDE.get(own) or set(ORDER[: ORDER.index(own)])
     assert {room(module) for module in others} <= below
     assert not {module for module in others if past_the_facade(module)}
+
+
+MISMATCH = "rotorid.mismatch"
+INSIDE = sorted(name for name in MODULES if name.startswith(f"{MISMATCH}."))
+
+
+def part(name: str) -> str:
+    """The sub-room of a module of the mismatch stage."""
+    return name.removeprefix(f"{MISMATCH}.").split(".")[0]
+
+
+def test_every_part_of_the_mismatch_stage_has_its_place_in_the_order() -> None:
+    assert sorted(stated(MISMATCH, "ROOMS")) == sorted({part(name) for name in INSIDE})
+    packages = {name for name in INSIDE if MODULES[name].name == "__init__.py"}
+    assert all(ast.get_docstring(ast.parse(MODULES[name].read_text(encoding="utf-8"))) for name in packages)
+
+
+@pytest.mark.parametrize("name", INSIDE)
+def test_a_part_of_the_mismatch_stage_imports_from_lower_ones_alone(name: str) -> None:
+    order = stated(MISMATCH, "ROOMS")
+    others = {part(module) for module in imported(MODULES[name]) if module in INSIDE} - {part(name)}
+    assert others <= set(order[: order.index(part(name))])
+    assert MISMATCH not in set(imported(MODULES[name]))
 
 
 @pytest.mark.parametrize("path", OUTSIDE, ids=lambda path: str(path.relative_to(ROOT)))

@@ -27,7 +27,7 @@ KEPT_ITEMS = [
 if not KEPT_ITEMS:
     refuse("config.yaml: decisions.seeds, decisions.plantings and decisions.studies leave no set")
 # What judges a set is the mismatch stage without its page: another layout of that is no other evidence.
-JUDGING = ["analyse", "instrument/analyse", "verdict"]
+JUDGING = ["analyse", "instrument/analyse", "tell/verdict"]
 
 
 def hashes_of_evidence():

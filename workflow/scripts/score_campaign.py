@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.io.text.files import read_yaml
-from rotorid.mismatch.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
+from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
 from rotorid.recordings import read_set
 from rotorid.report import log
 from rotorid_proof import campaign, quoted

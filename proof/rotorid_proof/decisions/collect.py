@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rotorid.mismatch.absent import evidence_of
-from rotorid.mismatch.decided import Decided
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.model.absent import evidence_of
+from rotorid.mismatch.model.decided import Decided
 from rotorid.mismatch.posterior.evidence import Evidence
-from rotorid.mismatch.verdict import WrongValue, effect_verdict
+from rotorid.mismatch.tell.verdict import WrongValue, effect_verdict
 from rotorid.recordings import RecordingSet
 from rotorid.report.deliver import analysis_of, verdict_of
 from rotorid_proof.decisions.plan import Item

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.findings import CLAIMED
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.search import decide
 from rotorid.mismatch.posterior.statements import Statement, statements_of
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid_proof.decisions.store import Kept
 
 Said = Mapping[str, Any]

@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.prepare import assemble_rows, prepare, training_rule
-from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES
-from rotorid.mismatch.values import believed_value
+from rotorid.mismatch.model.prepare import assemble_rows, prepare
+from rotorid.mismatch.model.values import believed_value
+from rotorid.mismatch.plant.regime import regime_variables
+from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES
+from rotorid.mismatch.plant.split import training_rule
 from rotorid.recordings import RecordingSet
 
 WRENCH = 6

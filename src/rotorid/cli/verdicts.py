@@ -15,7 +15,7 @@ from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_s
 from rotorid.errors import InputError
 
 if TYPE_CHECKING:
-    from rotorid.mismatch.verdict import Verdict
+    from rotorid.mismatch.tell.verdict import Verdict
 
 FIXED_S, PER_SAMPLE_S, MOST_SAMPLES = 5.0, 1.2e-3, 300_000
 """What a flight costs on one core (benchmarks/mismatch.md): a fixed part, a part a sample, and where it levels off."""

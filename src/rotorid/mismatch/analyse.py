@@ -14,42 +14,36 @@ import numpy as np
 from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage, moving_air
 from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
-from rotorid.mismatch import rules, within_trust
-from rotorid.mismatch.absent import absent, chosen_already
-from rotorid.mismatch.absorbed import absorbed_findings
-from rotorid.mismatch.decide import coefficients, exchangeable, wrench_findings
-from rotorid.mismatch.decided import Decided, Watch, unwatched
-from rotorid.mismatch.delivered import Values, believed_residuals, residuals_of
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.decide import coefficients, exchangeable, throttle_or_thrust, wrench_findings
+from rotorid.mismatch.decision.evidence import weighed
+from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, Trace
+from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
 from rotorid.mismatch.delivery.gate import Gated, Offer, Settled
 from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
 from rotorid.mismatch.delivery.reduce import chain_ids, with_only
 from rotorid.mismatch.delivery.stated import restated
 from rotorid.mismatch.delivery.usable import own_faults, question_of
-from rotorid.mismatch.dependence import dependence
-from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import CLAIMED, Analysis, Estimate, Finding, RunWind, Trace
-from rotorid.mismatch.fitted import Fitted, fitted
-from rotorid.mismatch.gusts import gust_finding
-from rotorid.mismatch.leave_one_out import without_each
-from rotorid.mismatch.leftover import leftover
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, full_speed, stretches
-from rotorid.mismatch.next_flight import next_flight
-from rotorid.mismatch.payload_windows import loads, on_board
-from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.prepare import Prepared, parts_of, prepare
-from rotorid.mismatch.probability import with_probabilities
-from rotorid.mismatch.refitted import refitted, values_alone
-from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.regression import Fit
-from rotorid.mismatch.report_runs import on_every_run, scaled_by_run
-from rotorid.mismatch.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
-from rotorid.mismatch.shares import fitted_part
-from rotorid.mismatch.speedpath import CommandChain, SpeedResult, commanded_path
-from rotorid.mismatch.split import split_runs
-from rotorid.mismatch.value_sides import sides_of_values
-from rotorid.mismatch.values import (
+from rotorid.mismatch.model import within_trust
+from rotorid.mismatch.model.absent import absent, chosen_already
+from rotorid.mismatch.model.absorbed import absorbed_findings
+from rotorid.mismatch.model.decided import Decided, Watch, unwatched
+from rotorid.mismatch.model.delivered import Values, believed_residuals, residuals_of
+from rotorid.mismatch.model.dependence import dependence
+from rotorid.mismatch.model.fitted import Fitted, fitted
+from rotorid.mismatch.model.gusts import gust_finding
+from rotorid.mismatch.model.leave_one_out import without_each
+from rotorid.mismatch.model.leftover import leftover
+from rotorid.mismatch.model.next_flight import next_flight
+from rotorid.mismatch.model.payload_windows import loads, on_board
+from rotorid.mismatch.model.prepare import Prepared, prepare
+from rotorid.mismatch.model.refitted import refitted, values_alone
+from rotorid.mismatch.model.report_runs import on_every_run, scaled_by_run
+from rotorid.mismatch.model.value_sides import sides_of_values
+from rotorid.mismatch.model.values import (
     changed_vehicle,
     contract_values,
     only_throttle,
@@ -59,8 +53,16 @@ from rotorid.mismatch.values import (
     with_square_term,
     with_values_in_question,
 )
-from rotorid.mismatch.within_trust import beyond_trust, settled
-from rotorid.mismatch.wrench import WrenchModel, linear_drag, nonlinear_intervals
+from rotorid.mismatch.model.within_trust import beyond_trust, settled
+from rotorid.mismatch.model.wrench import WrenchModel, linear_drag, nonlinear_intervals
+from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, full_speed, stretches
+from rotorid.mismatch.plant.regime import regime_variables
+from rotorid.mismatch.plant.regression import Fit
+from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
+from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult, commanded_path
+from rotorid.mismatch.plant.split import parts_of, split_runs
+from rotorid.mismatch.posterior.limits import UpperLimit
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 from rotorid.recordings import RecordingSet, Split, Vehicle
 
 UNITS = {"force": "N", "moment": "N m"}
@@ -465,15 +467,6 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
             f = replace(f, status="ambiguous", alternatives=tuple(sorted({f.id, load.id, *f.alternatives})))
         out.append(f)
     return out
-
-
-def throttle_or_thrust(finding: Finding) -> Finding:
-    """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
-    same = catalogue()[finding.id].same_on_commands if finding.id in catalogue() else ""
-    if not rules.THROTTLE_OR_THRUST(bool(same) and finding.status in CLAIMED):
-        return finding
-    both = tuple(sorted({finding.id, same, *finding.alternatives}))
-    return replace(finding, status="ambiguous", alternatives=both)
 
 
 def make_traces(

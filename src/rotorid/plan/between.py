@@ -17,14 +17,14 @@ from scipy.optimize import least_squares
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import SpeedForm
-from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.fitted import Fitted
-from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import assemble_rows
-from rotorid.mismatch.regression import autoregression
-from rotorid.mismatch.rows import residual
-from rotorid.mismatch.speedpath import commanded_path, starts_of
-from rotorid.mismatch.wrench import chosen, path_segments
+from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.model.fitted import Fitted
+from rotorid.mismatch.model.prepare import assemble_rows
+from rotorid.mismatch.model.wrench import chosen, path_segments
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.regression import autoregression
+from rotorid.mismatch.plant.rows import residual
+from rotorid.mismatch.plant.speedpath import commanded_path, starts_of
 from rotorid.recordings.signal.kernels import causal
 
 MOST_EVALUATIONS = 40

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.select import VALUE_FLOOR
+from rotorid.mismatch.plant.regression import NEVER_EXCITED, ridge_inverse
+from rotorid.mismatch.plant.rows import PARAMETER_NAMES
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.limits import PROBABILITY, drawn
-from rotorid.mismatch.regression import NEVER_EXCITED, ridge_inverse
-from rotorid.mismatch.rows import PARAMETER_NAMES
-from rotorid.mismatch.select import VALUE_FLOOR
-from rotorid.mismatch.unknowns import UNKNOWNS
 from rotorid.plan.questions import Known
 from rotorid.plan.separation import Information
 

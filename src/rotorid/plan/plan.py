@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
+from rotorid.mismatch.plant.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
 from rotorid.plan.candidates import STANDARD, Piece, Reference, candidates, joined, smaller, standard
 from rotorid.plan.intervals import Width, check_wishes, widths
 from rotorid.plan.limits import Limits

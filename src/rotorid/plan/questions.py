@@ -8,20 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.absent import chosen_already
 from rotorid.mismatch.analyse import findings_inside, findings_outside
-from rotorid.mismatch.findings import CLAIMED, Finding
-from rotorid.mismatch.fitted import Fitted, fitted
+from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.select import COST_PER_PARAMETER
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ
-from rotorid.mismatch.next_flight import CURVES, beyond_flying
-from rotorid.mismatch.prepare import Prepared, parts_of, prepare
-from rotorid.mismatch.probability import with_probabilities
-from rotorid.mismatch.regression import Regression
-from rotorid.mismatch.rows import Term
-from rotorid.mismatch.select import COST_PER_PARAMETER
-from rotorid.mismatch.split import split_runs
-from rotorid.mismatch.within_trust import settled
+from rotorid.mismatch.model.absent import chosen_already
+from rotorid.mismatch.model.fitted import Fitted, fitted
+from rotorid.mismatch.model.next_flight import CURVES, beyond_flying
+from rotorid.mismatch.model.prepare import Prepared, prepare
+from rotorid.mismatch.model.within_trust import settled
+from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ
+from rotorid.mismatch.plant.regression import Regression
+from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.plant.split import parts_of, split_runs
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.plan.between import ChainQuestion, chain_question
 from rotorid.recordings import RecordingSet
 

@@ -19,14 +19,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorid.mismatch.absent import scales
-from rotorid.mismatch.comparison import ENVIRONMENT_S
-from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.model.absent import scales
+from rotorid.mismatch.model.prepare import assemble_rows, prepare_like
+from rotorid.mismatch.model.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
+from rotorid.mismatch.plant.comparison import ENVIRONMENT_S
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.regression import Regression, autoregression, build, ridge_inverse
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.split import training_rule
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.prepare import assemble_rows, prepare_like, training_rule
-from rotorid.mismatch.regression import Regression, autoregression, build, ridge_inverse
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
 from rotorid.plan.between import interval as chain_interval
 from rotorid.plan.between import squares
 from rotorid.plan.candidates import Reference
@@ -132,7 +133,7 @@ def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | N
             if term.form.linear:
                 values[list(term.form.linear)] = fit.beta[fit.places(regression.columns([key]))]
             effects.append((term.form, values))
-    from rotorid.mismatch.unknowns import UNKNOWNS
+    from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
     unnamed = {t.form.name for t in regression.terms if t.kind == "effect" and t.effect in UNKNOWNS}
     effects = tuple(e for e in effects if e[0].name not in unnamed)

@@ -16,6 +16,7 @@ import pandas as pd
 
 from rotorid.effects.loading import CHANNELS
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
 from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
@@ -28,11 +29,9 @@ from rotorid.mismatch.instrument.model import (
     whole_reading,
 )
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
-from rotorid.mismatch.prepare import parts_of
-from rotorid.mismatch.probability import with_probabilities
-from rotorid.mismatch.regression import Regression, build
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.plant.regression import Regression, build
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.plan.limits import SessionLimits
 from rotorid.plan.plan import Tried, chosen_pieces, share_reached
 from rotorid.plan.questions import Question, question_of

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.comparison import ENVIRONMENT_S
-from rotorid.mismatch.findings import CLAIMED, Analysis, Finding
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.decision.findings import Analysis, Finding
+from rotorid.mismatch.plant.comparison import ENVIRONMENT_S
+from rotorid.mismatch.plant.split import split_runs
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import RecordingSet, Run
 
 MAY_DIFFER = ("name", "noise", "effects", "ground_z_m")

@@ -25,7 +25,7 @@ from typing import Any
 PACKAGES = {"rotorid": "src", "rotorid_proof": "proof"}
 """Each package of the project and the folder, from the top, that holds it."""
 RESOURCES = "importlib.resources"
-OPEN = "OPEN"
+READ_BY_TESTS = (["OPEN"], ["ROOMS"])
 
 
 class Code:
@@ -208,10 +208,10 @@ def _parse(path: Path) -> ast.Module:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if ast.get_docstring(node, clean=False) is not None:
                 node.body = node.body[1:] or [ast.Pass()]
-    tree.body = [node for node in tree.body if not _opens_modules(node)]
+    tree.body = [node for node in tree.body if not _of_rooms(node)]
     return tree
 
 
-def _opens_modules(node: ast.stmt) -> bool:
-    """Whether a statement is the list of a package's modules that others may import, which only a test reads."""
-    return isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] == [OPEN]
+def _of_rooms(node: ast.stmt) -> bool:
+    """Whether a statement lists a package's modules that others may import, or its order, which only a test reads."""
+    return isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] in READ_BY_TESTS

@@ -10,9 +10,9 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from rotorid.io.text.writing import all_or_none, rounded
-from rotorid.mismatch import rules
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.decided import Watch, unwatched
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.delivery.doubts import with_doubts
 from rotorid.mismatch.delivery.files import (
     CONDITIONS,
@@ -26,13 +26,13 @@ from rotorid.mismatch.delivery.files import (
 from rotorid.mismatch.delivery.files import text_of as file_text
 from rotorid.mismatch.delivery.model import model_of
 from rotorid.mismatch.delivery.parts import improved_vehicle
-from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.forward import Forward, forward_channels, prove
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.predict import prove as prove_reading
-from rotorid.mismatch.ledger import ledger, text_of
-from rotorid.mismatch.locate import locate
-from rotorid.mismatch.verdict import Verdict, make_verdict
+from rotorid.mismatch.model.decided import Watch, unwatched
+from rotorid.mismatch.tell.forward import Forward, forward_channels, prove
+from rotorid.mismatch.tell.ledger import ledger, text_of
+from rotorid.mismatch.tell.locate import locate
+from rotorid.mismatch.tell.verdict import Verdict, make_verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, write_vehicle
 from rotorid.recordings.sufficient import sufficient
 from rotorid.report.page.make import make_page

@@ -12,9 +12,9 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.io.text.files import parse_yaml
-from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.tiles import tiles
-from rotorid.mismatch.verdict import Verdict, main_channel
+from rotorid.mismatch.decision.findings import Analysis
+from rotorid.mismatch.tell.tiles import tiles
+from rotorid.mismatch.tell.verdict import Verdict, main_channel
 from rotorid.recordings import Vehicle, vehicle_of
 from rotorid.report.page.make import pretty
 

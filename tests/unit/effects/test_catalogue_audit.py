@@ -22,9 +22,9 @@ from rotorid.effects.contract import COLUMNS_OF, LACK, Motion, SpeedPath, not_te
 from rotorid.effects.describe import EXCITATION, instrument_forms
 from rotorid.effects.gust import window_form
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.prepare import make_terms
-from rotorid.mismatch.rows import form_columns, project, residual
-from rotorid.mismatch.speedpath import commanded_path
+from rotorid.mismatch.model.prepare import make_terms
+from rotorid.mismatch.plant.rows import form_columns, project, residual
+from rotorid.mismatch.plant.speedpath import commanded_path
 from rotorid.recordings import RecordingSet
 from rotorid.vehicle.improved import (
     active_forms,
@@ -78,7 +78,7 @@ def set_forms():
 
 
 def reading_forms():
-    """Every form of an instrument's own; what they add is held by `tests/unit/mismatch/test_instrument.py`."""
+    """Every form of an instrument's own; what they add is held by `tests/unit/mismatch/instrument`."""
     for effect in EFFECTS:
         for form in instrument_forms(effect):
             yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")

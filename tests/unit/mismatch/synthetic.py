@@ -7,7 +7,8 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.findings import Analysis, Estimate, Finding, Trace
+from rotorid.mismatch.decision.findings import Analysis, Finding, Trace
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run, Split
 from tests.unit.vehicle.thesis import thesis_vehicle
 

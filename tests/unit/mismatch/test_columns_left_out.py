@@ -16,9 +16,8 @@ from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build
 from rotorid.report.deliver import judge
 from rotorid_proof.concealed import build as concealed
 from rotorid_proof.concealed import cases
+from tests.unit.mismatch.flights import recorded, with_table
 from tests.unit.recordings.importers.test_public_sets import MANIFEST, REAL, VEHICLES, needs_data
-
-from .flights import recorded, with_table
 
 GROUPS = {
     "rotor_speeds": ("rotor_speed_",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rotorid.mismatch.analyse import payload_or_offset
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
 
 OFFSET = Finding(id="com_offset", status="established")
 PRODUCTS = Finding(id="inertia_products", status="established")

@@ -7,8 +7,8 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.mismatch.motion import build_segments
-from rotorid.mismatch.rows import residual
+from rotorid.mismatch.plant.motion import build_segments
+from rotorid.mismatch.plant.rows import residual
 from rotorid.plan import mission, page, write
 from rotorid.plan.candidates import Reference, candidates, joined, smaller, standard
 from rotorid.plan.limits import Limits

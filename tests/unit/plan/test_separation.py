@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.regression import build
-from rotorid.mismatch.rows import Rows, Term
+from rotorid.mismatch.plant.regression import build
+from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.plan.questions import Hypothesis, Question
 from rotorid.plan.separation import Information, drawn, left_over, log_odds, separations
 

@@ -70,7 +70,7 @@ def test_a_docstring_added_where_there_was_none_does_not(project: Path) -> None:
 
 def test_the_list_of_modules_that_others_may_import_does_not(project: Path) -> None:
     effects = "src/rotorid/effects/__init__.py"
-    assert changed(project, effects, "import pkgutil", 'OPEN = ("drag",)\nimport pkgutil') == set()
+    assert changed(project, effects, "import pkgutil", 'OPEN = ("drag",)\nROOMS = ("a", "b")\nimport pkgutil') == set()
     assert changed(project, effects, "import pkgutil", "CLOSED = ()\nimport pkgutil") == {"choose"}
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from rotorid.mismatch.delivery.model import model_of
 from rotorid.mismatch.delivery.parts import improved_vehicle
-from rotorid.mismatch.forward import delivered_model, forward_channels, prove
+from rotorid.mismatch.tell.forward import delivered_model, forward_channels, prove
 from rotorid.recordings import read_vehicle, write_vehicle
 from rotorid.report.deliver import write_files
 from tests.unit.mismatch.synthetic import HOVER, K_D, SPEED_M_S, analysis, drag_finding

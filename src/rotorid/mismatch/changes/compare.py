@@ -27,19 +27,20 @@ from rotorid.mismatch.changes.of_instruments import (
 )
 from rotorid.mismatch.changes.problem import NAMES, change_of
 from rotorid.mismatch.changes.usual import form_spread, spread_of_flights, usual_spread
-from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
-from rotorid.mismatch.decide import relative_change
-from rotorid.mismatch.findings import CLAIMED, Estimate, Finding, Status
-from rotorid.mismatch.fitted import Fitted
-from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.decision.decide import relative_change
+from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.model.fitted import Fitted
+from rotorid.mismatch.model.values import believed_value
+from rotorid.mismatch.plant.channel_errors import CHANNELS_OF_WRENCH
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.rows import CHANNELS, Rows
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import Statement, parameters, statements_of
-from rotorid.mismatch.rows import CHANNELS, Rows
-from rotorid.mismatch.values import believed_value
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Vehicle
 
 KEYS = {name: key for key, name in NAMES.items()}

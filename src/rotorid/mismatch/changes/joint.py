@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.absent import squares_of
 from rotorid.mismatch.changes.chain import (
     ChainTerms,
     chain_columns,
@@ -21,20 +20,21 @@ from rotorid.mismatch.changes.chain import (
 )
 from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.changes.usual import of_environments
-from rotorid.mismatch.findings import Finding
-from rotorid.mismatch.fitted import Fitted, fitted
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.model.absent import squares_of
+from rotorid.mismatch.model.fitted import Fitted, fitted
+from rotorid.mismatch.model.prepare import Prepared, assemble_rows, prepare, prepare_like
+from rotorid.mismatch.model.report_runs import as_flown, comparable
+from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, model_filters
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.regime import regime_variables
+from rotorid.mismatch.plant.regression import Regression, build
+from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.prepare import Prepared, assemble_rows, prepare, prepare_like
-from rotorid.mismatch.regime import regime_variables
-from rotorid.mismatch.regression import Regression, build
-from rotorid.mismatch.report_runs import as_flown, comparable
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.wrench import WrenchModel, block_seconds, model_filters
 from rotorid.recordings import RecordingSet, Vehicle
 
 FORCES = (0, 1, 2)

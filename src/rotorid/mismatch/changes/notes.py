@@ -8,11 +8,11 @@ import numpy as np
 
 from rotorid.mismatch.changes.joint import Joint
 from rotorid.mismatch.changes.usual import left_by_all
-from rotorid.mismatch.channel_errors import CHANNELS_OF_WRENCH
-from rotorid.mismatch.motion import Segment
+from rotorid.mismatch.decision.words import channel_words, listed, number, regime_words
+from rotorid.mismatch.plant.channel_errors import CHANNELS_OF_WRENCH
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.mismatch.posterior.leftover import TINY
-from rotorid.mismatch.rows import CHANNELS
-from rotorid.mismatch.words import channel_words, listed, number, regime_words
 
 LARGER = 2.0
 """How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""

@@ -17,11 +17,10 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import AXES, CHANNELS, Loading
 from rotorid.errors import InputError
-from rotorid.mismatch.absent import mean_squares
 from rotorid.mismatch.changes.joint import Joint, by_run
 from rotorid.mismatch.changes.problem import change_of, difference_of, joint, leftover_of, problem_of_changes, settled
 from rotorid.mismatch.changes.usual import joined
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.instrument.analyse import first_model
 from rotorid.mismatch.instrument.chain import ChainResult, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
@@ -37,14 +36,15 @@ from rotorid.mismatch.instrument.setup import (
     set_up,
     with_unseen,
 )
+from rotorid.mismatch.model.absent import mean_squares
+from rotorid.mismatch.plant.regression import Regression, build, ridge_inverse
+from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.leftover import TINY, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem
 from rotorid.mismatch.posterior.score import Model, Posterior
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.regression import Regression, build, ridge_inverse
-from rotorid.mismatch.rows import Rows, Term
 from rotorid.recordings import RecordingSet
 
 OTHER_RATE = 0.3

@@ -21,13 +21,13 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.mismatch.instrument.columns import VALUE_NAMES
+from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, believed, log_priors
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found, most_probable
-from rotorid.mismatch.rows import PARAMETER_NAMES
 
 NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
 """Key of every believed value, of a flight or an instrument, to the contract's name."""

@@ -15,13 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.plant.regression import NEVER_EXCITED
 from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.leftover import FULL_RIDGE, TINY
 from rotorid.mismatch.posterior.score import places, scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import statements_of
-from rotorid.mismatch.regression import NEVER_EXCITED
 
 SAME_SD, SAME_BODY_SD = 0.01, 0.003
 """Relative one-sigma between two flights in which nothing changed of a rotor's coefficient (3 K of air change

@@ -5,10 +5,18 @@ from __future__ import annotations
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.changes.compare import Change, Changes
 from rotorid.mismatch.changes.problem import NAMES
-from rotorid.mismatch.findings import CLAIMED, Estimate
+from rotorid.mismatch.decision.words import (
+    capital,
+    effect_words,
+    listed,
+    number,
+    parameter_words,
+    percent,
+    percent_words,
+)
 from rotorid.mismatch.instrument.columns import VALUE_NAMES
 from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.words import capital, effect_words, listed, number, parameter_words, percent, percent_words
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 
 VALUES = frozenset(NAMES.values())
 WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the largest load"}

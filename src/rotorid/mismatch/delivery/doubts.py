@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.sizes import scales
+from rotorid.mismatch.decision.findings import Analysis
+from rotorid.mismatch.decision.sizes import scales
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.check import doubts_of
 from rotorid.recordings.doubts import Doubt

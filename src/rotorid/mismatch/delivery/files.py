@@ -17,8 +17,8 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.writing import rounded
+from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind
 from rotorid.mismatch.delivery.parts import delivered, form_of
-from rotorid.mismatch.findings import Analysis, Finding, RunWind
 
 CONDITIONS, INSTRUMENTS = "conditions.yaml", "instruments.yaml"
 ABOUT = {

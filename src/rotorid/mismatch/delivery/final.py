@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from rotorid.mismatch.delivered import FittedModel, Values
+from rotorid.mismatch.decision.evidence import with_shares
+from rotorid.mismatch.decision.findings import Analysis, Finding
+from rotorid.mismatch.decision.words import parameter_words
 from rotorid.mismatch.delivery.gate import Gated, Offer, Residuals, Settled, gate
 from rotorid.mismatch.delivery.parts import improved_vehicle
 from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
 from rotorid.mismatch.delivery.usable import exports_lost
-from rotorid.mismatch.evidence import with_shares
-from rotorid.mismatch.findings import Analysis, Finding
-from rotorid.mismatch.values import names_of
-from rotorid.mismatch.words import parameter_words
+from rotorid.mismatch.model.delivered import FittedModel, Values
+from rotorid.mismatch.model.values import names_of
 from rotorid.recordings import Vehicle
 
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rotorid.mismatch.channel_errors import growth
-from rotorid.mismatch.delivered import FittedModel, Values, delivered_fit, judged_rows
-from rotorid.mismatch.regression import Fit
-from rotorid.mismatch.rows import CHANNELS
-from rotorid.mismatch.within_trust import ways
-from rotorid.mismatch.words import channel_words
+from rotorid.mismatch.decision.words import channel_words
+from rotorid.mismatch.model.delivered import FittedModel, Values, delivered_fit, judged_rows
+from rotorid.mismatch.model.within_trust import ways
+from rotorid.mismatch.plant.channel_errors import growth
+from rotorid.mismatch.plant.regression import Fit
+from rotorid.mismatch.plant.rows import CHANNELS
 
 WORSE_RATIO = 1.01
 """Error over the other model's from which a channel is predicted worse: a percent is what refitting itself moves."""

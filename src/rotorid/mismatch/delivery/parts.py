@@ -11,7 +11,8 @@ from typing import Literal
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
-from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, one_per_class
+from rotorid.mismatch.decision.findings import Analysis, Finding, one_per_class
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import Vehicle
 
 Place = Literal["vehicle", "conditions", "instruments"]

@@ -11,17 +11,18 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import moving_air
-from rotorid.mismatch.contributions import Contributions
-from rotorid.mismatch.delivered import Values
-from rotorid.mismatch.fitted import Fitted
-from rotorid.mismatch.leave_one_out import chain_without, without_wind
-from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.prepare import assemble_rows, training_rule
-from rotorid.mismatch.regression import build
-from rotorid.mismatch.select import Selection
-from rotorid.mismatch.two_sensors import compared_alone
-from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.wrench import WrenchModel, block_seconds, path_segments
+from rotorid.mismatch.decision.select import Selection
+from rotorid.mismatch.model.delivered import Values
+from rotorid.mismatch.model.fitted import Fitted
+from rotorid.mismatch.model.leave_one_out import chain_without, without_wind
+from rotorid.mismatch.model.prepare import assemble_rows
+from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, path_segments
+from rotorid.mismatch.plant.contributions import Contributions
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.regression import build
+from rotorid.mismatch.plant.split import training_rule
+from rotorid.mismatch.plant.two_sensors import compared_alone
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
 
 def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:

@@ -8,13 +8,13 @@ from itertools import combinations
 
 import numpy as np
 
-from rotorid.mismatch.decide import coefficients
-from rotorid.mismatch.delivered import FittedModel
+from rotorid.mismatch.decision.decide import coefficients
+from rotorid.mismatch.decision.findings import Finding, ValueRow
 from rotorid.mismatch.delivery.gate import Settled
-from rotorid.mismatch.findings import Finding, ValueRow
-from rotorid.mismatch.rows import PARAMETER_NAMES
-from rotorid.mismatch.values import believed_value
-from rotorid.mismatch.within_trust import all_free
+from rotorid.mismatch.model.delivered import FittedModel
+from rotorid.mismatch.model.values import believed_value
+from rotorid.mismatch.model.within_trust import all_free
+from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 from rotorid.recordings import Vehicle
 
 ONLY_A_RATIO = 0.9

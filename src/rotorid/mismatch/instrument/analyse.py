@@ -15,16 +15,15 @@ import numpy as np
 from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
-from rotorid.mismatch import rules
-from rotorid.mismatch.absorbed import absorbed_findings
-from rotorid.mismatch.analyse import throttle_or_thrust
-from rotorid.mismatch.decide import wrong_values
-from rotorid.mismatch.delivered import Values, residuals_of
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.decide import throttle_or_thrust, wrong_values
+from rotorid.mismatch.decision.evidence import weighed
+from rotorid.mismatch.decision.findings import Analysis, Finding, Trace
+from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.select import Selection
 from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
 from rotorid.mismatch.delivery.gate import Gated, Offer
 from rotorid.mismatch.delivery.parts import claimed
-from rotorid.mismatch.evidence import weighed
-from rotorid.mismatch.findings import CLAIMED, Analysis, Finding, Trace
 from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
 from rotorid.mismatch.instrument.chain import (
     ChainResult,
@@ -43,17 +42,17 @@ from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.leave_one_out import first_s, on_traces
-from rotorid.mismatch.next_flight import next_flight
-from rotorid.mismatch.prepare import parts_of
-from rotorid.mismatch.probability import with_probabilities
-from rotorid.mismatch.regression import Fit
-from rotorid.mismatch.rows import Term
-from rotorid.mismatch.select import Selection
-from rotorid.mismatch.split import split_runs
-from rotorid.mismatch.unknowns import UNKNOWNS
-from rotorid.mismatch.values import changed_vehicle, contract_values, stated_of_commands
-from rotorid.mismatch.within_trust import in_words, settled
+from rotorid.mismatch.model.absorbed import absorbed_findings
+from rotorid.mismatch.model.delivered import Values, residuals_of
+from rotorid.mismatch.model.leave_one_out import first_s, on_traces
+from rotorid.mismatch.model.next_flight import next_flight
+from rotorid.mismatch.model.values import changed_vehicle, contract_values, stated_of_commands
+from rotorid.mismatch.model.within_trust import in_words, settled
+from rotorid.mismatch.plant.regression import Fit
+from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.plant.split import parts_of, split_runs
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import RecordingSet, Vehicle
 
 LOST_SHARE = 0.15

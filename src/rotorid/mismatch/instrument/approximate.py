@@ -18,14 +18,14 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
-from rotorid.mismatch import rules
-from rotorid.mismatch.decide import WIDEST_TRUST, coefficients
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.decide import WIDEST_TRUST, coefficients
+from rotorid.mismatch.decision.select import KEEP_P, SHARE_OF_LARGEST, Selection
 from rotorid.mismatch.instrument.model import ReadingModel, block_length, everything, kept_values, restrain
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
-from rotorid.mismatch.regression import Regression, build
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import KEEP_P, SHARE_OF_LARGEST, Selection
-from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.plant.regression import Regression, build
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
 KNOTS = (0.0, 1 / 3, 2 / 3, 1.0)
 """Where the hat functions stand, as shares of the largest."""

@@ -18,10 +18,11 @@ from scipy.stats import f as f_distribution
 from rotorid.effects.catalogue import catalogue, ids_of
 from rotorid.effects.contract import CURVE, DELAY, SUPPLY, SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
-from rotorid.mismatch.findings import Estimate, Finding, Trace
-from rotorid.mismatch.instrument.columns import form_reading
+from rotorid.mismatch.decision.findings import Finding, Trace
 from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces_of, with_speed
-from rotorid.mismatch.regression import at_least, autoregression, quadratic_form
+from rotorid.mismatch.plant.readings import form_reading
+from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings.signal.kernels import causal
 
 ENTER_P = 1e-5

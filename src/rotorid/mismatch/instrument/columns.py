@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
-from rotorid.effects.contract import Contribution, Effect, Form, not_testable_reason
-from rotorid.effects.loading import NO_ROTORS, Instrument, Loading, at_sensor, forms_of, weight
+from rotorid.effects.contract import Effect, Form, not_testable_reason
+from rotorid.effects.loading import NO_ROTORS, Instrument, Loading, forms_of, weight
 from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
-from rotorid.mismatch.prepare import form_terms
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.model.prepare import form_terms
+from rotorid.mismatch.plant.readings import form_reading
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "gain": 0.03}
@@ -105,20 +106,6 @@ def nothing_to_test(effect: Effect, instrument: Instrument) -> str:
     return NO_ROTORS if instrument.bench else STILL
 
 
-def reading_of(added: Contribution, loading: Loading, vehicle: Vehicle) -> np.ndarray:
-    """What a contribution adds to the reading, (n, 6)."""
-    if added.reading is not None:
-        return added.reading
-    return at_sensor(added.force, added.moment, loading.motion, vehicle)
-
-
-def form_reading(form: Form, values, loading: Loading, vehicle: Vehicle) -> np.ndarray:
-    """Reading that a form adds at parameter values, (n, 6); forms for a flight act through the motion."""
-    values = np.asarray(values, float)
-    subject = loading if form.on_loading else loading.motion
-    return reading_of(form.contribution(subject, vehicle, values), loading, vehicle)
-
-
 def value_column(key: str, loading: Loading, vehicle: Vehicle) -> np.ndarray:
     """Reading of a relative change of one believed value, (n, 6)."""
     if key == "gain":
@@ -191,4 +178,4 @@ def rows_of(setup: Setup, terms: list[Term], loadings=None, at_work: AtWork = ()
     return out
 
 
-__all__ = ["OFFSET", "VALUE_NAMES", "form_reading", "make_terms", "rows_of", "value_keys"]
+__all__ = ["OFFSET", "VALUE_NAMES", "make_terms", "rows_of", "value_keys"]

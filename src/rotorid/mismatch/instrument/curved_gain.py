@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.effects.catalogue import ids_of
-from rotorid.mismatch import rules
-from rotorid.mismatch.decide import SMALLEST_CHANGE
-from rotorid.mismatch.delivered import Values
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.decide import SMALLEST_CHANGE
 from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
+from rotorid.mismatch.model.delivered import Values
 
 SMALL_LOADS = 0.3
 """Share of the largest load up to which a load is small."""

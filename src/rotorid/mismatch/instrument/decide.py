@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.loading import CHANNELS
-from rotorid.mismatch import rules
-from rotorid.mismatch.decide import TermReport, estimates, findings_of
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.decide import TermReport, estimates, findings_of
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.instrument.approximate import LeftOfForm
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
@@ -18,8 +18,9 @@ from rotorid.mismatch.instrument.model import (
     doubt_of_form,
     nonlinear_deviation,
 )
-from rotorid.mismatch.rows import Term
-from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
+from rotorid.mismatch.posterior.status import Estimate
 
 SHOWS = 0.33
 """A channel counts where the contribution is at least this share of its strongest, in units of the noise."""

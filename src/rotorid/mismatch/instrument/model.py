@@ -11,15 +11,14 @@ from scipy.optimize import least_squares
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading, forms_of
-from rotorid.mismatch import rules
-from rotorid.mismatch.comparison import LEAST_RUNS
-from rotorid.mismatch.contributions import Contributions
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.select import Questions, Search, Selection
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of, term_columns
 from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
-from rotorid.mismatch.posterior.chosen import posterior_at
-from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.regression import (
+from rotorid.mismatch.plant.comparison import LEAST_RUNS
+from rotorid.mismatch.plant.contributions import Contributions
+from rotorid.mismatch.plant.regression import (
     MOST_ATTENUATION,
     Regression,
     autoregression,
@@ -27,13 +26,10 @@ from rotorid.mismatch.regression import (
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.rows import Rows, Term
-from rotorid.mismatch.select import (
-    Questions,
-    Search,
-    Selection,
-)
-from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
+from rotorid.mismatch.posterior.chosen import posterior_at
+from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings.signal.kernels import causal
 
 SHORT = 60

@@ -10,10 +10,10 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
 from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.delivery.files import Instruments, instruments_of
-from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.instrument.columns import form_reading
 from rotorid.mismatch.instrument.setup import full_voltage_of, loaded_by, with_speed
+from rotorid.mismatch.plant.readings import form_reading
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import speeds_of_commands
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.effects.loading import CHANNELS, Loading
-from rotorid.mismatch.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
 from rotorid.mismatch.instrument.model import MEMORY, ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
+from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
 
 CROSS_S = 10.0
 """Blocks of a run by which every other is judged."""

@@ -10,7 +10,7 @@ from rotorid.mismatch.instrument.chain import ChainResult, moved
 from rotorid.mismatch.instrument.columns import rows_of
 from rotorid.mismatch.instrument.model import ReadingModel, whole_reading
 from rotorid.mismatch.instrument.setup import with_unseen
-from rotorid.mismatch.rows import Rows
+from rotorid.mismatch.plant.rows import Rows
 from rotorid.recordings import RecordingSet
 
 

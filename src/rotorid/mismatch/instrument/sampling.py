@@ -6,7 +6,8 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS, UNITS
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import columns as c
 
 COARSE_SHARE = 0.25

@@ -19,9 +19,9 @@ from rotorid.effects.loading import CHANNELS, REST_S, Instrument, Loading, at_se
 from rotorid.errors import InputError
 from rotorid.mismatch.instrument.settling import settling_s, without_settling
 from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
-from rotorid.mismatch.rows import baseline_wrench
-from rotorid.mismatch.split import split_runs
-from rotorid.mismatch.voltmeter import SLOW_S, expected_voltages, is_noise
+from rotorid.mismatch.plant.rows import baseline_wrench
+from rotorid.mismatch.plant.split import split_runs
+from rotorid.mismatch.plant.voltmeter import SLOW_S, expected_voltages, is_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units, vibration
 from rotorid.mismatch.mistakes.dead_voltmeter import connected
 from rotorid.mismatch.mistakes.signals import ReadSet

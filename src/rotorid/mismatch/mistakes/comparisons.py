@@ -12,7 +12,7 @@ import numpy as np
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.lagged import Blocks, Signal
 from rotorid.mismatch.mistakes.signals import Signals
-from rotorid.mismatch.motion import rates_from_attitude
+from rotorid.mismatch.plant.motion import rates_from_attitude
 from rotorid.recordings import Vehicle
 
 KINEMATIC_BAND_HZ = (0.3, 12.0)

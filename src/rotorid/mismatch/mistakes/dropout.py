@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.mismatch.findings import Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes.signals import COMMANDED, replace_columns, sensor_columns
-from rotorid.mismatch.motion import stretches
+from rotorid.mismatch.plant.motion import stretches
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 

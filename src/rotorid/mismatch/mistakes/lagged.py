@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal.windows import hann
 
-from rotorid.mismatch.motion import stretches
+from rotorid.mismatch.plant.motion import stretches
 from rotorid.recordings.signal import kernels
 
 BLOCK_S = 2.56

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
-from rotorid.mismatch.motion import continuous, fresh_samples, own_rate_hz, rotation_matrices
+from rotorid.mismatch.plant.motion import continuous, fresh_samples, own_rate_hz, rotation_matrices
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 

@@ -15,13 +15,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.stats import t as student
 
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Result, signals_of
 from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit
 from rotorid.mismatch.mistakes.signals import COMMANDED, Signals, replace_columns, sensor_columns
-from rotorid.mismatch.motion import fresh_samples
+from rotorid.mismatch.plant.motion import fresh_samples
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 LEAST_ALONE = 0.9

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes.signals import scaled, sensor_columns
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet
 from rotorid.recordings import columns as c
 

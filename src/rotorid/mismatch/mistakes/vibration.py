@@ -14,10 +14,11 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import gamma
 
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes.axes import signals_of
 from rotorid.mismatch.mistakes.signals import Signals
-from rotorid.mismatch.motion import full_speed
+from rotorid.mismatch.plant.motion import full_speed
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet
 from rotorid.recordings import columns as c
 

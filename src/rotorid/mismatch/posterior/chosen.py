@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from rotorid.mismatch.plant.regression import Regression
 from rotorid.mismatch.posterior.evidence import evidence_from
 from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.prior import Prior
@@ -13,7 +14,6 @@ from rotorid.mismatch.posterior.problem import problem_of
 from rotorid.mismatch.posterior.score import Posterior, scored
 from rotorid.mismatch.posterior.search import Found, joint
 from rotorid.mismatch.posterior.statements import squares_of
-from rotorid.mismatch.regression import Regression
 
 FORM_SD = 0.02
 """Share of what effects contribute that their forms are wrong by."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.mismatch.regression import Regression
-from rotorid.mismatch.rows import Term
+from rotorid.mismatch.plant.regression import Regression
+from rotorid.mismatch.plant.rows import Term
 
 
 @dataclass(frozen=True)

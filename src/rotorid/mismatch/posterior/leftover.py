@@ -22,8 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotorid.mismatch.plant.regression import NEVER_EXCITED
 from rotorid.mismatch.posterior.evidence import Evidence
-from rotorid.mismatch.regression import NEVER_EXCITED
 
 TINY = 1e-300
 FEWEST_ROWS = 50.0

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.score import places, scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import POSSIBLE, by_id
-from rotorid.mismatch.unknowns import UNKNOWNS
 
 PROBABILITY = 0.95
 DRAWS = 400

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm
 from rotorid.mismatch.posterior.leftover import TINY, Spectrum
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.unknowns import UNKNOWNS
 
 RATIOS = {"mass": ("thrust",), "arm": ("inertia_xx", "inertia_yy"), "torque": ("inertia_zz",)}
 """Believed values of which a flight knows no more than the ratio to others. Were both free, noise alone would say what

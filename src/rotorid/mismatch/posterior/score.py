@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rotorid.mismatch.plant.regression import limited_bias
 from rotorid.mismatch.posterior.leftover import Spectrum
 from rotorid.mismatch.posterior.problem import Problem
-from rotorid.mismatch.regression import limited_bias
 
 Model = tuple[str, ...]
 """Keys of the effects at work, sorted."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.mismatch.findings import CLAIMED, Estimate, Status
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.score import Model, Scored, places, scored
 from rotorid.mismatch.posterior.search import Found, ranked, without
-from rotorid.mismatch.unknowns import UNKNOWNS
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 
 Z95 = 1.959963984540054
 CONSIDERED = 10.0

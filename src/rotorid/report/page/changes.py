@@ -9,7 +9,7 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 from rotorid.mismatch.changes import Changes, words
-from rotorid.mismatch.words import capital, channel_words
+from rotorid.mismatch.decision.words import capital, channel_words
 from rotorid.report.page.make import policy_for
 from rotorid.report.plots.changes import draw_residuals, draw_values
 

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotorid.mismatch.findings import Analysis, Trace
-from rotorid.mismatch.locate import REGIME_BLOCK_S
-from rotorid.mismatch.shares import fitted_part, segments_of
-from rotorid.mismatch.verdict import Verdict
-from rotorid.mismatch.words import FORWARD_WORDS, channel_words, regime_words
+from rotorid.mismatch.decision.findings import Analysis, Trace
+from rotorid.mismatch.decision.shares import fitted_part, segments_of
+from rotorid.mismatch.decision.words import FORWARD_WORDS, channel_words, regime_words
+from rotorid.mismatch.tell.locate import REGIME_BLOCK_S
+from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.report.page.replay import replay
 from rotorid.report.page.signals import fit_percent, measured
 

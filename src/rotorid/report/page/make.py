@@ -18,20 +18,8 @@ from markupsafe import Markup
 
 from rotorid.effects.advice import advice
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.delivery.parts import form_of
-from rotorid.mismatch.findings import Analysis, Finding
-from rotorid.mismatch.tiles import errors_of, tiles
-from rotorid.mismatch.verdict import (
-    Absent,
-    BelievedValue,
-    Channel,
-    EffectVerdict,
-    Location,
-    Verdict,
-    main_channel,
-    spoken,
-)
-from rotorid.mismatch.words import (
+from rotorid.mismatch.decision.findings import Analysis, Finding
+from rotorid.mismatch.decision.words import (
     FORWARD_WORDS,
     capital,
     channel_words,
@@ -44,6 +32,18 @@ from rotorid.mismatch.words import (
     plus_minus,
     regime_words,
     sure,
+)
+from rotorid.mismatch.delivery.parts import form_of
+from rotorid.mismatch.tell.tiles import errors_of, tiles
+from rotorid.mismatch.tell.verdict import (
+    Absent,
+    BelievedValue,
+    Channel,
+    EffectVerdict,
+    Location,
+    Verdict,
+    main_channel,
+    spoken,
 )
 from rotorid.recordings import RecordingSet
 from rotorid.report.page.data import page_data

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch import forward
+from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.delivery.model import Model
-from rotorid.mismatch.findings import Analysis
-from rotorid.mismatch.motion import Segment
-from rotorid.mismatch.verdict import Verdict
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.tell import forward
+from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.vehicle.windows import Windows
 
 LONGEST_S = 20.0

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotorid.effects.loading import Loading
-from rotorid.mismatch.findings import Analysis, Trace
+from rotorid.mismatch.decision.findings import Analysis, Trace
+from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.instrument.setup import averaged
-from rotorid.mismatch.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
-from rotorid.mismatch.rows import Thinner, at_centre
-from rotorid.mismatch.shares import fitted_part
+from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
+from rotorid.mismatch.plant.rows import Thinner, at_centre
 
 Pieces = list[tuple[np.ndarray, dict[str, np.ndarray]]]
 """Of each stretch of a run its instants (n,), s, and the channels' values (n,) by name."""

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.findings import RunWind
+from rotorid.mismatch.decision.shares import segments_of
 from rotorid.mismatch.delivery.files import (
     conditions_of,
     empty,
@@ -15,9 +17,7 @@ from rotorid.mismatch.delivery.files import (
     text_of,
 )
 from rotorid.mismatch.delivery.model import model_of
-from rotorid.mismatch.findings import RunWind
-from rotorid.mismatch.forward import delivered_model, errors_of, forward_channels
-from rotorid.mismatch.shares import segments_of
+from rotorid.mismatch.tell.forward import delivered_model, errors_of, forward_channels
 from rotorid.report.deliver import write_files
 from tests.unit.mismatch.delivery.test_parts import WIND, sensor_error
 from tests.unit.mismatch.synthetic import HOVER, K_D, analysis, drag_finding

@@ -3,8 +3,9 @@
 import pytest
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.delivery.parts import delivered, entry_of, improved_vehicle, place_of
-from rotorid.mismatch.findings import Estimate, Finding
+from rotorid.mismatch.posterior.status import Estimate
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 
 WIND = Finding(

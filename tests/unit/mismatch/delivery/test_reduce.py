@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from rotorid.mismatch.delivery.reduce import with_only
-from rotorid.mismatch.fitted import fitted
-from rotorid.mismatch.prepare import parts_of, prepare
-from rotorid.mismatch.rows import Term
-from rotorid.mismatch.split import split_runs
+from rotorid.mismatch.model.fitted import fitted
+from rotorid.mismatch.model.prepare import prepare
+from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.plant.split import parts_of, split_runs
 from tests.unit.mismatch.flights import recorded
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.mismatch.findings import ValueRow
-from rotorid.mismatch.sentences import MOST_WORDS
-from rotorid.mismatch.shares import segments_of
-from rotorid.mismatch.tiles import tiles
-from rotorid.mismatch.verdict import main_channel
+from rotorid.mismatch.decision.findings import ValueRow
+from rotorid.mismatch.decision.shares import segments_of
+from rotorid.mismatch.tell.sentences import MOST_WORDS
+from rotorid.mismatch.tell.tiles import tiles
+from rotorid.mismatch.tell.verdict import main_channel
 from rotorid.recordings import Run
 from rotorid.recordings.doubts import Doubt
 from rotorid.report.deliver import verdict_of, write_files

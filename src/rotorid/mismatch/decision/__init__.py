@@ -1,0 +1,1 @@
+"""What may be said of an id: findings and their status, rules, selection of terms, sizes and words."""

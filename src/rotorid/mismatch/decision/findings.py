@@ -1,0 +1,214 @@
+"""What the analysis of a recording set found, before it is put into words, figures and files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rotorid.effects.contract import Form
+from rotorid.effects.loading import Instrument, Loading
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
+from rotorid.recordings import RecordingSet, Split, Vehicle
+from rotorid.recordings.doubts import Doubt
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.decision.sizes import Size
+    from rotorid.mismatch.posterior.limits import UpperLimit
+
+
+class Reason(str):
+    """Why an effect is not stated, in words, and the rule that says so."""
+
+    rule: str
+
+    def __new__(cls, rule: str, text: str) -> Reason:
+        """The words of a rule."""
+        made = super().__new__(cls, text)
+        made.rule = rule
+        return made
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One id of the catalogue (physics, sensor, mistake) and what the data say of it."""
+
+    id: str
+    status: Status
+    form: Form | None = None
+    """The form that fits best (None for mistakes and effects that are no wrench, such as `sensor_dropout`)."""
+    values: tuple[float, ...] = ()
+    """Parameter values of `form`, in its order."""
+    equation: str = ""
+    sentence: str = ""
+    parameters: tuple[Estimate, ...] = ()
+    p_value: float = 1.0
+    channels: tuple[str, ...] = ()
+    """Channels it shows in, the strongest first (`force_x` … `moment_z`, `rotor_speed_i`)."""
+    alternatives: tuple[str, ...] = ()
+    """For `ambiguous`: the whole class, itself included."""
+    gain: tuple[float, float, float] | None = None
+    """Held-out rmse ratio (with / without the effect) and its 95 % interval, block bootstrap."""
+    rule: str = ""
+    """Of one that is not established: the rule that took it out."""
+    objection: str = ""
+    """Of a `suggested` one: why it is not established."""
+    windows: tuple[tuple[str, float, float], ...] = ()
+    """(run, start_s, stop_s) where it acts, for effects in part of the flight; empty for always."""
+    late_s: float | None = None
+    """Of stamps that are late (positive) or early: by how much; `parameters` have the length alone."""
+    probability: float | None = None
+    """That it, or one of its class, is at work; None where none was computed."""
+    withheld: str = ""
+    """Of one that is claimed: why the gate keeps it out of the files; empty where it is delivered."""
+
+    @property
+    def which(self) -> tuple[str, tuple[str, ...]]:
+        """What distinguishes it from another mistake of a set: its id, of a clock also the columns stamped by it."""
+        return self.id, () if self.late_s is None else self.channels
+
+    @property
+    def delivered(self) -> bool:
+        """Whether it may stand in one of the files."""
+        return self.status in CLAIMED and not self.withheld
+
+
+@dataclass(frozen=True)
+class RunWind:
+    """Wind of a run: straight lines between instants, still air outside of them."""
+
+    run: str
+    kind: Literal["all the time", "in windows"]
+    time_s: np.ndarray
+    """(k,)."""
+    wind_m_s: np.ndarray
+    """North and east, (k, 2)."""
+
+
+@dataclass(frozen=True)
+class ValueRow:
+    """A believed value before and after, all values free within their trust jointly with the delivered effects."""
+
+    name: str
+    """By its contract name."""
+    believed: float
+    estimate: float
+    low: float
+    high: float
+    """95 % interval of the estimate; the trust is part of it."""
+    delivered: float
+    """What stands in the improved vehicle."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Residual of one channel of one run, thinned, before refitting, after refitting and with the effects."""
+
+    run: str
+    channel: str
+    unit: str
+    time_s: np.ndarray
+    before: np.ndarray
+    refitted: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything that the verdict, its page and the improved vehicle are made from."""
+
+    recordings: RecordingSet
+    """The set as analysed (mistakes with overwhelming evidence already corrected)."""
+    split: Split
+    believed: Vehicle
+    refitted: Vehicle
+    """Believed values re-estimated without new physics."""
+    improved: Vehicle
+    """Values re-estimated together with the established effects (which `findings` hold)."""
+    findings: tuple[Finding, ...]
+    values: dict[str, tuple[float, float, float, float]]
+    """Wrong values: contract name to (believed, refitted, low, high)."""
+    not_testable: dict[str, str]
+    traces: tuple[Trace, ...]
+    noise_floor: dict[str, float]
+    """Measured noise of each channel, its own unit, in the band of the traces."""
+    p_values: dict[str, tuple[float, float]]
+    """Channel to p-value that the residual does not depend on the inputs, before and after."""
+    regimes: dict[str, dict[str, np.ndarray]]
+    """Run to regime variable (`airspeed_m_s`, …, and `time_s`) on the traces' instants."""
+    absent: tuple[UpperLimit, ...] = ()
+    """Ids that were tested and not found, and how large they may be."""
+    winds: tuple[RunWind, ...] = ()
+    """Winds that the model flies in, by run."""
+    between_sensors: tuple[Trace, ...] = ()
+    """Two sensors of one quantity compared (`accelerometer_x` … `gyroscope_z`): effects are judged by them, too."""
+    without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
+    """To the id of a stated effect what is left of every trace of `compared` without it, all else fitted anew."""
+    suggested_values: Mapping[str, tuple[tuple[float, float, float, float], str]] = field(default_factory=dict)
+    """Values that an open class would change: as in `values`, and why."""
+    shares: Mapping[str, float] = field(default_factory=dict)
+    """To the id of a stated effect the part of the error that goes on the runs held out which goes without it."""
+    effect_sizes: Mapping[str, Size] = field(default_factory=dict)
+    """To the id of a stated effect what it does where it does most, on the runs held out."""
+    unexplained_share: float = 0.0
+    """Share of the residual's energy above the noise floor that the findings leave (0 where nothing was off)."""
+    unexplained_channels: tuple[str, ...] = ()
+    unexplained_depends_on: tuple[str, ...] = ()
+    unexplained_description: str = ""
+    next_manoeuvre: str = ""
+    next_separates: tuple[str, ...] = ()
+    force_source: str = "accelerometer"
+    samples_per_row: int = 1
+    """How many samples a row of a stand's or bench's traces is the mean of."""
+    instrument: Instrument | None = None
+    """Kinds `stand` and `bench`: what is known of the instrument."""
+    loadings: tuple[Loading, ...] = ()
+    """Kinds `stand` and `bench`: loads and readings as analysed, rotor speeds as the improved model has them."""
+    notes: tuple[str, ...] = field(default_factory=tuple)
+    """Things a reader must know (what was derived, what was corrected)."""
+    instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Wrong value to others, in words, that would explain as much in its place: `yaw inertia −9.8 ± 0.4 %`."""
+    fired: Mapping[str, int] = field(default_factory=dict)
+    """How often each rule's condition held during the analysis (`rules`)."""
+    corrected: tuple[str, ...] = ()
+    """Values corrected within their trust, in words: `thrust coefficient −0.7 %`."""
+    doubts: tuple[Doubt, ...] = ()
+    """What `check` doubts in the set, and values that are only proposed."""
+    worse_elsewhere: tuple[str, ...] = ()
+    """Channels that what is delivered predicts worse than the refitted vehicle where neither was fitted, in words;
+    the gate lets none pass."""
+    withheld_values: Mapping[str, str] = field(default_factory=dict)
+    """Wrong value (by its contract name) that the gate keeps out of the vehicle, to the reason."""
+    believed_values: tuple[ValueRow, ...] = ()
+    """Every believed value before and after, as an identification report has them."""
+    value_correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    """Correlation of the estimates of two values of which little more than a ratio is known."""
+
+    @property
+    def compared(self) -> tuple[Trace, ...]:
+        """Everything that effects are judged by: the traces that are shown, and those between sensors."""
+        return (*self.traces, *self.between_sensors)
+
+    @property
+    def wrong_values(self) -> dict[str, tuple[float, float, float, float]]:
+        """Those of `values` that were believed to be something else; a scale that nobody stated is no mismatch."""
+        return {name: v for name, v in self.values.items() if math.isfinite(v[0])}
+
+
+def with_status(analysis: Analysis, *statuses: str) -> list[Finding]:
+    """Findings of these statuses, the surest first."""
+    return sorted((f for f in analysis.findings if f.status in statuses), key=lambda f: f.p_value)
+
+
+def one_per_class(findings: Sequence[Finding]) -> list[Finding]:
+    """The surest of each class of alternatives."""
+    kept, seen = [], set()
+    for finding in findings:
+        members = frozenset(finding.alternatives) | {finding.id}
+        if not members & seen:
+            kept.append(finding)
+        seen |= members
+    return kept

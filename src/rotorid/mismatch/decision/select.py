@@ -1,0 +1,509 @@
+"""Which effects are at work: a grouped search over the catalogue with the believed values free throughout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.findings import Reason
+from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
+from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
+
+ENTER_P = 5e-5
+"""A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
+KEEP_P = 1e-4
+COST_PER_PARAMETER = 8.0
+"""Whitened squares that each further parameter must explain before a richer form is preferred."""
+SMALLEST_SIZE = rules.SIZE["least"]
+SHARE_OF_LARGEST = rules.OVERSHADOWED["share"]
+COST_PER_EFFECT = 20.0
+"""Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
+COST_OF_UNKNOWN = 40.0
+"""Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
+SHARE_OF_UNKNOWN = 0.1
+ALTERNATIVE_P = 0.01
+"""A term that given an alternative is less significant than this could be that alternative instead."""
+INSTEAD_P = 1e-3
+"""It must itself be as significant as this in the other's place."""
+MOST_EXTRA_PARAMETERS = 3
+"""An alternative with more further parameters than this explains by its freedom, not by its cause."""
+MOST_EFFECTS = 10
+VALUE_FLOOR = 0.002
+"""Relative one-sigma that no estimate here is better than (filters, timing): of two effects that explain the same but
+for twice as much neither explains more."""
+MOST_TRIALS = 12
+"""Exchanges looked at closely, the most promising first."""
+LEAST_TRANSFER = rules.TRANSFER["share"]
+LEAST_PROMISE = rules.TRANSFER["promise"]
+NEAR_LIMIT = 0.98
+"""Share of the furthest that a believed value may move at which it counts as held there."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A term judged given the present model."""
+
+    key: str
+    beta: np.ndarray
+    p_value: float
+    gain: float
+    inflation: float
+    physical: bool
+    """Coefficients inside their bounds, regressors that are more than their own noise, and a contribution of which the
+    others could not take over all but what its form is wrong by (SHARE_OF_LARGEST): such a one is whatever its sum
+    with the others is, and two of them grow against each other without end."""
+    named: bool = True
+    """Whether it is of the catalogue."""
+
+    @property
+    def score(self) -> float:
+        """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
+        score = self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
+        return score if self.named else (1 - SHARE_OF_UNKNOWN) * score - COST_OF_UNKNOWN * self.inflation
+
+
+@dataclass
+class Selection:
+    """The terms that entered, and what was seen on the way."""
+
+    active: list[str]
+    fit: Fit
+    p_values: dict[str, float] = field(default_factory=dict)
+    trail: list[str] = field(default_factory=list)
+    not_established: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Questions:
+    """What a search asks of the recordings that its regression does not hold."""
+
+    sizes_of: Callable[[str, np.ndarray], np.ndarray]
+    """Size of a term (key, coefficients) per channel in units of its noise, (12,), less what values would absorb."""
+    joint_sizes: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
+    known_sizes: np.ndarray = field(default_factory=lambda: np.zeros(12))
+    """The same of effects that are in the model already (between command and rotor speed), (12,)."""
+
+
+class Search:
+    """Forward search with replacement of forms and backward checks."""
+
+    refused: Mapping[str, str] = {}
+    """Ids that are not to enter, with the reason."""
+    widened = False
+    """Whether believed values have more room than their trust gives."""
+
+    def __init__(self, regression: Regression, ask: Questions):
+        self.regression = regression
+        self.terms: dict[str, Term] = {t.key: t for t in regression.terms}
+        self.always = [t.key for t in regression.terms if t.kind != "effect"]
+        self.ask = ask
+        self.blocks = int(regression.training.sum())
+
+    def within_bounds(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
+        """Whether coefficients are inside their bounds, or outside by less than their own uncertainty."""
+        if not term.form.linear:
+            return bool(0.2 < beta[0] < 5.0)
+        for index, value, sd in zip(term.form.linear, beta, error, strict=True):
+            parameter = term.form.parameters[index]
+            if value < parameter.low - 1.5 * sd or value > parameter.high + 1.5 * sd:
+                return False
+        return True
+
+    def physical(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
+        """Whether coefficients are within their bounds, and large enough for what the form says."""
+        if rules.BOUNDS(not self.within_bounds(term, beta, error)):
+            return False
+        if not term.form.linear:
+            return True
+        for index, value, sd in zip(term.form.linear, beta, error, strict=True):
+            if rules.MUST_SHOW(index in term.form.must_show and abs(value) < 2.0 * sd):
+                return False
+        limits = [term.form.parameters[i].negligible for i in term.form.linear]
+        return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
+
+    def judge(self, key: str, active: list[str], base: Fit, jackknife: bool = False) -> Candidate:
+        """A term added to (or, if in `active`, kept in) the model."""
+        keys = self.always + [k for k in active if k != key] + [key]
+        fit = self.regression.fit(keys, jackknife=jackknife)
+        cols = self.regression.columns([key])
+        where = len(fit.columns) - len(cols) + np.arange(len(cols))
+        beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
+        p_value = self.regression.wald(fit, cols, self.blocks)
+        gain = fit.gain - base.gain
+        statistic = quadratic_form(beta, covariance)
+        inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
+        physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
+        if physical:
+            own, noise = self.regression.own_part(keys, key, beta)
+            physical = not rules.OWN_PART(own <= SHARE_OF_LARGEST**2 or noise >= MOST_ATTENUATION)
+        physical = physical and not rules.STRAIN(self.strains(fit, base))
+        return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
+
+    def strains(self, fit: Fit, base: Fit) -> bool:
+        """Whether a term needs a believed value far from its belief that the model without it does not need."""
+        for term in self.regression.terms:
+            if term.kind != "value":
+                continue
+            column = self.regression.start[term.key]
+            most = min(rules.STRAIN["deviations"] * term.prior_sd[0], NEAR_LIMIT * self.regression.limit[column])
+            with_it, without = fit.beta[fit.columns == column][0], base.beta[base.columns == column][0]
+            side = np.sign(with_it)  # a value that was off the other way is pushed all the further
+            if side * with_it > most and side * with_it > side * without + term.prior_sd[0]:
+                return True
+        return False
+
+    def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
+        """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
+        own = self.ask.sizes_of(key, beta)
+        largest = self.ask.known_sizes.copy()
+        others = [k for k in active if k != key]
+        if others:
+            fit = self.regression.fit(self.always + others)
+            for k in others:
+                cols = self.regression.columns([k])
+                where = fit.places(cols)
+                largest = np.maximum(largest, self.ask.sizes_of(k, fit.beta[where]))
+        limits, burst = rules.OVERSHADOWED, self.terms[key].run
+        dwarfed = own < (limits["share_of_burst"] if burst else limits["share"]) * largest
+        if limits(bool(dwarfed.any())):
+            own = np.where(dwarfed, 0.0, own)
+        # A burst is easily imitated by what the form of a strong effect leaves over.
+        return float(own.max()) / (limits["times_for_burst"] if burst else 1.0)
+
+    def without(self, key: str, active: list[str]) -> Fit:
+        return self.regression.fit(self.always + [k for k in active if k != key])
+
+    def gains(self, active: list[str]) -> list[tuple[float, Term]]:
+        """Every term whose id is not in the model yet with what it would explain less what its parameters cost."""
+        taken = {self.terms[k].once for k in active}
+        base = self.regression.explained(self.always + active)
+        return [
+            (self.regression.explained([*self.always, *active, t.key]) - base - COST_PER_PARAMETER * t.size, t)
+            for t in self.terms.values()
+            if t.kind == "effect" and t.once not in taken
+        ]
+
+    def candidates(self, active: list[str]) -> list[Candidate]:
+        """Terms whose id is not in the model yet and that are worth their parameters, judged, best first."""
+        base = self.regression.fit(self.always + active)
+        found = [self.judge(t.key, active, base) for gain, t in self.gains(active) if gain > 0]
+        return sorted(found, key=lambda c: -c.score)
+
+    def best_form(self, key: str, active: list[str]) -> str:
+        """The form of the same id that explains most for its parameters, the others in the model kept."""
+        effect = self.terms[key].effect
+        if self.terms[key].run:
+            return key
+        base = self.without(key, active)
+        rest = [k for k in active if k != key]
+        judged = [
+            self.judge(t.key, rest, base) for t in self.terms.values() if t.kind == "effect" and t.effect == effect
+        ]
+        physical = [c for c in judged if c.physical]
+        return max(physical, key=lambda c: c.score).key if physical else key
+
+    def simpler(self, active: list[str]) -> list[str] | None:
+        """A model with one id less and other forms of those that stay, if it explains nearly as much.
+
+        Drag and inflow at the hubs, for example, are the same as at the centre of mass with a damping in addition.
+        """
+        if len(active) < 2 or not rules.SIMPLER.on:
+            return None
+        best, found = self.worth(active), None
+        for gone in active:
+            if self.terms[gone].run:
+                continue
+            trial = [k for k in active if k != gone]
+            value = self.worth(trial)
+            for place in 2 * [i for i, k in enumerate(trial) if not self.terms[k].run]:
+                for form in self.terms.values():
+                    if form.kind != "effect" or form.effect != self.terms[trial[place]].effect:
+                        continue
+                    other = [*trial[:place], form.key, *trial[place + 1 :]]
+                    if (worth := self.worth(other)) > value:
+                        trial, value = other, worth
+            if value > best and self._all_physical(trial):
+                best, found = value, trial
+        return found
+
+    def worth(self, keys: list[str]) -> float:
+        """Whitened squares that a model explains, less what its parameters and ids cost."""
+        parameters = sum(self.terms[k].size for k in keys)
+        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
+        gain = self.regression.explained(self.always + keys)
+        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
+
+    def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
+        """A model with one id in another's place, if it explains clearly more: the first to enter may be wrong.
+
+        The newcomer must hold by itself: what it displaces is not looked at again, and would be lost with it.
+        """
+        if not rules.EXCHANGE.on:
+            return None
+        taken = {self.terms[k].once for k in active} | set(dropped)
+        present, whole = self.worth(active), self.regression.explained(self.always + active)
+        trials = []
+        for gone in active:
+            if self.terms[gone].run:
+                continue
+            own = whole - self.regression.explained(self.always + [k for k in active if k != gone])
+            least = present + max(COST_PER_PARAMETER / 2, (2 * VALUE_FLOOR) ** 2 * own)
+            for other in self.terms.values():
+                if other.kind == "effect" and not other.run and other.once not in taken:
+                    trial = [other.key if k == gone else k for k in active]
+                    if (worth := self.worth(trial)) > least:
+                        trials.append((worth, other.key, trial))
+        trials = sorted(trials, key=lambda t: -t[0])
+        return next(
+            (
+                trial
+                for _, new, trial in trials[:MOST_TRIALS]
+                if self._all_physical(trial) and self.failing(new, trial)[0] is None
+            ),
+            None,
+        )
+
+    def values_alone(self, selection: Selection) -> Regression | None:
+        """The regression with more room for believed values, where those alone explain as much as a selection does.
+
+        A value that is off by many times its trust is held back in the search, and something else absorbs the rest.
+        """
+        reg, fit = self.regression, selection.fit
+        limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
+        moved = [abs(float(fit.beta[fit.columns == reg.start[t.key]][0])) for t in reg.terms if t.kind == "value"]
+        held = sum(m > NEAR_LIMIT * most for m, most in zip(moved, limits, strict=True))
+        if not held or not selection.active:
+            return None
+        wide = reg.with_room(VALUE_LIMITS[1])
+        enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
+        return wide if rules.VALUES_FIRST(enough) else None
+
+    def beside(self, active: list[str]) -> Fit | None:
+        """The model with the strongest further effect that explains more than it costs and is still not stated.
+
+        It may be too small, too unsure or too much like the others; as long as it may be there, what is stated may be
+        off by what it would change.
+        """
+        found = next((c for c in self.candidates(active) if c.score > 0 and c.physical), None)
+        return None if found is None else self.regression.fit([*self.always, *active, found.key])
+
+    def _all_physical(self, active: list[str]) -> bool:
+        return all(self.judge(key, active, self.without(key, active)).physical for key in active)
+
+    def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
+        """Why a term of the model does not hold given the others (None where it does), and its score."""
+        judged = self.judge(key, active, self.without(key, active))
+        size = self.weight(key, judged.beta, active)
+        reason = None
+        if judged.p_value > KEEP_P:
+            reason = Reason("significance", f"p = {judged.p_value:.2g} given the others")
+        elif not judged.physical:
+            reason = Reason("physical_bounds", "its coefficients are outside physical bounds")
+        elif rules.SIZE(size < SMALLEST_SIZE):
+            reason = Reason("size", f"its size is {size:.2g} of the noise")
+        return reason, judged.score
+
+    def weak(self, active: list[str]) -> tuple[str, str] | None:
+        """The worst term of the model that fails a test, with the reason; None if all hold."""
+        found = [(key, *self.failing(key, active)) for key in active]
+        weak = [(score, key, reason) for key, reason, score in found if reason]
+        return min(weak)[1:] if weak else None
+
+    def run(self, active: list[str] | None = None) -> Selection:
+        """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
+        active = list(active or [])
+        trail: list[str] = []
+        refuted: dict[str, str] = dict(self.refused)
+        for _ in range(MOST_EFFECTS):
+            dropped = dict(refuted)
+            active = self._grown(active, dropped, trail)
+            found = self._refuted(active)
+            if found is None:
+                break
+            key, reason = found
+            active = [k for k in active if k != key]
+            refuted[self.terms[key].once] = reason
+            trail.append(f"- {key}: {reason}")
+        # No single block of the recording decides.
+        fit = self.regression.fit(self.always + active, jackknife=True)
+        final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
+        kept = {self.terms[k].effect for k in active}
+        # What acts in one window of one run was dropped under its key.
+        reasons = {self.terms[name].effect if name in self.terms else name: r for name, r in dropped.items()}
+        return Selection(active, fit, final, trail, {e: r for e, r in reasons.items() if e not in kept})
+
+    def _grown(self, active: list[str], dropped: dict[str, str], trail: list[str]) -> list[str]:
+        """The model grown, its forms replaced and its weak terms taken out; `dropped` and `trail` are filled."""
+        for _ in range(4 * MOST_EFFECTS):
+            added = self._next(active, dropped) or []
+            active = active + added
+            trail += [f"+ {key}" for key in added]
+            for key in list(active):
+                better = self.best_form(key, active)
+                if better != key:
+                    active[active.index(key)] = better
+                    trail.append(f"  {key} → {better}")
+            if (simpler := self.simpler(active)) is not None and rules.SIMPLER(True):
+                trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
+                for key in active:
+                    if self.terms[key].once not in {self.terms[k].once for k in simpler}:
+                        dropped[self.terms[key].once] = Reason("simpler", "the others explain as much in other forms")
+                active = simpler
+            exchanged = None if added else self.swapped(active, dropped)
+            if exchanged is not None and rules.EXCHANGE(True):
+                trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
+                for gone in set(active) - set(exchanged):
+                    dropped[self.terms[gone].once] = Reason("exchange", "another explains more in its place")
+                active = exchanged
+            while (weak := self.weak(active)) is not None:
+                key, reason = weak
+                active = [k for k in active if k != key]
+                dropped[self.terms[key].once] = reason
+                trail.append(f"- {key}: {reason}")
+            if not added and exchanged is None:
+                break
+        return active
+
+    def _next(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
+        """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
+        if len(active) >= MOST_EFFECTS:
+            return None
+        for candidate in sorted(self.candidates(active), key=self._turn):
+            effect = self.terms[candidate.key].once
+            if candidate.score <= 0:
+                continue
+            if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
+                continue
+            size = self.weight(candidate.key, candidate.beta, active)
+            if not rules.SIZE(size < SMALLEST_SIZE):
+                return [candidate.key]
+            dropped.setdefault(effect, Reason("size", f"its size is {size:.2g} of the noise"))
+        return None
+
+    def _turn(self, candidate: Candidate) -> int:
+        """When a candidate is looked at: one that could be two effects, or has no name, where nothing else enters."""
+        later = self.terms[candidate.key].form.compound if candidate.named else False
+        return int(rules.COMPOUND_LAST(later)) if candidate.named else 2
+
+    def _refuted(self, active: list[str]) -> tuple[str, str] | None:
+        """A term that other environments or another term speak against, with the reason."""
+        if rules.TRANSFER((failed := self.refuted_elsewhere(active)) is not None):
+            return failed, Reason("transfer", "where it was not fitted it does not keep what it promises")
+        if rules.STEADY((unsteady := self.unsteady(active)) is not None):
+            return unsteady, Reason("steady", "it differs from run to run")
+        if rules.CANCELS((cancelling := self.cancelling(active)) is not None):
+            return cancelling, Reason("cancels", "where it is strongest it only cancels another")
+        if rules.FREE_VALUES((imitating := self.imitates_values(active)) is not None):
+            return imitating, Reason("free_values", "given believed values that are free it is not significant")
+        return None
+
+    def imitates_values(self, active: list[str]) -> str | None:
+        """The least significant term of those that are not significant once believed values are free.
+
+        The search holds values by their trust. Where one is off by many times that, an effect may absorb the rest: a
+        thrust curve stands for a wrong mass or arm.
+        """
+        values = {t.key: VALUE_LIMITS[1] for t in self.regression.terms if t.kind == "value"}
+        if not values or not active:
+            return None
+        wide = self.regression.with_room(VALUE_LIMITS[1])
+        fit = wide.fit(self.always + active, jackknife=True, loose=values)
+        p_values = {k: wide.wald(fit, wide.columns([k]), self.blocks) for k in active if not self.terms[k].run}
+        least = max(p_values, key=p_values.get, default=None)
+        return least if least is not None and p_values[least] > KEEP_P else None
+
+    def cancelling(self, active: list[str]) -> str | None:
+        """The term of least worth that in its strongest channel is cancelled by another.
+
+        Something the catalogue lacks is in a channel where noise is low: a tilt of ten degrees is bought there, and
+        an accelerometer that is turned by ten degrees hides it in the force.
+        """
+        if len(active) < 2:
+            return None
+        fit = self.regression.fit(self.always + active)
+        named = [k for k in active if self.terms[k].effect not in UNKNOWNS and not self.terms[k].run]
+
+        def sizes(keys: list[str]) -> np.ndarray:
+            cols = self.regression.columns(keys)
+            return self.ask.joint_sizes(cols, fit.beta[fit.places(cols)])
+
+        alone, found = {k: sizes([k]) for k in named}, set()
+        for pair in combinations(named, 2):
+            both = sizes(list(pair))
+            for key in pair:
+                c = int(np.argmax(alone[key]))
+                least = min(alone[k][c] for k in pair)
+                if least > SMALLEST_SIZE and both[c] < rules.CANCELS["share"] * least:
+                    found.add(key)
+        return min(found, key=lambda k: fit.gain - self.without(k, active).gain, default=None)
+
+    def refuted_elsewhere(self, active: list[str]) -> str | None:
+        """The term that keeps least of what it promises on environments it was not fitted on, if that is too little.
+
+        One that is at work keeps nearly all of it in nearly every environment that excites it; one that fills a gap
+        which another cause left gains on average only.
+        """
+        worst, found = LEAST_TRANSFER, None
+        for key in active:
+            if self.terms[key].run:
+                continue
+            seen = self.regression.compare(self.always + active, self.always + [k for k in active if k != key])
+            if seen.promised.sum() <= LEAST_PROMISE or not seen.votes.any():
+                continue
+            kept = (
+                seen.transfer
+                if seen.won >= rules.TRANSFER["won"] * seen.expected_won
+                else min(seen.transfer, LEAST_TRANSFER - 1e-9)
+            )
+            if kept < worst:
+                worst, found = kept, key
+        return found
+
+    def unsteady(self, active: list[str]) -> str | None:
+        """A term whose coefficients are not the same from run to run, beyond doubt and by much."""
+        fit = self.regression.fit(self.always + active)
+        for key in active:
+            if self.terms[key].run:
+                continue
+            spread, p = self.regression.between_runs(fit, key)
+            cols = self.regression.columns([key])
+            beta = fit.beta[fit.places(cols)]
+            runs = len(np.unique(self.regression.run[self.regression.training]))
+            # Coefficients of one term have different units: what counts is how much of its contribution changes.
+            gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
+            changes = np.diag(gram) @ spread * runs > rules.STEADY["spread"] ** 2 * (beta @ gram @ beta)
+            if p < rules.STEADY["p_value"] and changes:
+                return key
+        return None
+
+    def alternatives(self, key: str, active: list[str]) -> list[str]:
+        """Ids that are collinear with a term: with one of them in its place the term is no longer needed."""
+        rest = [k for k in active if k != key]
+        taken = {self.terms[k].effect for k in rest}
+        base = self.without(key, active)
+        own = self.judge(key, rest, base)
+        found = []
+        for term in self.terms.values():
+            if term.kind != "effect" or term.effect in taken or term.effect == self.terms[key].effect:
+                continue
+            if term.effect in found or term.effect in UNKNOWNS:
+                continue
+            if self._replaces(term.key, own, rest, base):
+                found.append(term.effect)
+        return found
+
+    def _replaces(self, other: str, own: Candidate, rest: list[str], base: Fit) -> bool:
+        """Whether given another term alone one of the model is no longer needed."""
+        instead = self.judge(other, rest, base)
+        if not instead.physical or instead.p_value > INSTEAD_P or instead.gain < 0.5 * own.gain:
+            return False
+        if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
+            return False
+        beside = self.regression.fit(self.always + rest + [other])
+        return self.judge(own.key, [*rest, other], beside).p_value > ALTERNATIVE_P

@@ -1,0 +1,259 @@
+"""What is fitted to a set: what lies between command and rotor speed, and the model of force, moment and sensors.
+
+1. the chain from command to speed, 2. the grouped search over force, moment and sensor effects with the believed
+values free, refined in its nonlinear parameters, the wind and the gusts, 3. the chain once more with the effects found
+known, 4. less what may as well be nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.effects.catalogue import ids_of_stage
+from rotorid.effects.contract import CURVE, Form
+from rotorid.effects.throttle_curve import SLOPE
+from rotorid.mismatch.decision import rules
+from rotorid.mismatch.decision.decide import coefficients, wrong_values
+from rotorid.mismatch.decision.findings import Reason
+from rotorid.mismatch.decision.select import COST_PER_EFFECT, COST_PER_PARAMETER
+from rotorid.mismatch.model.delivered import Values
+from rotorid.mismatch.model.gusts import with_gusts
+from rotorid.mismatch.model.payload_windows import Windows, changes, loads, payload_windows_of, with_payload_on_board
+from rotorid.mismatch.model.prepare import Prepared
+from rotorid.mismatch.model.refitted import size_of_value
+from rotorid.mismatch.model.swinging import hung, like, price, swinging_term, with_likely_length
+from rotorid.mismatch.model.value_sides import sides_of_values
+from rotorid.mismatch.model.within_trust import beyond_trust
+from rotorid.mismatch.model.wrench import (
+    WrenchModel,
+    after_residual,
+    chosen,
+    path_segments,
+    refine_nonlinear,
+    speed_path,
+    with_wind,
+    wrench_model,
+)
+from rotorid.mismatch.plant.rows import RUN_SCALE, Term
+from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult
+from rotorid.recordings.signal.kernels import causal
+
+RUN_P = 1e-6
+RUN_SPREAD = 0.007
+"""Relative spread of the thrust coefficient between runs below which one number serves all."""
+RUN_TRUST = 0.02
+"""Relative one-sigma of a run's own thrust about the common one."""
+
+ROUNDS, CHAIN_ROUNDS = 4, 2
+MOVED = 0.3
+"""Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The model of a set, the believed values it contradicts, and what lies between command and speed."""
+
+    model: WrenchModel
+    values: Values
+    chain: CommandChain | None
+    """None where no command is recorded."""
+    measured: bool
+    """Whether rotor speeds are measured."""
+
+    @property
+    def prepared(self) -> Prepared:
+        """What was fitted: the fitted runs alone."""
+        return self.model.prepared
+
+    @property
+    def commanded(self) -> bool:
+        """Whether rotor speeds are known from their commands alone."""
+        return self.chain is not None and not self.measured
+
+
+def fitted(prepared: Prepared) -> Fitted:
+    """The model of a set."""
+    measured = all(s.measured_speed for s in prepared.segments)
+    chain = speed_path(prepared)
+    if chain is None or measured:
+        model = refined_model(prepared, *turning(prepared))
+    else:
+        chain, model = with_chain(prepared, chain)
+    return Fitted(model, values_called_wrong(model, ()), chain, measured)
+
+
+def turning(prepared: Prepared, chain: CommandChain | None = None):
+    """Segments and their noisy copies with the rotors turning as measured, or as a chain makes of their commands."""
+    both = prepared.segments, prepared.noisy_segments
+    if chain is None:
+        return both
+    return tuple(path_segments(segments, *chain, prepared.thinner.cutoff_hz) for segments in both)
+
+
+def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, WrenchModel]:
+    """The chain and the model where rotor speeds are known from commands alone."""
+    model = refined_model(prepared, *turning(prepared, chain))
+    known, trusted = bool(model.selection.active), strains(model)
+    for _ in range(CHAIN_ROUNDS if known or trusted else 0):
+        # The wrench effects found change what the commands must explain, and what values beyond their trust made room
+        # for is not delivered: once more with the effects known and such values as believed.
+        chain = speed_path(prepared, chosen(model), trusted=trusted)
+        model = refined_model(prepared, *turning(prepared, chain))
+        if trusted or not (trusted := strains(model)):
+            break
+    if rules.MERE_SCALE(only_scales(chain.result)):
+        curves = ids_of_stage(CURVE)
+        chain = speed_path(prepared, chosen(model), tuple(curves), trusted=trusted)
+        reason = Reason("mere_scale", "another thrust coefficient explains as much")
+        dropped = {**chain.result.dropped, **dict.fromkeys(curves, reason)}
+        chain = chain._replace(result=replace(chain.result, dropped=dropped))
+        model = refined_model(prepared, *turning(prepared, chain))
+    return chain, model
+
+
+def strains(model: WrenchModel) -> bool:
+    """Whether the recordings ask a value that is not called wrong to move beyond its trust."""
+    return beyond_trust(model, values_called_wrong(model, ()), model.selection.active)
+
+
+def only_scales(result: SpeedResult) -> bool:
+    """Whether a throttle curve between command and speed is nothing but another slope, as far as it is known."""
+    key, form = next(((k, f) for k, f in result.fit.chain if f.stage == CURVE), (None, None))
+    if form is None or SLOPE not in [p.symbol for p in form.parameters]:
+        return False
+    where = result.fit.slice_of(key)
+    sd = np.sqrt(np.diag(result.fit.covariance)[where])
+    away = np.abs(result.fit.values[where] - np.array(form.neutral)) > 1.96 * sd
+    return not any(away[i] for i, p in enumerate(form.parameters) if p.symbol != SLOPE)
+
+
+def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
+    """The search, then nonlinear parameters refined and the search repeated from there."""
+    model = with_own_scales(prepared, segments, noisy)
+    if rules.PAYLOAD_WINDOWS(bool(windows := payload_windows_of(model))):
+        segments, noisy, model = with_payload(prepared, model, windows)
+    segments, noisy, model = with_swing(prepared, model)
+    terms = list(model.terms)
+    for number in range(
+        ROUNDS if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
+    ):
+        refined = refine_nonlinear(prepared, model, segments, wide=number == 0)
+        terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
+        before = model
+        if segments[0].motion.hung is not None:
+            segments, noisy = hung_anew(model, terms) or (segments, noisy)
+        model = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
+        if converged(before, model):
+            break
+    model = with_wind(prepared, model, segments, noisy, terms)
+    if model.wind is not None:
+        terms = list(model.terms)
+    return with_gusts(prepared, model, terms)
+
+
+def converged(before: WrenchModel, after: WrenchModel) -> bool:
+    """Whether two rounds have the same terms at work, and no coefficient that moved by MOVED of its error."""
+    if set(before.selection.active) != set(after.selection.active):
+        return False
+    for key in after.selection.active:
+        (old, _), (new, covariance) = (coefficients(m.regression, m.selection.fit, key) for m in (before, after))
+        if np.any(np.abs(new - old) > MOVED * np.sqrt(np.diag(covariance))):
+            return False
+    return True
+
+
+def with_own_scales(prepared: Prepared, segments, noisy) -> WrenchModel:
+    """The search over all terms, where thrust differs between runs with a scale for each."""
+    model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
+    if not rules.OWN_SCALES(thrust_differs(model)):
+        return model
+    return wrench_model(prepared, with_run_scales(prepared.terms, prepared), segments=segments, noisy_segments=noisy)
+
+
+def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows]):
+    """Segments, their noisy copies and the model with a payload on board in some windows, where that explains more.
+
+    Each taking up and dropping costs as much as an effect; without a payload in the model everything is as it was.
+    """
+    segments, noisy = model.segments, model.noisy_segments
+    both = with_payload_on_board(segments, windows), with_payload_on_board(noisy, windows) if noisy else noisy
+    with_it = with_own_scales(prepared, *both)
+    carries = any(t.key in with_it.selection.active for t in loads(with_it))
+    filters, price = model.regression.filters, COST_PER_EFFECT * changes(both[0])
+    if carries and cost_of(with_it, filters) + price < cost_of(model, filters):
+        return *both, with_it
+    return segments, noisy, model
+
+
+def with_swing(prepared: Prepared, model: WrenchModel):
+    """Segments, their noisy copies and the model with a payload that hung as each run says, if that explains more."""
+    same = model.segments, model.noisy_segments, model
+    start = swinging_term(model)
+    term = None if start is None else with_likely_length(model, start)
+    segments = None if term is None else hung(model, model.segments, model.rows, term)
+    if segments is None:
+        return same
+    noisy = like(segments, model.noisy_segments)
+    terms = [replace(t, values=term.values) if is_like(t, start) else t for t in prepared.terms]
+    with_it = with_own_scales(replace(prepared, terms=terms), segments, noisy)
+    swings = any(with_it.search.terms[k].form.swings for k in with_it.selection.active)
+    filters = model.regression.filters
+    if swings and cost_of(with_it, filters) + price(segments) < cost_of(model, filters):
+        return segments, noisy, with_it
+    return same
+
+
+def is_like(term: Term, other: Term) -> bool:
+    """Whether a term swings on the same cable as another."""
+    return bool(term.form and term.form.swings) and term.values == other.values
+
+
+def hung_anew(model: WrenchModel, terms: Sequence[Term]):
+    """Segments and their noisy copies with a payload that hung as a model with other lengths of the cable says."""
+    active = {k for k in model.selection.active if model.search.terms[k].form.swings}
+    term = next((t for t in terms if t.key in active), None)
+    segments = None if term is None else hung(model, model.segments, model.rows, term)
+    return None if segments is None else (segments, like(segments, model.noisy_segments))
+
+
+def changes_its_columns(form: Form) -> bool:
+    """Whether a form's columns hang on what the model holds: nonlinear parameters, or the accelerations predicted."""
+    return bool(form.nonlinear) or not {"angular_acceleration", "specific_force"}.isdisjoint(form.requires)
+
+
+def thrust_differs(model: WrenchModel) -> bool:
+    """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than RUN_SPREAD."""
+    if "thrust" not in model.search.terms or not all(s.measured_speed for s in model.prepared.segments):
+        return False
+    regression = model.search.regression
+    fit = regression.fit(model.search.always + model.selection.active)
+    spread, p = regression.between_runs(fit, "thrust")
+    runs = len(np.unique(regression.run[regression.training]))
+    return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
+
+
+def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
+    """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
+    runs = dict.fromkeys([*(s.run for s in prepared.segments), *prepared.unseen])
+    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(RUN_TRUST,), run=r) for r in runs)]
+
+
+def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
+    """Believed values that the model's recordings contradict, less those refused."""
+    sides, size = sides_of_values(model), size_of_value(model)
+    return wrong_values(
+        sides.judging, model.selection, sides.agreeing, size, refused=refused, measured_moment=sides.measured_moment
+    )
+
+
+def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
+    """Whitened squares that a model leaves, and what its ids and parameters cost."""
+    left = 0.0
+    for part in after_residual(model):
+        for channel, taps in filters.items():
+            left += float((causal(taps, part[:, channel])[len(taps) :] ** 2).sum())
+    terms = [model.search.terms[k] for k in model.selection.active]
+    return left + sum(COST_PER_EFFECT + COST_PER_PARAMETER * t.size for t in terms)

@@ -1,0 +1,217 @@
+"""What no named effect explains: how much, in which channels, what it depends on, and a plain description."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, left_by, standardised
+from rotorid.mismatch.model.slow_changes import slow_excess
+from rotorid.mismatch.model.wrench import WORTH_STATING, channel_floor
+from rotorid.mismatch.plant.between_runs import DifferingMeans, apart
+from rotorid.mismatch.plant.rows import CHANNELS
+from rotorid.mismatch.plant.unknowns import DEPENDS_ON, UNKNOWNS
+
+MOST_BY_VALUES = 0.8
+"""Share up to which mismatch that some believed value would explain counts as left over: its kind is known."""
+UNCLAIMED = 3.0
+"""Energy relative to the noise's from which what only free values explain counts by itself, without any claim."""
+LEAST_NOISE = 0.1
+"""Share of what a flexible regression leaves that is noise, whatever else moves in it."""
+
+
+@dataclass(frozen=True)
+class ChannelLeftover:
+    """What one channel holds on the stretches judged, as energies: sums of squares, N² or N² m²."""
+
+    name: str
+    count: int
+    noise: float
+    """What is left when everything that could be explained is taken away."""
+    explainable: float
+    """What the believed vehicle leaves beyond that."""
+    empirical: float
+    """Of the empirical terms that won against the catalogue."""
+    diffuse: float
+    """What a flexible regression on all inputs still explains."""
+    slow: float
+    """Slow changes that no sensor makes."""
+    between: DifferingMeans | None
+    """Means that differ between runs."""
+    shifted: float
+    """Energy of those means."""
+    by_values: float
+    """What is delivered keeps because no believed value by itself could be called wrong."""
+
+    @property
+    def unexplained(self) -> float:
+        """Energy whose cause no named effect and no believed value holds."""
+        return max(self.empirical + self.diffuse, self.slow + self.shifted)
+
+    @property
+    def counts(self) -> bool:
+        """Whether anything is left over here."""
+        return self.unexplained > 0 or self.by_values > 0
+
+    @property
+    def gain(self) -> str:
+        """What a plain empirical term would gain, in words."""
+        whole = np.sqrt((self.noise + self.unexplained + self.by_values) / self.count)
+        return f"{self.name} from {whole:.3g} to {np.sqrt(self.noise / self.count):.3g} {_unit(self.name)}"
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """What stays unexplained: a share of the mismatch, 0 to 1, channels, inputs and a description."""
+
+    share: float = 0.0
+    channels: tuple[str, ...] = ()
+    depends_on: tuple[str, ...] = ()
+    description: str = ""
+
+
+def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None, claimed=True) -> Leftover:
+    """What no named effect explains of the force and moment channels.
+
+    Five things count: empirical terms that won against the catalogue, what a ridge regression on all inputs and
+    their products ("whatever could be explained") still finds, fitted on the training runs and judged held out,
+    slow changes that no sensor's noise can have made, means that differ between runs, and what the residuals
+    `delivered` ((n, 12) per stretch; None where values stay within their trust) keep because no believed value by
+    itself could be called wrong (where nothing is `claimed` only as much as makes the error twice the noise's).
+    `p_after` and `depends` are those of `dependence`.
+    """
+    full = model.full_fit()
+    added = model.contributions.of(full.columns, full.beta)
+    slow = slow_excess(prepared, model, segments, noisy, added)
+    channels = channels_of(
+        prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else UNCLAIMED
+    )
+    total = sum(c.explainable / c.noise for c in channels)
+    left = [c for c in channels if c.counts]
+    if not left or total <= 0:
+        return Leftover()
+    unknown = [UNKNOWNS[e] for e in (model.search.terms[k].effect for k in model.selection.active) if e in UNKNOWNS]
+    on = [v for e in unknown for v in DEPENDS_ON[e.id]] + ([] if unknown else list(depends))
+    on += ["time_s"] if slow else []
+    on += ["run"] if any(c.between for c in left) else []
+    share = sum(c.unexplained / c.noise for c in left) / total
+    by_values = sum(c.by_values / c.noise for c in left) / total
+    share = max(share, min(share + by_values, MOST_BY_VALUES))
+    return Leftover(
+        float(min(1.0, share)),
+        tuple(c.name for c in left),
+        tuple(dict.fromkeys(on)),
+        description(left, [e.sentence for e in unknown], slow, list(depends)),
+    )
+
+
+def channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[ChannelLeftover]:
+    """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others.
+
+    `full` is the fit of the whole model, `added` (n, 12) of each stretch what it makes of the channels; `least` is how
+    much of the noise's energy must be kept by values to count.
+    """
+    _, inputs = standardised(prepared, segments)
+    unnamed = model.unnamed(full.columns)
+    training = [r.run in prepared.split.training for r in model.rows]
+    if prepared.split.training == prepared.split.held_out:
+        training = [True] * len(training)
+    judged = [i for i, t in enumerate(training) if not t] or list(range(len(training)))
+    features = [_features(z) for z in inputs]
+    size = features[0].shape[1]
+    gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
+    weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
+    runs = [r.run for r in model.rows]
+    least_noise = WORTH_STATING * channel_floor(segments, prepared.vehicle)
+    out = []
+    for c, name in enumerate(CHANNELS[:6]):
+        if name not in p_after:
+            continue
+        left = left_by(model.rows, c, added)
+        empirical = [r.x[:, c][:, full.columns[unnamed]] @ full.beta[unnamed] for r in model.rows]
+        cross = sum(f.T @ e for f, e, t in zip(features, left, training, strict=True) if t)
+        beta = np.linalg.solve(weights, cross)
+        count = sum(len(left[i]) for i in judged)
+        energy = _energy(left[i] for i in judged)
+        start = _energy(model.rows[i].y[:, c] for i in judged)
+        outside = _energy(empirical[i] for i in judged)
+        flexible = min(_energy(left[i] - features[i] @ beta for i in judged), energy)
+        # A simulator without noise leaves nothing, and any share of nothing is large.
+        flexible = max(flexible, count * least_noise[c] ** 2)
+        diffuse = p_after[name] < ALARM_P and energy - flexible > SMALLEST_SHARE_OF_NOISE**2 * flexible
+        between = apart(runs, left, prepared.thinner.rate_hz, float(model.noise[c]))
+        # The runs held out may be like each other: all runs are judged by their means.
+        shifted = 0.0 if between is None else count * between.mean_square(runs, [len(x) for x in left])
+        moving = count * slow[name][0] ** 2 if name in slow else 0.0
+        delivered_energy = energy if delivered is None else _energy(delivered[i][:, c] for i in judged)
+        # What moves slowly, or between runs, is no noise: shares are of what the named effects could have explained.
+        noise = max(flexible - moving - shifted, LEAST_NOISE * flexible, 1e-300)
+        out.append(
+            ChannelLeftover(
+                name,
+                count,
+                noise,
+                explainable=max(start - noise, shifted),
+                empirical=outside if outside > SMALLEST_SHARE_OF_NOISE**2 * flexible else 0.0,
+                diffuse=energy - flexible if diffuse else 0.0,
+                slow=moving,
+                between=between,
+                shifted=shifted,
+                by_values=kept_by_values(delivered_energy, energy + outside, flexible, least),
+            )
+        )
+    return out
+
+
+def description(
+    channels: Sequence[ChannelLeftover],
+    sentences: Sequence[str],
+    slow: Mapping[str, tuple[float, float]],
+    depends: Sequence[str],
+) -> str:
+    """Causes, as far as they can be identified, and what a plain empirical term would gain."""
+    causes = list(sentences)
+    if slow:
+        peaks = [f"{name} around {hz:.1f} Hz, {rms:.2g} {_unit(name)} rms" for name, (rms, hz) in slow.items()]
+        causes.append(f"it changes slowly in a way that no column follows ({'; '.join(peaks)})")
+    causes += [_differing(c.name, c.between) for c in channels if c.between]
+    diffuse = [c.name for c in channels if c.diffuse > 0]
+    if not causes and diffuse:
+        causes.append(f"{', '.join(diffuse)} still depend on {' and '.join(depends) or 'the inputs'}")
+    parts = [" and ".join(causes) + "; the cause is not in the catalogue"] if causes else []
+    unsettled = [c.name for c in channels if c.by_values > 0]
+    if unsettled:
+        parts.append(f"what is left of {', '.join(unsettled)} cannot be put down to any one believed value")
+    return f"{'; '.join(parts)} (a plain empirical term would lower {', '.join(c.gain for c in channels)})"
+
+
+def kept_by_values(delivered: float, fitted: float, noise: float, least: float = 1.0) -> float:
+    """Energy that what is delivered leaves beyond the model with every value free (`fitted`).
+
+    Nothing below `least` times the noise's: in a calm flight free values make up for much of the noise.
+    """
+    kept = delivered - fitted
+    return kept if kept > least * noise else 0.0
+
+
+def _differing(channel: str, between: DifferingMeans) -> str:
+    """The runs with the lowest and the highest mean, in words."""
+    low, high = (pick(between.means, key=between.means.get) for pick in (min, max))
+    values = " and ".join(f"{between.means[run]:.2g} {_unit(channel)} in {run}" for run in (low, high))
+    return f"{channel} is off by another amount in each run ({values}), as if something were changed between flights"
+
+
+def _energy(parts: Iterable[np.ndarray]) -> float:
+    return sum(float(x @ x) for x in parts)
+
+
+def _unit(channel: str) -> str:
+    return "N m" if channel.startswith("moment") else "N"
+
+
+def _features(z: np.ndarray) -> np.ndarray:
+    """Inputs and their pairwise products, (n, p + p(p+1)/2)."""
+    i, j = np.triu_indices(z.shape[1])
+    return np.concatenate([z, z[:, i] * z[:, j]], axis=1)

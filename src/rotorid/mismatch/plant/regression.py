@@ -1,0 +1,952 @@
+"""Joint generalised least squares over blocks of time, with intervals that hold for coloured residuals.
+
+Each channel is whitened by an autoregressive filter estimated from the residual of the fullest model; then all
+rows are reduced to Gram matrices of short blocks. Fits, tests, leave-run-out scores and cluster-robust
+covariances of any subset of terms follow from those matrices alone, so the cost of a search over the catalogue
+does not depend on the number of samples.
+
+Noisy regressors: `bias_gram` and `bias_cross` hold what the sensors' own noise adds to XᵀX and Xᵀy (learnt by
+adding the same noise once more); they are subtracted, which removes the attenuation (corrected least squares,
+Fuller, Measurement Error Models, 1987, ch. 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.optimize import lsq_linear
+from scipy.stats import chi2, f
+
+from rotorid.mismatch.plant.comparison import LEAST_RUNS, Comparison, environments, folds
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.recordings.signal.kernels import causal
+
+HIGHEST_AR_ORDER = 12
+WHITE_SHARE = 0.01
+"""White part assumed in every residual, as a share of its variance: recordings smoothed before they were stored
+have almost no energy at high frequency, and whitening must not make that corner decide."""
+AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
+"""Two instruments that agree to within this (m/s2, rad/s; one sigma) are called equal."""
+MOST_ATTENUATION = 0.3
+"""Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
+DOUBT_OF_CORRECTION = 0.5
+MOST_REMEMBERED = 2000
+MOST_EXPLAINED = 200_000
+MOST_DISTRUST = 3.0
+"""Standard deviations of trust that a believed value may be off."""
+VALUE_LIMITS = (0.15, 0.4)
+"""A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
+mismatch that needs a third of the arm is no wrong ruler."""
+MOST_OF_ACTIVE_SET = 20
+HOLD = 1e6
+RIDGE = 1e-10
+"""Trace of ridge on every normal matrix, in units of its diagonal."""
+NEVER_EXCITED = 1e-24
+"""Diagonal of a normal matrix up to which a column is not excited at all."""
+UNKNOWN = 1e12
+"""Variance of a coefficient of which nothing is known."""
+
+
+def autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
+    """Pooled autocovariance at lags 0 to `order` of stretches that do not touch each other."""
+    total = sum(len(p) for p in parts)
+    return np.array([sum(float(p[k:] @ p[: len(p) - k]) for p in parts if len(p) > k) for k in range(order + 1)]) / max(
+        total, 1
+    )
+
+
+def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
+    """Whitening filter (1, -a_1, …, -a_p)/σ of a coloured residual; the order by Akaike's criterion.
+
+    `floor` is the one-sigma of white noise assumed on top.
+    """
+    total = sum(len(p) for p in parts)
+    highest = int(min(HIGHEST_AR_ORDER, max(1, total // 50)))
+    covariance = autocovariance(parts, highest)
+    if covariance[0] <= 0:
+        return np.array([1.0])
+    covariance[0] += WHITE_SHARE * covariance[0] + floor**2
+    best = (np.inf, np.array([1.0 / np.sqrt(covariance[0])]))
+    for order in range(0, highest + 1):
+        a = solve_toeplitz(covariance[:order], covariance[1 : order + 1]) if order else np.zeros(0)
+        variance = covariance[0] - a @ covariance[1 : order + 1]
+        if variance <= 0:
+            break
+        criterion = total * np.log(variance) + 2 * order
+        if criterion < best[0]:
+            best = (criterion, np.concatenate([[1.0], -a]) / np.sqrt(variance))
+    return best[1]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fit of some terms: coefficients, covariance and what is left."""
+
+    columns: np.ndarray
+    beta: np.ndarray
+    covariance: np.ndarray
+    """Cluster-robust covariance, never below the model's own, shape (k, k)."""
+    residual_square: np.ndarray
+    """Whitened squared residual of every block (training and held out), shape (blocks,)."""
+    gain: float
+    """Whitened squares explained on the training blocks."""
+
+    def places(self, columns: np.ndarray) -> list[int]:
+        """Where columns of the regression stand among those fitted."""
+        at = list(self.columns)
+        return [at.index(c) for c in columns]
+
+
+@dataclass(frozen=True)
+class Apart:
+    """Products of some channels alone, by which the coefficients of some terms are estimated.
+
+    The normal equations of those terms hold these products; all others see every channel, with those terms as they
+    come out. What the model of the other channels lacks cannot reach them then (Plummer, Cuts in Bayesian graphical
+    models, Statistics and Computing 25, 2015).
+    """
+
+    columns: np.ndarray
+    """Columns of the terms, (m,), ascending."""
+    gram: np.ndarray
+    """Their products with all columns, (blocks, m, K)."""
+    cross: np.ndarray
+    """(blocks, m)."""
+    bias_gram: np.ndarray
+    """(m, K), as in `Regression`."""
+    bias_cross: np.ndarray
+    channels: np.ndarray
+    """Numbers of those channels."""
+
+    def before(self, kept: int) -> Apart:
+        """The same without the columns from `kept` on."""
+        return replace(self, gram=self.gram[:, :, :kept], bias_gram=self.bias_gram[:, :kept])
+
+
+MOST_ENVIRONMENTS = 120
+"""Environments of which products are kept channel by channel; those of a longer flight are joined."""
+
+
+@dataclass(frozen=True)
+class ByChannel:
+    """Products of the fitted blocks channel by channel, summed over environments."""
+
+    channels: np.ndarray
+    """(C,) of the twelve."""
+    gram: np.ndarray
+    """(C, E, K, K)."""
+    cross: np.ndarray
+    """(C, E, K)."""
+    square: np.ndarray
+    """(C, E)."""
+    environment: np.ndarray
+    """(blocks,) number of each block's environment; −1 for one that is not fitted."""
+    bias_gram: np.ndarray
+    """(C, K, K) what the noise of the regressors adds over all blocks, fitted or not."""
+    bias_cross: np.ndarray
+    """(C, K)."""
+
+    def projected(self, kept: int, follows: np.ndarray, alone: np.ndarray) -> ByChannel:
+        """The same with what the columns from `kept` on take of the others taken out (`Regression.without_winds`)."""
+        count, environments = self.square.shape
+        gram = np.zeros((count, environments, kept, kept))
+        cross, square = np.zeros((count, environments, kept)), np.zeros((count, environments))
+        bias_gram, bias_cross = np.zeros((count, kept, kept)), np.zeros((count, kept))
+        for c in range(count):
+            for e in range(environments):
+                own = self.gram[c, e], self.cross[c, e], self.square[c, e]
+                gram[c, e], cross[c, e], square[c, e] = projected(*own, kept, follows, alone)
+            noise = self.bias_gram[c], self.bias_cross[c], 0.0
+            bias_gram[c], bias_cross[c], _ = projected(*noise, kept, follows, alone)
+        return replace(self, gram=gram, cross=cross, square=square, bias_gram=bias_gram, bias_cross=bias_cross)
+
+
+@dataclass
+class Regression:
+    """Gram matrices of all terms over blocks of time."""
+
+    terms: list[Term]
+    start: dict[str, int]
+    gram: np.ndarray
+    """(blocks, K, K)."""
+    cross: np.ndarray
+    """(blocks, K)."""
+    square: np.ndarray
+    """(blocks,)."""
+    run: np.ndarray
+    """Run number of each block."""
+    training: np.ndarray
+    """Mask of the blocks to fit."""
+    precision: np.ndarray
+    """Prior precision of every column, (K,)."""
+    bias_gram: np.ndarray
+    bias_cross: np.ndarray
+    filters: dict[int, np.ndarray]
+    """Whitening filter of each channel."""
+    names: dict[str, int]
+    """Number of each run."""
+    memory: int = 0
+    """Blocks over which the noise of neighbours may still be alike (1/f noise of a sensor at rest)."""
+    block_s: float = 1.0
+    """Length of a block, s."""
+    blocks_of_rows: tuple[np.ndarray, ...] = ()
+    """Of every stretch the block that each of its rows is in, (n,); -1 where it is in none."""
+    apart: Apart | None = None
+    """Terms that some of the channels alone estimate; None where all channels estimate all."""
+    by_channel: ByChannel | None = None
+    """Products of the fitted blocks channel by channel, where they were asked for."""
+
+    def keys_of(self, *kinds: str) -> list[str]:
+        """Keys of the terms of some kinds."""
+        return [t.key for t in self.terms if t.kind in kinds]
+
+    def columns(self, keys: Iterable[str]) -> np.ndarray:
+        """Column numbers of terms, in the order given."""
+        parts = [self._where[k] for k in keys]
+        return np.concatenate(parts) if parts else np.zeros(0, int)
+
+    def __post_init__(self):
+        self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
+        self._total_gram = self.gram[self.training].sum(axis=0)
+        self._total_cross = self.cross[self.training].sum(axis=0)
+        self._place_apart = np.full(len(self._total_cross), -1)
+        if self.apart is not None:
+            self._place_apart[self.apart.columns] = np.arange(len(self.apart.columns))
+            self._total_apart = self.apart.gram[self.training].sum(axis=0), self.apart.cross[self.training].sum(axis=0)
+        self.limit = np.full(len(self._total_cross), np.inf)
+        for term in self.terms:
+            if term.kind == "value":
+                self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
+        self._explained: dict[tuple[str, ...], float] = {}
+        self._fits: dict[tuple, Fit] = {}
+        self._left_out: dict[tuple, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+
+    def with_room(self, least: float) -> Regression:
+        """The same with believed values that may move by at least a share `least`."""
+        wider = replace(self)  # fits remembered are those of the narrower limits
+        wider.limit = np.maximum(self.limit, least)
+        return wider
+
+    def given(self, cols: np.ndarray, beta: np.ndarray) -> Regression:
+        """The same where the coefficients `beta` (k,) of the columns `cols` are known: what they add is taken off."""
+        pulls = self.gram[:, :, cols] @ beta
+        square = self.square - 2 * self.cross[:, cols] @ beta + pulls[:, cols] @ beta
+        apart = self.apart
+        if apart is not None:
+            apart = replace(
+                apart,
+                cross=apart.cross - apart.gram[:, :, cols] @ beta,
+                bias_cross=apart.bias_cross - apart.bias_gram[:, cols] @ beta,
+            )
+        known = replace(
+            self,
+            cross=self.cross - pulls,
+            square=square,
+            bias_cross=self.bias_cross - self.bias_gram[:, cols] @ beta,
+            apart=apart,
+        )
+        known.limit = self.limit
+        return known
+
+    def without_winds(self) -> Regression:
+        """The same without the winds of single runs: every other column less what they take of it.
+
+        A wind has two columns for every knot, hundreds where it never rests, and each acts in a few blocks. Their
+        share of any fit is linear in the other coefficients (Frisch, Waugh and Lovell), so it is taken out once:
+        fits, gains, block scores and robust covariances of the others are those of the whole. The winds stand last,
+        so column numbers stay.
+        """
+        winds = [t for t in self.terms if t.kind == "wind" and t.run]
+        if not winds:
+            return self
+        cols = self.columns([t.key for t in winds])
+        kept = cols.min()
+        if cols.max() + 1 != len(self.precision) or len(cols) != len(self.precision) - kept:
+            raise ValueError("the winds of single runs must be the last columns")
+        every = np.arange(len(self.precision))
+        gram, cross, bias, bias_cross = self._normal(every, self.training)
+        normal = gram - bias + np.diag(self.precision)
+        inverse = ridge_inverse(normal[kept:, kept:])
+        # A wind follows the other coefficients b as `alone + follows @ b`.
+        follows, alone = -inverse @ normal[kept:, :kept], inverse @ (cross - bias_cross)[kept:]
+        blocks = [
+            projected(*of_block, kept, follows, alone)
+            for of_block in zip(self.gram, self.cross, self.square, strict=True)
+        ]
+        bias_gram, bias_cross, _ = projected(self.bias_gram, self.bias_cross, 0.0, kept, follows, alone)
+        return replace(
+            self,
+            terms=[t for t in self.terms if t not in winds],
+            start={k: v for k, v in self.start.items() if v < kept},
+            gram=np.array([b[0] for b in blocks]),
+            cross=np.array([b[1] for b in blocks]),
+            square=np.array([b[2] for b in blocks]),
+            precision=self.precision[:kept],
+            bias_gram=bias_gram,
+            bias_cross=bias_cross,
+            # No wind of a single run acts in the channels of which others are estimated apart.
+            apart=None if self.apart is None else self.apart.before(kept),
+            by_channel=None if self.by_channel is None else self.by_channel.projected(kept, follows, alone),
+        )
+
+    def _apart(self, cols: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which of some columns are estimated apart, and where they stand among those that are."""
+        place = self._place_apart[cols]
+        return np.flatnonzero(place >= 0), place[place >= 0]
+
+    def _equations(self, cols: np.ndarray, mask: np.ndarray):
+        """What `_normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
+        gram, cross, bias, bias_cross = self._normal(cols, mask)
+        where, own = self._apart(cols)
+        if len(where):
+            share, grid = mask.sum() / len(mask), np.ix_(own, cols)
+            if mask is self.training:
+                gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
+            else:
+                gram[where] = self.apart.gram[mask][:, own[:, None], cols].sum(axis=0)
+                cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
+            noise = self.apart.bias_gram[grid] * share
+            at = np.arange(len(where))
+            # As `limited_bias`, column by column: these channels' products alone are no symmetric matrix.
+            most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[at, where], 1e-300)
+            bias[where] = noise * np.minimum(1.0, most)[:, None]
+            bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
+        return gram, cross, bias, bias_cross
+
+    def _normal(self, cols: np.ndarray, mask: np.ndarray):
+        share = mask.sum() / len(mask)
+        grid = np.ix_(cols, cols)
+        if mask is self.training:
+            gram, cross = self._total_gram[grid], self._total_cross[cols]
+        else:
+            index = np.flatnonzero(mask)
+            gram = self.gram[np.ix_(index, cols, cols)].sum(axis=0)
+            cross = self.cross[np.ix_(index, cols)].sum(axis=0)
+        bias = limited_bias(gram, self.bias_gram[grid] * share)
+        return gram, cross, bias, self.bias_cross[cols] * share
+
+    def fit(
+        self,
+        keys: Iterable[str],
+        mask: np.ndarray | None = None,
+        jackknife: bool = False,
+        loose: dict[str, float] | None = None,
+    ) -> Fit:
+        """Fit terms on the masked blocks (training by default); `loose` widens priors (term to one-sigma).
+
+        Fits of the training blocks are remembered: a search asks for the same ones over and over.
+        """
+        keys = tuple(keys)
+        if mask is not None:
+            return self._fit(keys, mask, jackknife, loose)
+        asked = keys, jackknife, tuple(sorted((loose or {}).items()))
+        if asked not in self._fits:
+            if len(self._fits) > MOST_REMEMBERED:
+                self._fits.clear()
+            self._fits[asked] = self._fit(keys, self.training, jackknife, loose)
+        return self._fits[asked]
+
+    def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
+        cols = self.columns(keys)
+        gram, cross, bias, bias_cross = self._equations(cols, mask)
+        where, own = self._apart(cols)
+        precision = self.precision
+        if loose:
+            precision = precision.copy()
+            for key, sd in loose.items():
+                precision[self.columns([key])] = 1.0 / sd**2
+        prior = np.diag(precision[cols])
+        normal = gram - bias + prior
+        beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
+        self._fit_held_out_scales(cols, beta, mask)
+        count = int(mask.sum())
+        every, explained = self.gram[:, cols[:, None], cols], self.cross[:, cols]
+        pull = every @ beta
+        scores, blocks = (explained - pull)[mask], every[mask]
+        if len(where):
+            blocks[:, where] = self.apart.gram[mask][:, own[:, None], cols]
+            scores[:, where] = self.apart.cross[mask][:, own] - blocks[:, where] @ beta
+        scores -= (bias_cross - bias @ beta) / count
+        if jackknife:
+            eye = np.eye(len(cols))
+            scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
+        spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
+        robust = inverse @ spread @ inverse.T
+        # With the ridge, or two columns that are copies of each other would seem to be known.
+        noise = gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))
+        noise[:, where] = noise[where].T
+        plain = inverse @ noise @ inverse.T
+        # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
+        uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
+        values = np.isfinite(self.limit[cols])
+        shift = trusted(DOUBT_OF_CORRECTION * (beta - uncorrected), normal, values, precision[cols])
+        covariance = at_least(robust, plain) + np.outer(shift, shift)
+        # What the regressors' noise adds to a block is no misfit: left in, a model that shrinks them all would be best.
+        if len(where):
+            bias, bias_cross = self._normal(cols, mask)[2:]
+        added = float(beta @ bias @ beta - 2 * beta @ bias_cross) / count
+        rss = self.square - 2 * explained @ beta + pull @ beta - added
+        gain = float((self.square - rss)[mask].sum())
+        return Fit(cols, beta, covariance, rss, gain)
+
+    def _fit_held_out_scales(self, cols: np.ndarray, beta: np.ndarray, mask: np.ndarray) -> None:
+        """Coefficients of a run's own scale where that run is not fitted: found in the run itself, in place."""
+        for term in self.terms:
+            if term.kind != "nuisance" or not term.run:
+                continue
+            column = self.start[term.key]
+            where = np.flatnonzero(cols == column)
+            own = self.run == self.names.get(term.run, -1)
+            if not own.any() or not len(where) or (own & mask).any():
+                continue
+            gram = self.gram[own, column][:, cols].sum(axis=0)
+            beta[where] = 0.0
+            left = self.cross[own, column].sum() - gram @ beta
+            beta[where] = left / (gram[where[0]] + self.precision[column])
+
+    def explained(self, keys: Iterable[str]) -> float:
+        """Whitened squares that terms explain on the training blocks: the gain of `fit` without the rest of it.
+
+        Remembered whatever the order: exchanges and simplifications come back to the same sets again and again.
+        """
+        keys = tuple(sorted(keys))
+        if keys not in self._explained:
+            if len(self._explained) > MOST_EXPLAINED:
+                self._explained.clear()
+            self._explained[keys] = self._explains(keys)
+        return self._explained[keys]
+
+    def _explains(self, keys: tuple[str, ...]) -> float:
+        cols = self.columns(keys)
+        gram, cross, bias, bias_cross = self._equations(cols, self.training)
+        normal = gram - bias + np.diag(self.precision[cols])
+        beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
+        if len(self._apart(cols)[0]):
+            gram, cross, bias, bias_cross = self._normal(cols, self.training)
+        return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
+
+    def folds(self, whole_runs: bool) -> np.ndarray:
+        """Fold of every block (blocks,), -1 for one that is not fitted; blocks of a fold are left out together."""
+        out = np.full(len(self.training), -1)
+        run = self.run[self.training]
+        out[self.training] = folds(environments(run, self.block_s), run, whole_runs)
+        return out
+
+    def left_out(
+        self, keys: Iterable[str], whole_runs: bool, loose: dict[str, float] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Columns (k,) of terms and their coefficients fitted without each fold in turn, (folds, k)."""
+        return self._without_folds(keys, whole_runs, loose)[:2]
+
+    def _without_folds(
+        self, keys: Iterable[str], whole_runs: bool, loose: dict[str, float] | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
+        asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
+        if asked not in self._left_out:
+            if len(self._left_out) > MOST_REMEMBERED:
+                self._left_out.clear()
+            self._left_out[asked] = self._leave_out(*asked)
+        return self._left_out[asked]
+
+    def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        kinds = {t.key: t for t in self.terms}
+        winds = [k for k in keys if kinds[k].kind == "wind" and kinds[k].run]
+        if winds:
+            return self._leave_out_in_wind([k for k in keys if k not in winds], winds, whole_runs, loose)
+        cols, fold = self.columns(keys), self.folds(whole_runs)
+        precision = self.precision
+        if loose:
+            precision = precision.copy()
+            for key, sd in loose:
+                precision[self.columns([key])] = 1.0 / sd**2
+        found, inverses = [], []
+        for out in range(fold.max() + 1):
+            mask = self.training & (fold != out)
+            gram, cross, bias, bias_cross = self._equations(cols, mask)
+            normal = gram - bias + np.diag(precision[cols])
+            beta, inverse = bounded(normal, cross - bias_cross, self.limit[cols])[:2]
+            found.append(beta)
+            # Of a column that only this fold excites nothing is known without it.
+            dead = np.diag(normal) <= NEVER_EXCITED
+            inverses.append(np.where(np.diag(dead), UNKNOWN, inverse))
+            self._fit_held_out_scales(cols, found[-1], mask)
+        return cols, np.array(found), np.array(inverses)
+
+    def _leave_out_in_wind(self, keys, winds, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same where winds of single runs blow: they belong to the run and are found in it, left out or not."""
+        cols, betas, known = self.without_winds()._without_folds(keys, whole_runs, dict(loose))
+        own = self.columns(winds)
+        both = np.concatenate([cols, own])
+        gram, cross, bias, bias_cross = self._normal(both, self.training)
+        normal, right, count = gram - bias + np.diag(self.precision[both]), cross - bias_cross, len(cols)
+        inverse = ridge_inverse(normal[count:, count:])
+        blowing = (right[count:, None] - normal[count:, :count] @ betas.T).T @ inverse
+        # The winds are of the run that is left out, so their own errors are not those of another run's numbers.
+        inverses = np.zeros((len(betas), len(both), len(both)))
+        inverses[:, :count, :count] = known
+        return both, np.concatenate([betas, blowing], axis=1), inverses
+
+    def compare(
+        self, more: list[str], fewer: list[str], loose: dict[str, float] | None = None, whole_runs: bool | None = None
+    ) -> Comparison:
+        """The model of the terms `more` against that of `fewer`, on environments that neither was fitted on.
+
+        Whole runs are left out where there are enough of them and where what is asked of one run is seen in the
+        others; else environments of every run in turn.
+        """
+        if whole_runs is None:
+            if len(np.unique(self.run[self.training])) < LEAST_RUNS:
+                return self.compare(more, fewer, loose, False)
+            apart = self.compare(more, fewer, loose, True)
+            return apart if apart.answers else self.compare(more, fewer, loose, False)
+        fold = self.folds(whole_runs)
+        environment = environments(self.run[self.training], self.block_s)
+        more_of, fewer_of = (self._without_folds(keys, whole_runs, loose) for keys in (more, fewer))
+        (cols, a, _), (others, b, _) = more_of, fewer_of
+        index = np.flatnonzero(self.training)
+        a, b = a[fold[index]], b[fold[index]]
+        left, grams = [], []
+        for c, beta in ((cols, a), (others, b)):
+            gram, cross = self._noise_free(index, c)
+            quadratic = np.einsum("bk,bkl,bl->b", beta, gram, beta)
+            left.append(quadratic - 2 * np.einsum("bk,bk->b", cross, beta))
+            grams.append(gram)
+        shift, gram = a.copy(), grams[0]
+        shared = np.isin(cols, others)
+        at = [list(others).index(c) for c in cols[shared]]
+        shift[:, shared] -= b[:, at]
+        promised = np.einsum("bk,bkl,bl->b", shift, gram, shift)
+        # What the fitted blocks of each fold hold of the same change of coefficients.
+        every = gram.sum(axis=0)
+        seen = np.empty(len(index))
+        for out in np.unique(fold[index]):
+            own = fold[index] == out
+            one = shift[own][0]
+            seen[own] = one @ (every - gram[own].sum(axis=0)) @ one
+        doubt = self._doubt(index, cols, fold, more_of[2]) - self._doubt(index, others, fold, fewer_of[2])
+        count = int(environment.max()) + 1
+        size = np.bincount(environment, minlength=count)
+        return Comparison(
+            np.bincount(environment, left[1] - left[0], count),
+            np.bincount(environment, promised, count),
+            np.bincount(environment, seen, count) / size,
+            np.bincount(environment, doubt, count),
+            np.bincount(environment, fold[index], count) / size,
+        )
+
+    def _noise_free(self, index: np.ndarray, cols: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gram matrices (blocks, k, k) and cross products (blocks, k) less each block's part of the regressors' noise.
+
+        Coefficients that the noise does not shrink promise, and leave, no more than the signal in the columns: scored
+        on noisy columns a true one would keep 1 − 2 λ of its promise where a share λ of the energy is noise.
+        """
+        _, _, bias, bias_cross = self._normal(cols, self.training)
+        gram, cross = self.gram[np.ix_(index, cols, cols)], self.cross[np.ix_(index, cols)]
+        return gram - bias / len(index), cross - bias_cross / len(index)
+
+    def _doubt(self, index: np.ndarray, cols: np.ndarray, fold: np.ndarray, inverses: np.ndarray) -> np.ndarray:
+        """Squares that errors of coefficients fitted without a block's fold are expected to make in it, (blocks,)."""
+        gram = self.gram[np.ix_(index, cols, cols)]
+        return np.einsum("bkl,bkl->b", gram, inverses[fold[index]])
+
+    def shown(self, key: str) -> np.ndarray:
+        """Which columns of a term act in any row fitted, (k,)."""
+        return np.diag(self._total_gram)[self.columns([key])] > 0
+
+    def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
+        """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
+
+        Per run the term is refitted with all other coefficients held (DerSimonian and Laird's moment estimate).
+        """
+        cols = self.columns([key])
+        where = fit.places(cols)
+        rest = [i for i in range(len(fit.columns)) if i not in where]
+        apart, own = self._apart(cols)
+        source, at = (self.apart, own) if len(apart) else (self, cols)
+        owns = source.gram[:, at[:, None], cols]
+        lefts = source.cross[:, at] - source.gram[:, at[:, None], fit.columns[rest]] @ fit.beta[rest]
+        every = np.diag(owns[self.training].sum(axis=0))
+        estimates, variances = [], []
+        for run in np.unique(self.run[self.training]):
+            mask = self.training & (self.run == run)
+            if mask.sum() < 5:
+                continue
+            own, cross = owns[mask], lefts[mask]
+            total = own.sum(axis=0)
+            if total[0, 0] < 1e-3 * every[0]:
+                continue  # the effect is hardly excited in this run
+            inverse = np.linalg.pinv(total, rcond=1e-10, hermitian=True)
+            beta = inverse @ cross.sum(axis=0)
+            scores = cross - own @ beta
+            robust = inverse @ (scores.T @ scores) @ inverse
+            estimates.append(beta)
+            # A coefficient that a run does not excite says nothing there: a height of mass on a level mount.
+            silent = np.diag(total) < 1e-3 * every
+            variances.append(np.where(silent, np.inf, np.maximum(np.diag(robust), np.diag(inverse))))
+        if len(estimates) < 2:
+            return np.zeros(len(cols)), 1.0
+        b, v = np.array(estimates), np.maximum(np.array(variances), 1e-100)
+        w = 1.0 / v
+        mean = (w * b).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-300)
+        q = (w * (b - mean) ** 2).sum(axis=0)
+        degrees = np.maximum((w > 0).sum(axis=0) - 1, 1)
+        scale = w.sum(axis=0) - (w**2).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-300)
+        spread = np.maximum(0.0, (q - degrees) / np.maximum(scale, 1e-300))
+        p = float(min(1.0, len(cols) * chi2.sf(q, degrees).min()))
+        return spread / len(b), p
+
+    def beyond(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Columns and coefficients of a term's own part: what `keys` would absorb of it is taken off.
+
+        No value absorbs more than MOST_DISTRUST times its trust allows.
+        """
+        others, own = self.columns(keys), self.columns([key])
+        gram = self._total_gram
+        inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
+        with np.errstate(divide="ignore"):
+            most = MOST_DISTRUST / np.sqrt(self.precision[others])
+        pull = gram[np.ix_(others, own)] @ beta
+        taken = -inner @ pull
+        if (np.abs(taken) > most).any():
+            # |B x + B⁻ᵀ pull|² with Bᵀ B the normal matrix is the same square, completed; in units of each column.
+            unit = np.sqrt(np.maximum(np.diag(inner), 0.0))
+            unit = np.where(unit > 0, unit, 1.0)
+            values, vectors = np.linalg.eigh(inner / np.outer(unit, unit))
+            values = np.maximum(values, RIDGE)
+            forth, back = (vectors / np.sqrt(values)).T, (vectors * np.sqrt(values)).T
+            # Of few columns the active set is found at once; of many, interior steps are faster.
+            method = "bvls" if len(unit) < MOST_OF_ACTIVE_SET else "trf"
+            taken = lsq_linear(forth, -back @ (unit * pull), bounds=(-most / unit, most / unit), method=method).x * unit
+        return np.concatenate([others, own]), np.concatenate([taken, beta])
+
+    def column_noise(self, key: str) -> float:
+        """Share of the energy of a term of one column, on the training blocks, that is noise of its regressors."""
+        (column,) = self.columns([key])
+        energy = self._total_gram[column, column]
+        return float(self.training.mean() * self.bias_gram[column, column] / energy) if energy > 0 else 0.0
+
+    def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
+        """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
+        return self.own_part(keys, key, beta)[1]
+
+    def own_part(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[float, float]:
+        """Share of a term's energy along `beta` that the others of `keys` could not take over, and the share of that
+        which is noise of the regressors."""
+        cols, direction = self.beyond([k for k in keys if k != key], key, beta)
+        gram, bias = self._total_gram, self.bias_gram * self.training.mean()
+        own, grid = self.columns([key]), np.ix_(cols, cols)
+        whole = beta @ gram[np.ix_(own, own)] @ beta
+        energy, noise = direction @ gram[grid] @ direction, direction @ bias[grid] @ direction
+        return float(energy / max(whole, 1e-300)), float(noise / max(energy, 1e-300))
+
+    def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
+        """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
+        where = np.searchsorted(np.sort(fit.columns), cols)
+        where = np.argsort(fit.columns)[where]
+        b = fit.beta[where]
+        cov = fit.covariance[np.ix_(where, where)]
+        statistic = quadratic_form(b, cov)
+        q = len(b)
+        if count - q < 2:
+            return 1.0
+        return float(f.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
+
+
+def projected(
+    gram: np.ndarray, cross: np.ndarray, square: float, kept: int, follows: np.ndarray, alone: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Gram matrix (kept, kept), cross products and square of a block whose columns from `kept` on have the
+    coefficients `alone + follows @ b`, b those of the columns before."""
+    acting = np.flatnonzero(np.diag(gram)[kept:])
+    last, follows, alone = kept + acting, follows[acting], alone[acting]
+    mixed, own = gram[:kept, last], gram[np.ix_(last, last)]
+    shared = mixed @ follows
+    inner = gram[:kept, :kept] + shared + shared.T + follows.T @ own @ follows
+    left = cross[last] - own @ alone
+    outer = cross[:kept] - mixed @ alone + follows.T @ left
+    return inner, outer, square - float(alone @ (cross[last] + left))
+
+
+def trusted(shift: np.ndarray, normal: np.ndarray, values: np.ndarray, precision: np.ndarray) -> np.ndarray:
+    """A doubt about coefficients (k,) with no believed value doubted by more than its prior one-sigma.
+
+    Where a recording knows a ratio alone (thrust over mass), both values walk along it with anything; all that hangs
+    on their common scale would be as doubtful as that. What the values' share does to the others goes with it.
+    """
+    most = 1.0 / np.sqrt(np.maximum(precision[values], 1e-300))
+    walk = np.abs(shift[values])
+    factor = float(np.min(most / np.maximum(walk, most))) if values.any() else 1.0
+    if factor == 1.0:
+        return shift
+    out, others = shift.copy(), ~values
+    follows = -ridge_inverse(normal[np.ix_(others, others)]) @ normal[np.ix_(others, values)] @ shift[values]
+    out[values] *= factor
+    out[others] -= (1.0 - factor) * follows
+    return out
+
+
+def inverse_root(diagonal: np.ndarray) -> np.ndarray:
+    """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
+    dead = diagonal <= NEVER_EXCITED
+    return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+
+
+def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
+    """Solution of normal equations with |solution| within `limit` (n,): solution, inverse, and what holds it where.
+
+    The one that is furthest out is held at its limit by an overwhelming prior, until none is out.
+    """
+    held, at = np.zeros(len(right)), np.zeros(len(right))
+    inverse = ridge_inverse(normal)
+    for _ in range(len(right) + 1):
+        solution = inverse @ (right + held * at)
+        out = np.where(held > 0, 0.0, np.abs(solution) / limit)
+        worst = int(np.argmax(out)) if len(out) else 0
+        if not len(out) or out[worst] <= 1.0:
+            break
+        held[worst] = HOLD * max(normal[worst, worst], 1e-300)
+        at[worst] = np.sign(solution[worst]) * limit[worst]
+        # One more number on the diagonal is a change of rank one (Sherman and Morrison).
+        column, row = inverse[:, worst], inverse[worst]
+        inverse = inverse - np.outer(column, row) * (held[worst] / (1.0 + held[worst] * column[worst]))
+    return solution, inverse, held, at
+
+
+def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric normal matrix, scaled to unit diagonal, with a trace of ridge."""
+    scale = inverse_root(np.diag(matrix))
+    scaled = matrix * np.outer(scale, scale) + RIDGE * np.eye(len(matrix))
+    return np.linalg.inv(scaled) * np.outer(scale, scale)
+
+
+def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """The noise's Gram matrix, held to MOST_ATTENUATION of the energy in every direction."""
+    if not len(gram):
+        return bias
+    scale = inverse_root(np.diag(gram))
+    if (np.diag(bias) * scale**2).sum() <= MOST_ATTENUATION * 1e-9:
+        return bias  # less than the limit in any direction that is kept below
+    scaled = gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram))
+    if np.trace(np.linalg.solve(scaled, bias * np.outer(scale, scale))) <= MOST_ATTENUATION:
+        return bias  # the shares of all directions together are no more
+    values, vectors = np.linalg.eigh(scaled)
+    values = np.maximum(values, 1e-9)
+    back = vectors / np.sqrt(values)
+    inner = back.T @ (bias * np.outer(scale, scale)) @ back
+    share, turn = np.linalg.eigh((inner + inner.T) / 2)
+    if share[-1] <= MOST_ATTENUATION:
+        return bias
+    root = (vectors * np.sqrt(values)) @ turn
+    unscale = np.where(scale > 0, 1.0 / np.where(scale > 0, scale, 1.0), 0.0)
+    return (root * np.minimum(share, MOST_ATTENUATION)) @ root.T * np.outer(unscale, unscale)
+
+
+def spread_of(scores: np.ndarray, runs: np.ndarray, memory: int) -> np.ndarray:
+    """Sum of products of the blocks' scores (n, k), and of those up to `memory` apart in one run, (k, k).
+
+    Newey and West, A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent covariance
+    matrix, Econometrica 55, 1987.
+    """
+    total = scores.T @ scores
+    for lag in range(1, min(memory, len(scores) - 1) + 1):
+        same = runs[lag:] == runs[:-lag]
+        product = scores[lag:][same].T @ scores[:-lag][same]
+        total += (1.0 - lag / (memory + 1)) * (product + product.T)
+    return total
+
+
+def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
+    """A covariance that is in no direction smaller than the classical one."""
+    # Coefficients differ by many powers of ten (kg m2 and relative changes): compare in units of their own.
+    unit = np.sqrt(np.maximum(np.diag(plain), 0.0))
+    scale = np.where(unit > 0, 1.0 / np.where(unit > 0, unit, 1.0), 0.0)
+    values, vectors = np.linalg.eigh((plain + plain.T) / 2 * np.outer(scale, scale))
+    values = np.maximum(values, 1e-12)
+    root = vectors * np.sqrt(values)
+    back = vectors / np.sqrt(values)
+    inner = back.T @ (robust * np.outer(scale, scale)) @ back
+    v, u = np.linalg.eigh((inner + inner.T) / 2)
+    return root @ (u * np.maximum(v, 1.0)) @ u.T @ root.T * np.outer(unit, unit)
+
+
+def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
+    """valuesᵀ covariance⁻¹ values, in units of the coefficients' own standard errors."""
+    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    scaled = values / unit
+    return float(scaled @ np.linalg.pinv(covariance / np.outer(unit, unit), rcond=1e-10, hermitian=True) @ scaled)
+
+
+def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened y (n,) and x (n, K) of one channel from sample `start` on (one at a time: all would be large)."""
+    x = np.zeros_like(rows.x[:, channel])
+    used = np.flatnonzero(rows.x[:, channel].any(axis=0))
+    x[:, used] = causal(taps, rows.x[:, channel, used])
+    return causal(taps, rows.y[:, channel])[start:], x[start:]
+
+
+def full_fit_residuals(
+    rows: list[Rows], precision: np.ndarray, colours: dict[int, np.ndarray] | None = None
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Residuals (n, 12) of every term fitted at once, channels weighted by their own spread (two rounds).
+
+    `colours` are whitening filters of channels whose columns exceed the noise only through them: weighed evenly over
+    all frequencies, their noise would be fitted and what they explain be left, to be taken for the channel's own noise.
+    """
+    colours = colours or {}
+    channels = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
+    size = rows[0].x.shape[2]
+    beta = np.zeros(size)
+    left = [r.y for r in rows]
+    for _ in range(2):
+        gram, cross = np.zeros((size, size)), np.zeros(size)
+        for c in channels:
+            taps = colours.get(c, np.ones(1))
+            weight = 1.0 / (np.concatenate([causal(taps, part[:, c]) for part in left]).std() + 1e-12)
+            for r in rows:
+                y, x = whiten(r, c, taps, 0) if c in colours else (r.y[:, c], r.x[:, c])
+                x = x * weight
+                gram += x.T @ x
+                cross += x.T @ (y * weight)
+        gram += np.diag(precision)
+        scale = inverse_root(np.diag(gram))
+        beta = scale * np.linalg.solve(gram * np.outer(scale, scale) + 1e-7 * np.eye(size), cross * scale)
+        left = [r.y - r.x @ beta for r in rows]
+    return left, beta
+
+
+def build(
+    rows: list[Rows],
+    terms: list[Term],
+    filters: dict[int, np.ndarray],
+    in_training,
+    block_s: float,
+    rate_hz: float,
+    noisy: list[Rows] | None = None,
+    estimated_by: Collection[int] = (),
+    apart: Iterable[str] = (),
+    by_channel: bool = False,
+) -> Regression:
+    """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
+
+    `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap. The channels
+    `estimated_by` alone estimate the terms `apart` (`Apart`). `by_channel` keeps the products channel by channel, too.
+    """
+    start, at = {}, 0
+    for term in terms:
+        start[term.key] = at
+        at += term.size
+    per_block = max(2, int(round(block_s * rate_hz)))
+    longest = max(len(f) for f in filters.values()) - 1
+    own = np.sort([start[t.key] + i for t in terms if t.key in set(apart) for i in range(t.size)]).astype(int)
+    names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
+    parts_of, blocks_of_rows, runs, training = blocks_of(rows, names, per_block, longest, in_training)
+    count = len(runs)
+    fitted = np.array([t is True for t in training])
+    gram, cross, square = np.zeros((count, at, at)), np.zeros((count, at)), np.zeros(count)
+    own_gram, own_cross = np.zeros((count, len(own), at)), np.zeros((count, len(own)))
+    bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
+    own_bias, own_bias_cross = np.zeros((len(own), at)), np.zeros(len(own))
+    kept = empty_by_channel(np.array(list(filters)), runs, fitted, per_block / rate_hz, at) if by_channel else None
+    for k, (r, parts) in enumerate(zip(rows, parts_of, strict=True)):
+        if not parts:
+            continue  # shorter than the whitening reaches: it says nothing
+        first = blocks_of_rows[k][0]
+        for place, (channel, taps) in enumerate(filters.items()):
+            y, x = whiten(r, channel, taps, longest)
+            again = None if noisy is None else whiten(noisy[k], channel, taps, longest)
+            # Many columns say nothing in a channel (a moment in a force): they are left out of the products.
+            used = np.flatnonzero(x.any(axis=0) | (False if again is None else again[1].any(axis=0)))
+            x, grid = x[:, used], np.ix_(used, used)
+            # Of the columns used those that this channel estimates apart: where they stand among them, and in `own`.
+            ours = np.flatnonzero(np.isin(used, own)) if channel in estimated_by else np.zeros(0, int)
+            ours_at = np.searchsorted(own, used[ours])
+            ours_grid = np.ix_(ours_at, used)
+            if again is not None:
+                shift = again[1][:, used] - x
+                noise, with_y = shift.T @ shift, shift.T @ (again[0] - y)
+                bias_gram[grid] += noise
+                bias_cross[used] += with_y
+                own_bias[ours_grid] += noise[ours]
+                own_bias_cross[ours_at] += with_y[ours]
+                if kept is not None:
+                    kept.bias_gram[place][grid] += noise
+                    kept.bias_cross[place, used] += with_y
+            for b, part in enumerate(parts, first):
+                products, with_y, own_square = x[part].T @ x[part], x[part].T @ y[part], float(y[part] @ y[part])
+                gram[b][grid] += products
+                cross[b, used] += with_y
+                if len(ours):
+                    own_gram[b][ours_grid] += products[ours]
+                    own_cross[b, ours_at] += with_y[ours]
+                square[b] += own_square
+                if kept is not None and (e := kept.environment[b]) >= 0:
+                    kept.gram[place, e][grid] += products
+                    kept.cross[place, e, used] += with_y
+                    kept.square[place, e] += own_square
+    precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
+    return Regression(
+        terms,
+        start,
+        gram,
+        cross,
+        square,
+        np.array(runs),
+        fitted,
+        precision,
+        bias_gram,
+        bias_cross,
+        filters,
+        names,
+        block_s=per_block / rate_hz,
+        blocks_of_rows=tuple(blocks_of_rows),
+        apart=Apart(own, own_gram, own_cross, own_bias, own_bias_cross, np.array(sorted(estimated_by), int))
+        if len(own)
+        else None,
+        by_channel=kept,
+    )
+
+
+def blocks_of(
+    rows: list[Rows], names: dict[str, int], per_block: int, longest: int, in_training
+) -> tuple[list[list[np.ndarray]], list[np.ndarray], list[int], list[bool | None]]:
+    """Of every stretch its blocks as places behind the whitening's reach `longest`, and of each of its rows the block;
+    of every block the run's number, and whether it is fitted."""
+    parts_of, blocks_of_rows = [], []
+    runs: list[int] = []
+    training: list[bool | None] = []
+    for r in rows:
+        size = len(r.y) - longest
+        blocks_of_rows.append(np.full(len(r.y), -1))
+        parts_of.append([] if size < 2 else np.array_split(np.arange(size), max(1, size // per_block)))
+        for b, part in enumerate(parts_of[-1], len(runs)):
+            blocks_of_rows[-1][longest + part] = b
+        if parts_of[-1]:
+            blocks_of_rows[-1][:longest] = len(runs)
+        runs += [names[r.run]] * len(parts_of[-1])
+        middles = [r.time_s[min(len(r.time_s) - 1, longest + int(part.mean()))] for part in parts_of[-1]]
+        training += [in_training(r.run, float(middle)) for middle in middles]
+    return parts_of, blocks_of_rows, runs, training
+
+
+def empty_by_channel(
+    channels: np.ndarray, runs: list[int], fitted: np.ndarray, block_s: float, columns: int
+) -> ByChannel:
+    """Products of no rows yet, for every channel and environment of the fitted blocks."""
+    environment = np.full(len(runs), -1)
+    environment[fitted] = environments(np.array(runs)[fitted], block_s)
+    count = int(environment.max(initial=0)) + 1
+    environment //= -(-count // MOST_ENVIRONMENTS)  # joined where they are more than that
+    count = int(environment.max(initial=0)) + 1
+    return ByChannel(
+        channels=channels,
+        environment=environment,
+        gram=np.zeros((len(channels), count, columns, columns)),
+        cross=np.zeros((len(channels), count, columns)),
+        square=np.zeros((len(channels), count)),
+        bias_gram=np.zeros((len(channels), columns, columns)),
+        bias_cross=np.zeros((len(channels), columns)),
+    )

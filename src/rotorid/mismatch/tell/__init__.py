@@ -1,0 +1,1 @@
+"""What a reader sees: locations, simulation forward, the verdict, its sentences and its ledger."""

@@ -1,0 +1,111 @@
+"""What makes a verdict agree with itself: its word and its shares follow from the errors that it prints.
+
+With b, a and n the energies of before, after and the noise floor over the located channels of the runs held out, each
+channel in units of its floor, the share left is max(0, a − n) / max(b − n, n): up to 0.15 the mismatch is explained,
+below 0.85 partly. A reader with a pocket calculator gets the same word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.mismatch.decision.findings import Analysis, Finding, with_status
+from rotorid.mismatch.posterior.status import CLAIMED
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.tell.verdict import Channel, Errors, Location
+
+EXPLAINED_SHARE = 0.15
+"""Up to this share of the mismatch's energy may be left for the word `explained`."""
+UNEXPLAINED_SHARE = 0.85
+"""From this share on the findings are said to explain nothing that matters."""
+PLAINLY_OFF = 1.5
+"""Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is."""
+NINE_TENTHS = 0.9
+
+
+def quoted(channel: Channel) -> Errors:
+    """A channel's errors on the runs held out; where nothing of it is held out, on the fitted ones."""
+    return channel.rmse.training if channel.rmse.held_out.after is None else channel.rmse.held_out
+
+
+def energies(channels: Mapping[str, Channel], located: Sequence[str]) -> tuple[float, float, float]:
+    """Energies before, after and of the noise floor over located channels, each in units of its floor."""
+    before = after = noise = 0.0
+    for name in located:
+        errors, floor = quoted(channels[name]), channels[name].noise_floor
+        if errors.before is None or errors.after is None or not floor:
+            continue
+        before, after, noise = before + (errors.before / floor) ** 2, after + (errors.after / floor) ** 2, noise + 1.0
+    return before, after, noise
+
+
+def share_left(channels: Mapping[str, Channel], located: Sequence[str]) -> float:
+    """Share of the mismatch that is left, from the errors printed."""
+    before, after, noise = energies(channels, located)
+    return min(1.0, max(0.0, after - noise) / max(before - noise, noise)) if noise else 0.0
+
+
+def verdict_word(analysis: Analysis, locations: Sequence[Location], left: float) -> str:
+    """One of the four words, from what was found and the share that is left."""
+    if not with_status(analysis, *CLAIMED) and not analysis.wrong_values:
+        return "unexplained" if locations else "no_mismatch"
+    if left <= EXPLAINED_SHARE:
+        return "explained"
+    return "partly_explained" if left < UNEXPLAINED_SHARE else "unexplained"
+
+
+def located_channels(locations: Sequence[Location], channels: Mapping[str, Channel]) -> tuple[str, ...]:
+    """Channels in which the mismatch is located; all of force and moment where a fault of the set left no place."""
+    named = {location.channel for location in locations}
+    return tuple(c for c in channels if c in named) or tuple(channels)
+
+
+def missing_places(
+    analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]
+) -> list[tuple[str, float]]:
+    """Channels (with p-values) that must be located too: sentence, list and pictures speak of the same ones.
+
+    Of each effect that a model holds the channel it betters most; what stays unexplained though nothing was located;
+    a channel whose error on the runs held out is far above its noise floor.
+    """
+    there = {location.channel for location in locations}
+    out: dict[str, float] = {}
+    for finding in with_status(analysis, *CLAIMED):
+        own = [c for c in finding.channels if c in channels]
+        if finding.id in analysis.without and own and not there & set(own):
+            out.setdefault(own[0], finding.p_value)
+            there.add(own[0])
+    if not there and not analysis.wrong_values:
+        out |= {c: analysis.p_values.get(c, (1.0, 1.0))[1] for c in analysis.unexplained_channels if c in channels}
+    # Where nothing is stated, values corrected within their trust may be all that it takes.
+    stated = with_status(analysis, *CLAIMED) or analysis.wrong_values
+    for name, channel in channels.items():
+        both = (channel.rmse.held_out, channel.rmse.training)
+        errors = [x for e in both if (x := e.before if stated else e.after) is not None]
+        wrench = name.split("_")[0] in ("force", "moment")
+        if wrench and name not in there and max(errors, default=0.0) > PLAINLY_OFF * (channel.noise_floor or np.inf):
+            out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])
+    return [(c, p) for c, p in out.items() if c not in {location.channel for location in locations}]
+
+
+def by_share(findings: Sequence[Finding], shares: Mapping[str, float]) -> list[Finding]:
+    """Findings in the order of their shares: the stated ones first, mistakes of the set before all."""
+    order = {"established": 0, "ambiguous": 0, "suggested": 1, "absorbed": 2, "not_established": 3}
+    return sorted(findings, key=lambda f: (order[f.status], -shares.get(f.id, 2.0 if f.status in CLAIMED else 0.0)))
+
+
+def carrying(findings: Sequence[Finding], shares: Mapping[str, float]) -> list[Finding]:
+    """Those of the stated findings, the largest share first, that together take away nine tenths of the error."""
+    out, total = [], 0.0
+    ordered = by_share(findings, shares)
+    whole = sum(shares.get(f.id, 0.0) for f in ordered)
+    for finding in ordered:
+        if out and total >= NINE_TENTHS * whole:
+            break
+        out.append(finding)
+        total += shares.get(finding.id, 0.0)
+    return out

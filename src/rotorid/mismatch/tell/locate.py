@@ -1,0 +1,602 @@
+"""Where a mismatch shows: which channel of which run, from when to when, in which regime.
+
+Three sources, in this order of trust:
+
+1. Findings that state their own windows (a gust, a sensor that drops out) are taken as they are; on their channels
+   nothing else is listed that findings explain.
+2. What a finding adds to a channel carries almost no noise. An interval is where its local size matters relative to
+   the channel's noise; it is kept if the energy of the residual `before` is above what the coloured noise of
+   `after` allows. Findings at work for most of the flight are listed only where nothing is confined in time:
+   their place is a regime, not a time.
+3. What the findings leave, `after`, is whitened, evened out (noise that grows with how hard it is flown is no
+   mismatch) and scanned over windows of 0.5 to 4 s for energy (of what moves: the same noise with a higher variance is
+   a sensor's matter) and for a mean other than zero. The threshold is
+   Bonferroni's over every window of every channel of every run; the spread of both statistics is measured on the
+   blocks of the residual themselves, so that colour that whitening left, or noise that comes in bouts, raises the
+   threshold. Edges are those of the most likely segment. A force that the accelerometer reads and the velocity does
+   not show is none: a vibration seen through a low sampling rate stands still for a second where the rotors turn at
+   a multiple of that rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.stats import chi2, f
+
+from rotorid.mismatch.decision.findings import Analysis, Trace, with_status
+from rotorid.mismatch.decision.shares import effort, segments_of, shares
+from rotorid.mismatch.mistakes.signals import channel_of
+from rotorid.mismatch.plant.between_runs import apart
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.regression import autoregression
+from rotorid.mismatch.tell.verdict import SMALLEST_P, Location, Regime, rms
+from rotorid.recordings.signal.kernels import causal
+
+FAMILY_ERROR = 0.002
+"""Chance of any false interval in a whole set."""
+SCAN_ERROR = 1e-4
+"""The same for the scan of what is left; smaller, because the tails of real noise are heavier than assumed."""
+LOCAL_S = 0.1
+"""Length over which the local size of an explained mismatch is taken."""
+MATTERS = 0.3
+"""Local size relative to the channel's noise from which an explained mismatch matters at all."""
+ON_SHARE_OF_PEAK = 0.2
+ON_SHARE_OF_NOISE = 0.15
+LOST_AT_ENDS_S = 1.0
+SMALLEST_SHARE = 0.03
+"""Share of a run's mismatch energy below which an interval is not worth a line."""
+NIL = 1e-9
+"""Share of the largest value of a regime's variable below which a value is none."""
+SHORTEST_GAP_S = 0.25
+LONGEST_GAP_S = 2.0
+THROUGHOUT = 0.7
+"""Covering more than this share of the flight counts as being there throughout."""
+CONFINED = 0.4
+"""Being at work for less than this share of the flight counts as acting in part of it."""
+AT_WORK = 0.03
+"""Local size relative to its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
+SCAN_S = (0.5, 1.0, 2.0, 4.0)
+LARGER = 4.0
+"""Energy of a window over the usual, below which noise of higher variance is not called a mismatch."""
+MOVES_S = 0.2
+"""Lags over which larger residuals may follow each other."""
+FIRST_LAGS = 4
+LIKE = 0.999
+"""Largest correlation that Fisher's transform is taken of."""
+MOVES_Z = 4.0
+"""Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual."""
+WILD = 4.0
+"""Whitened residual beyond which a single sample counts no more."""
+SHIFTED = 0.4
+"""Mean of a window relative to the residual's usual size, below which a shift does not matter."""
+HELD_BACK = 3.0
+"""Energy of a block over the noise expected there, beyond which it does not count as noise in full."""
+REGIME_BLOCK_S = 0.5
+REGIME_BINS = 8
+REGIME_P = 1e-3
+CONTRAST = 2.0
+"""Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
+MOST_OF_IT = 0.5
+"""Share of a stretch's energy that is a difference between two sensors, from which it is the sensor's matter."""
+EXCESS_SHARE = 0.25
+"""Bins with at least this share of the largest excess belong to the regime."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A stretch of one trace: samples start to stop (exclusive)."""
+
+    trace: Trace
+    start: int
+    stop: int
+    p_value: float
+    explained: bool
+    of_the_run: bool = False
+    """Whether it is the run that matters, and no regime."""
+
+
+def locate(analysis: Analysis) -> list[Location]:
+    """Locations of the mismatch, in the order of channels, runs and time; empty where there is none."""
+    segments = segments_of(analysis)
+    stated = _stated(analysis)
+    found: list[Interval] = []
+    if with_status(analysis, "established", "ambiguous", "absorbed") or analysis.wrong_values:
+        partial, throughout = _explained(analysis, segments)
+        spoken_for = {loc.channel for loc in stated}
+        found += [i for i in partial if i.trace.channel not in spoken_for]
+        if not found and not stated:
+            found += throughout
+    found += _unexplained(analysis, segments)
+    traces = list(dict.fromkeys((t.channel, t.run) for t in analysis.traces))
+    order = {key: k for k, key in enumerate(traces)}
+    located = stated + _worded(analysis, _disjoint(found, order))
+    return sorted(located, key=lambda loc: (order.get((loc.channel, loc.run), -1), loc.run, loc.start_s))
+
+
+def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]:
+    regimes: dict[tuple[str, bool], Regime | None] = {}
+    out = []
+    for i in intervals:
+        key = (i.trace.channel, i.explained)
+        if key not in regimes and not i.of_the_run:
+            regimes[key] = regime_of(analysis, *key)
+        out.append(
+            Location(
+                run=i.trace.run,
+                channel=i.trace.channel,
+                start_s=_edge(analysis, i, i.start, 0),
+                stop_s=_edge(analysis, i, i.stop - 1, -1),
+                p_value=float(np.clip(i.p_value, SMALLEST_P, 1.0)),
+                energy_share=_energy_share(mismatch_of(i.trace, i.explained), slice(i.start, i.stop)),
+                regime=None if i.of_the_run else regimes[key],
+            )
+        )
+    return out
+
+
+def _energy_share(signal: np.ndarray, part: slice) -> float:
+    total = float(np.nansum(signal**2))
+    return min(float(np.nansum(signal[part] ** 2)) / total, 1.0) if total > 0 else 0.0
+
+
+def _edge(analysis: Analysis, interval: Interval, sample: int, end: int) -> float:
+    """Time of an interval's edge; at a trace's end that of the run, of which filtering cost a moment."""
+    time_s, run_s = interval.trace.time_s, analysis.recordings.run(interval.trace.run).time_s
+    if time_s[sample] == time_s[end] and abs(run_s[end] - time_s[end]) < LOST_AT_ENDS_S:
+        return float(run_s[end])
+    return float(time_s[sample])
+
+
+def mismatch_of(trace: Trace, explained: bool) -> np.ndarray:
+    """The mismatch with as little noise as can be had: what the findings take away, else the residual itself."""
+    return trace.before - trace.after if explained else trace.after
+
+
+def channel_noise(traces: Sequence[Trace]) -> float:
+    """Usual size of the residual after the effects, robust against stretches in which it is larger."""
+    blocks = []
+    for trace in traces:
+        per = max(2, int(round(REGIME_BLOCK_S / _period(trace))))
+        count = len(trace.after) // per
+        if count:
+            blocks.append(np.sqrt(np.nanmean(trace.after[: count * per].reshape(count, per) ** 2, axis=1)))
+    if not blocks:
+        return rms([t.after for t in traces])
+    return float(np.nanmedian(np.concatenate(blocks)))
+
+
+def _period(trace: Trace) -> float:
+    return float(np.median(np.diff(trace.time_s)))
+
+
+def _by_channel(analysis: Analysis) -> dict[str, list[Trace]]:
+    out: dict[str, list[Trace]] = {}
+    for trace in analysis.traces:
+        if len(trace.time_s) > 8:
+            out.setdefault(trace.channel, []).append(trace)
+    return out
+
+
+def _stated(analysis: Analysis) -> list[Location]:
+    """Windows that findings state, on the channels they show in.
+
+    Samples that a sensor lost are left out of the residuals, so that a channel may have no residual there: then the
+    share of the channel's mismatch is that of the time stated in the run.
+    """
+    vehicle, regimes, out = analysis.recordings.vehicle, {}, []
+    for finding in with_status(analysis, "established", "ambiguous"):
+        channels = dict.fromkeys(channel_of(name, vehicle) for name in finding.channels)
+        for run, start_s, stop_s in finding.windows:
+            stated_s = sum(b - a for r, a, b in finding.windows if r == run)
+            for channel in channels:
+                share = min((stop_s - start_s) / stated_s, 1.0) if stated_s > 0 else 1.0
+                for trace in analysis.traces:
+                    inside = slice(*np.searchsorted(trace.time_s, [start_s, stop_s]))
+                    if (trace.run, trace.channel) == (run, channel) and inside.stop > inside.start:
+                        share = _energy_share(mismatch_of(trace, True), inside)
+                if channel not in regimes:
+                    regimes[channel] = regime_of(analysis, channel, True)
+                out.append(
+                    Location(
+                        run=run,
+                        channel=channel,
+                        start_s=start_s,
+                        stop_s=stop_s,
+                        p_value=float(np.clip(finding.p_value, SMALLEST_P, 1.0)),
+                        energy_share=share,
+                        regime=regimes[channel],
+                    )
+                )
+    return out
+
+
+def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interval], list[Interval]]:
+    """Intervals of what acts in part of the flight, and of what acts for most of it.
+
+    Each finding's own contribution says where it acts; for what lies between command and rotor speed all that was
+    taken away from its channels does. A wrong value is wrong throughout.
+    """
+    channels = _by_channel(analysis)
+    causes = [{c: x for c, x in found.items() if c in channels} for found in shares(analysis, segments).values()]
+    spoken_for = {channel for found in causes for channel in found}
+    rest = {c: [mismatch_of(t, True) for t in ts] for c, ts in channels.items() if c not in spoken_for}
+    at_work = with_status(analysis, "established", "ambiguous")
+    formless = {c for f in at_work if f.form is None and not f.windows for c in f.channels}
+    causes.append({c: x for c, x in rest.items() if c in formless})
+    partial, throughout = [], []
+    if analysis.wrong_values:
+        for channel in rest.keys() - formless:
+            masks = _acting(channels[channel], rest[channel])
+            if masks is not None:
+                throughout += _tested(channels[channel], [np.ones(len(m), bool) for m in masks], len(analysis.traces))
+    for cause in causes:
+        masks = {c: m for c, series in cause.items() if (m := _acting(channels[c], series)) is not None}
+        if not masks:
+            continue
+        confined = _share_at_work({c: (channels[c], cause[c]) for c in masks}) < CONFINED
+        for channel, parts in masks.items():
+            here = _tested(channels[channel], parts, len(analysis.traces))
+            (partial if confined else throughout).extend(here)
+    return partial, throughout
+
+
+def _share_at_work(contributions: Mapping[str, tuple[Sequence[Trace], Sequence[np.ndarray]]]) -> float:
+    """Share of the flight in which a cause's contribution to any channel (traces and their series) is more than nil."""
+    by_run: dict[tuple[str, float], list[np.ndarray]] = {}
+    for traces, series in contributions.values():
+        levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
+        nil = AT_WORK * float(np.quantile(np.concatenate(levels), 0.99))
+        for trace, level in zip(traces, levels, strict=True):
+            by_run.setdefault((trace.run, float(trace.time_s[0])), []).append(level > nil)
+    return float(np.concatenate([np.any(m, axis=0) for m in by_run.values()]).mean())
+
+
+def _acting(traces: Sequence[Trace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
+    """Masks of where a contribution to a channel matters relative to its noise; None where it never does."""
+    noise = channel_noise(traces)
+    levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
+    peak = float(np.quantile(np.concatenate(levels), 0.99))
+    if not peak > MATTERS * noise:
+        return None
+    threshold = max(ON_SHARE_OF_PEAK * peak, ON_SHARE_OF_NOISE * noise)
+    masks = [_closed(level > threshold, _period(t)) for level, t in zip(levels, traces, strict=True)]
+    if np.concatenate(masks).mean() > THROUGHOUT:
+        return [np.ones(len(m), bool) for m in masks]
+    return masks
+
+
+def _tested(traces: Sequence[Trace], masks: Sequence[np.ndarray], count: int) -> list[Interval]:
+    """Intervals of the masks in which the residual before is larger than coloured noise allows."""
+    noise, freedom = channel_noise(traces), _freedom_per_sample(traces)
+    found = []
+    for trace, mask in zip(traces, masks, strict=True):
+        energy = np.concatenate([[0.0], np.cumsum(np.nan_to_num(mismatch_of(trace, True)) ** 2)])
+        spans = [(a, b) for a, b in _spans(mask) if energy[b] - energy[a] >= SMALLEST_SHARE * energy[-1]]
+        for start, stop in spans:
+            p = _energy_p(trace.before[start:stop], noise, freedom)
+            if p < FAMILY_ERROR / max(len(spans) * count, 1):
+                found.append(Interval(trace, start, stop, p, True))
+    return found
+
+
+def _local_size(values: np.ndarray, period_s: float) -> np.ndarray:
+    """Local root mean square, (n,)."""
+    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, LOCAL_S / period_s))
+
+
+def _moving_mean(values: np.ndarray, width: float) -> np.ndarray:
+    """Centred moving mean over about `width` samples, ends over what there is."""
+    half = int(width // 2)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    index = np.arange(len(values))
+    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    return np.maximum(total[last] - total[first], 0.0) / (last - first)
+
+
+def _spans(mask: np.ndarray) -> list[tuple[int, int]]:
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    return [(int(a), int(b)) for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)]
+
+
+def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
+    """The mask with gaps closed that are shorter than what surrounds them: a zero crossing is no end."""
+    spans = _spans(mask)
+    out = mask.copy()
+    for (a, b), (c, d) in zip(spans, spans[1:], strict=False):
+        allowed = min(max(SHORTEST_GAP_S, min(b - a, d - c) * period_s), LONGEST_GAP_S)
+        if (c - b) * period_s < allowed:
+            out[b:c] = True
+    return out
+
+
+def _freedom_per_sample(traces: Sequence[Trace], longest_s: float = 1.0) -> float:
+    """Degrees of freedom that a sample's square adds in coloured noise: 1 / Σ ρ² over lags (Bartlett)."""
+    count = int(longest_s / _period(traces[0]))
+    covariance = np.zeros(count + 1)
+    for trace in traces:
+        a = np.nan_to_num(trace.after - np.nanmean(trace.after))
+        for lag in range(min(count + 1, len(a))):
+            covariance[lag] += a[lag:] @ a[: len(a) - lag]
+    rho = covariance / max(covariance[0], 1e-300)
+    return float(np.clip(1.0 / (1.0 + 2.0 * np.sum(rho[1:] ** 2)), 0.0, 1.0))
+
+
+def _energy_p(values: np.ndarray, noise: float, freedom: float) -> float:
+    """p-value of the energy of a stretch against coloured noise of a given size."""
+    values = values[np.isfinite(values)]
+    degrees = max(len(values) * freedom, 1.0)
+    return float(chi2.sf(degrees * np.mean(values**2) / max(noise, 1e-300) ** 2, degrees)) if len(values) else 1.0
+
+
+def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
+    """Stretches in which the residual after the effects is larger or shifted."""
+    channels = _by_channel(analysis)
+    windows = sum(
+        2 * len(_window_starts(len(t.after), length)) for ts in channels.values() for t in ts for length in _lengths(t)
+    )
+    limit = SCAN_ERROR / max(windows, 1)
+    found, hard = [], effort(segments)
+    for traces in channels.values():
+        parts = [np.nan_to_num(t.after) for t in traces]
+        taps = autoregression(parts)
+        white = [causal(taps, p) for p in parts]
+        # One or two wild samples are a glitch; a mismatch lasts.
+        white = [np.clip(w, -WILD, WILD) for w in _evened(traces, white, hard)]
+        for w in white:
+            w[: len(taps)] = 0.0
+        found += _louder(traces, white, limit) + _shifted(traces, white, parts, limit)
+        if "run" in analysis.unexplained_depends_on:
+            found += _apart(traces, parts)
+    sensors = _sensor_differences(analysis)
+    return [i for i in found if not _of_one_sensor(i, sensors)]
+
+
+def _sensor_differences(analysis: Analysis) -> dict[tuple[str, str, float], np.ndarray]:
+    """To run, channel and first instant of a trace of forces (n,), N, that the accelerometer alone reads."""
+    if analysis.force_source != "accelerometer":
+        return {}
+    return {
+        (t.run, f"force_{t.channel[-1]}", float(t.time_s[0])): analysis.improved.mass_kg * t.after
+        for t in analysis.between_sensors
+        if t.channel.startswith("accelerometer") and len(t.time_s)
+    }
+
+
+def _of_one_sensor(interval: Interval, differences: Mapping[tuple[str, str, float], np.ndarray]) -> bool:
+    """Whether most of the residual there is a difference between the accelerometer and the velocity."""
+    trace, part = interval.trace, slice(interval.start, interval.stop)
+    difference = differences.get((trace.run, trace.channel, float(trace.time_s[0])))
+    if difference is None:
+        return False
+    left, whole = (float(np.nansum(x[part] ** 2)) for x in (trace.after - difference, trace.after))
+    return left < MOST_OF_IT * whole
+
+
+def _apart(traces, parts) -> list[Interval]:
+    """Whole runs whose mean is off, where runs differ."""
+    noise = channel_noise(traces)
+    between = apart([t.run for t in traces], parts, 1.0 / _period(traces[0]), noise)
+    means = between.means if between else {}
+    return [
+        Interval(t, 0, len(t.after), between.p_value, False, of_the_run=True)
+        for t in traces
+        if abs(means.get(t.run, 0.0)) > SHIFTED * noise
+    ]
+
+
+def _evened(traces: Sequence[Trace], white: list[np.ndarray], hard) -> list[np.ndarray]:
+    """Residuals divided by the size that noise has at that moment: a constant and a part that grows with effort.
+
+    The energy of half-second blocks is fitted by non-negative least squares on the effort, twice, blocks far above
+    the fit held back to it, so that a mismatch that comes and goes does not count as noise.
+    """
+    energies, efforts, lengths = [], [], []
+    for trace, w in zip(traces, white, strict=True):
+        width = REGIME_BLOCK_S / _period(trace)
+        time_s, squares = hard[trace.run]
+        on_trace = [np.interp(trace.time_s, time_s, column) for column in squares.T]
+        efforts.append(np.stack([np.ones(len(w)), *(_moving_mean(x, width) for x in on_trace)], axis=1))
+        energies.append(_moving_mean(w**2, width))
+        lengths.append(max(int(width), 1))
+    x = np.concatenate([e[::n] for e, n in zip(efforts, lengths, strict=True)])
+    y = np.concatenate([e[::n] for e, n in zip(energies, lengths, strict=True)])
+    scale = np.maximum(x.mean(axis=0), 1e-300)
+    usual = np.full(len(y), max(float(np.median(y)), 1e-300))
+    for _ in range(3):
+        weight = 1.0 / usual
+        coefficients, _ = nnls(x / scale * weight[:, None], np.minimum(y, HELD_BACK * usual) * weight)
+        usual = np.maximum(x / scale @ coefficients, 1e-3 * float(np.median(y)) + 1e-300)
+    floor = 1e-3 * float(np.median(y)) + 1e-300
+    return [w / np.sqrt(np.maximum(e / scale @ coefficients, floor)) for w, e in zip(white, efforts, strict=True)]
+
+
+def _lengths(trace: Trace) -> list[int]:
+    return [n for s in SCAN_S if 4 < (n := int(round(s / _period(trace)))) <= len(trace.after) // 2]
+
+
+def _window_starts(size: int, length: int) -> np.ndarray:
+    return np.arange(0, size - length + 1, max(1, length // 4))
+
+
+def _window_sums(values: np.ndarray, length: int) -> np.ndarray:
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    starts = _window_starts(len(values), length)
+    return total[starts + length] - total[starts]
+
+
+def _louder(traces, white, limit) -> list[Interval]:
+    """Windows with more energy than the spread of the windows' energies allows."""
+    flagged = [np.zeros(len(w), bool) for w in white]
+    lowest = [1.0] * len(white)
+    for length in _lengths(min(traces, key=lambda t: len(t.after))):
+        means = [_window_sums(w**2, length) / length for w in white]
+        pooled = np.concatenate(means)
+        usual = max(float(np.median(pooled)), 1e-300)  # of a rotor at rest next to nothing is left
+        spread = max(float(np.quantile(pooled, 0.75) - np.quantile(pooled, 0.25)) / 1.349, 1e-12)
+        degrees = max(min(2 * (usual / spread) ** 2, float(length)), 1.0)
+        for k, mean in enumerate(means):
+            p = chi2.sf(degrees * mean / usual, degrees)
+            for j in np.flatnonzero((p < limit) & (mean > LARGER * usual)):
+                start = _window_starts(len(white[k]), length)[j]
+                flagged[k][start : start + length] = True
+                lowest[k] = min(lowest[k], float(p[j]))
+    out = []
+    for trace, w, mask, p in zip(traces, white, flagged, lowest, strict=True):
+        for start, stop in _spans(mask):
+            reach = int(round(1.0 / _period(trace)))
+            a, b = max(start - reach, 0), min(stop + reach, len(w))
+            variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
+            likelihood = -0.5 * np.log(variance) + 0.5 * w[a:b] ** 2 * (1.0 - 1.0 / variance)
+            first, last = _best_segment(likelihood)
+            if _moves(w[a + first : a + last], w, int(MOVES_S / _period(trace))):
+                out.append(Interval(trace, a + first, a + last, p, False))
+    return out
+
+
+def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
+    """Whether a whitened residual moves in one part otherwise than in the whole, and is not the same noise with a
+    higher variance.
+
+    What bodies and air do lasts longer than a sample; a sensor that is shaken or badly received has a higher variance,
+    no more. Decided by the correlations at one of the first lags, or at all up to `most` together.
+    """
+    count = len(part)
+    lags = np.arange(1, min(most, count - 5) + 1)
+    usual, here = (np.array([_correlation(x, lag) for lag in lags]) for x in (whole, part))
+    sure = (np.arctanh(np.clip(here, -LIKE, LIKE)) - np.arctanh(np.clip(usual, -LIKE, LIKE))) * np.sqrt(
+        count - lags - 3
+    )
+    return len(lags) > 0 and max(np.abs(sure[:FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > MOVES_Z
+
+
+def _correlation(values: np.ndarray, lag: int) -> float:
+    """Autocorrelation at a lag, about nothing."""
+    return float(values[lag:] @ values[:-lag] / max(values @ values, 1e-300))
+
+
+def _shifted(traces, white, parts, limit) -> list[Interval]:
+    """Windows whose mean is further from zero than the windows' own spread allows, and far enough to matter."""
+    noise = channel_noise(traces)
+    flagged = [np.zeros(len(w), bool) for w in white]
+    lowest = [1.0] * len(white)
+    least = 1.0
+    for length in _lengths(min(traces, key=lambda t: len(t.after))):
+        sums = [_window_sums(w, length) / np.sqrt(length) for w in white]
+        local = [_window_sums(p, length) / length for p in parts]
+        count = sum(len(w) // length for w in white)
+        least = max(least, float(np.median(np.concatenate(sums) ** 2)) / 0.4549)
+        for k, total in enumerate(sums):
+            # Where noise has a higher variance for a while its means are, too.
+            spread = (_window_sums(white[k] ** 2, length) - total**2) / (length - 1)
+            p = f.sf(total**2 / (least * np.maximum(spread, 1.0)), 1, max(count - 1, 1))
+            for j in np.flatnonzero((p < limit) & (np.abs(local[k]) > SHIFTED * noise)):
+                start = _window_starts(len(white[k]), length)[j]
+                flagged[k][start : start + length] = True
+                lowest[k] = min(lowest[k], float(p[j]))
+    out = []
+    for trace, part, mask, p in zip(traces, parts, flagged, lowest, strict=True):
+        for start, stop in _spans(mask):
+            reach = int(round(1.0 / _period(trace)))
+            a, b = max(start - reach, 0), min(stop + reach, len(part))
+            level = float(np.mean(part[start:stop]))
+            first, last = _best_segment(level * part[a:b] - 0.5 * level**2)
+            out.append(Interval(trace, a + first, a + last, p, False))
+    return out
+
+
+def _best_segment(gain: np.ndarray) -> tuple[int, int]:
+    """Start and stop (exclusive) of the stretch with the largest sum: the most likely segment."""
+    total = np.concatenate([[0.0], np.cumsum(gain)])
+    lowest = np.minimum.accumulate(total)
+    stop = int(np.argmax(total - lowest))
+    start = int(np.argmin(total[: stop + 1]))
+    return start, max(stop, start + 1)
+
+
+def _disjoint(intervals: Sequence[Interval], order: Mapping[tuple[str, str], int]) -> list[Interval]:
+    """Intervals sorted by trace and start, overlaps on one trace merged."""
+    out: list[Interval] = []
+    for i in sorted(intervals, key=lambda i: (order[i.trace.channel, i.trace.run], i.start)):
+        last = out[-1] if out else None
+        if last is not None and last.trace is i.trace and i.start <= last.stop:
+            stop, p = max(last.stop, i.stop), min(last.p_value, i.p_value)
+            out[-1] = Interval(last.trace, last.start, stop, p, last.explained or i.explained)
+        else:
+            out.append(i)
+    return out
+
+
+def regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | None:
+    """The variable and its range that separate the mismatch's energy best; None if none does.
+
+    Analysis of variance of the log energy of half-second blocks over bins of equal counts, each variable in
+    turn; blocks, not samples, are the units, so that colour within a block does not count as evidence. Time is
+    chosen only where nothing else separates half as well.
+    """
+    traces = [t for t in analysis.traces if t.channel == channel]
+    noise = channel_noise(traces)
+    energies, values = [], {}
+    names = set.intersection(*(set(analysis.regimes.get(t.run, {})) for t in traces)) if traces else set()
+    for trace in traces:
+        per = max(2, int(round(REGIME_BLOCK_S / _period(trace))))
+        count = len(trace.time_s) // per
+
+        def blocks(x, per=per, count=count):
+            return x[: count * per].reshape(count, per).mean(axis=1)
+
+        energies.append(blocks(np.nan_to_num(mismatch_of(trace, explained)) ** 2) / max(noise, 1e-300) ** 2)
+        for name in names:
+            regimes = analysis.regimes[trace.run]
+            values.setdefault(name, []).append(blocks(np.interp(trace.time_s, regimes["time_s"], regimes[name])))
+    if not energies:
+        return None
+    energy = np.concatenate(energies)
+    scored = []
+    for name in sorted(names):
+        value = np.concatenate(values[name])
+        found = _separation(energy, value)
+        if found is not None:
+            share, p, low, high = found
+            if p < REGIME_P / len(names):
+                scored.append((share * (0.5 if name == "time_s" else 1.0), name, low, high))
+    if not scored:
+        return None
+    _, name, low, high = max(scored)
+    return Regime(variable=name, low=low, high=high)
+
+
+def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, float, float] | None:
+    """Share of variance between bins, its p-value, and the range of the bins in which the energy lies."""
+    good = np.isfinite(value) & np.isfinite(energy)
+    energy, value = energy[good], value[good]
+    # A load turned into other axes is 1e-17 where it should be nothing: two bins of nothing, and no words for either.
+    value = np.where(np.abs(value) < NIL * np.abs(value).max(initial=0.0), 0.0, value)
+    edges = np.unique(np.quantile(value, np.linspace(0, 1, REGIME_BINS + 1))) if len(value) else np.zeros(0)
+    if len(edges) < 3 or len(value) < 3 * len(edges):
+        return None
+    which = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2)
+    bins = [b for b in range(len(edges) - 1) if np.any(which == b)]
+    log = np.log(energy + 0.05)
+    within = sum(float(((log[which == b] - log[which == b].mean()) ** 2).sum()) for b in bins)
+    total = float(((log - log.mean()) ** 2).sum())
+    if total <= 0 or len(bins) < 2:
+        return None
+    between = total - within
+    p = f.sf(
+        between / (len(bins) - 1) / max(within / (len(log) - len(bins)), 1e-300), len(bins) - 1, len(log) - len(bins)
+    )
+    means = np.array([energy[which == b].mean() for b in bins])
+    floor = means.min()
+    if means.max() < CONTRAST * floor:
+        return None
+    inside = means - floor >= EXCESS_SHARE * (means.max() - floor)
+    first = last = int(np.argmax(means))
+    while first > 0 and inside[first - 1]:
+        first -= 1
+    while last < len(bins) - 1 and inside[last + 1]:
+        last += 1
+    return between / total, float(p), float(edges[bins[first]]), float(edges[bins[last] + 1])

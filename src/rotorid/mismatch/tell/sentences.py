@@ -1,0 +1,463 @@
+"""A verdict in words: one sentence of at most forty words, and the details that it has no room for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rotorid.mismatch.decision.findings import Analysis, Finding, one_per_class, with_status
+from rotorid.mismatch.decision.sizes import Size, channel_size, metres_words, scales, share_words
+from rotorid.mismatch.decision.words import (
+    capital,
+    channel_words,
+    effect_words,
+    listed,
+    number,
+    on_the_ground,
+    parameter_words,
+    percent,
+    percent_words,
+    plus_minus,
+    regime_words,
+    sure,
+)
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
+from rotorid.mismatch.tell.consistency import by_share, carrying, quoted
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.posterior.limits import UpperLimit
+    from rotorid.mismatch.tell.verdict import Channel, Location
+
+MOST_WORDS = 40
+NEARLY_ALL = 0.99
+"""Share that stays unexplained from which the causes named explain next to nothing."""
+MOST_LIMITS = 3
+"""Effects that were not found and are named with their limit; more are counted."""
+MOST_NAMES = 2
+"""Effects or values that the sentence names; more are counted."""
+WORTH_SAYING_P = 0.05
+WORTH_A_WORD = 0.03
+"""Share of the weight, or of the moment that the rotors can make, that a channel must stay off to be named: what a
+pilot trims without noticing is less."""
+NO_BETTER = 0.02
+"""Relative change of an error run forward below which it is neither better nor worse."""
+
+
+SizeWords = Literal["both", "share", "metres", ""]
+"""Which sizes stand in a text: share of the weight and metres after half a second."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What the words are made from."""
+
+    analysis: Analysis
+    word: str
+    locations: Sequence[Location]
+    channels: Mapping[str, Channel]
+    """Of the inverse dynamics, or of the reading."""
+    shares: Mapping[str, float]
+    left: float
+    """Share of the mismatch that is left."""
+    forward: Mapping[str, Channel]
+
+
+def spoken(text: str, analysis: Analysis) -> str:
+    """A text about flights as it is said of this kind of set."""
+    return text if analysis.recordings.vehicle.kind == "flight" else on_the_ground(text)
+
+
+def first_words(text: str, most: int = MOST_WORDS) -> str:
+    """A text cut at its last whole clause within so many words."""
+    words = text.split()
+    if len(words) <= most:
+        return text
+    short = " ".join(words[:most])
+    ends = [short.rfind(mark) for mark in (";", ":", ",")]
+    short = short[: max(ends)] if max(ends) > 0 else short
+    return f"{short}." if text.endswith(".") else short
+
+
+def headline(contents: Contents) -> str:
+    """What a pilot reads in at most MOST_WORDS words: where and how much, what was left out, how much better."""
+    analysis = contents.analysis
+    if contents.word == "not_judged":
+        first = next(d for d in analysis.doubts if d.stops)
+        return first_words(f"Not judged. {first.sentence}")
+    if contents.word == "no_mismatch":
+        return _agreement(analysis, contents.channels)
+    stated = with_status(analysis, *CLAIMED)
+    if stated and all(_concerns_the_recording(f) for f in stated) and not analysis.wrong_values:
+        rest = "" if contents.word == "explained" else f" {_rest(contents)}"
+        return first_words(f"{_corrected_mistakes(stated)}{rest}")
+    main = main_channel(analysis, contents.locations, contents.channels)
+    places = _places(main, contents.locations, contents.channels, analysis)
+    causes = _causes(contents)
+    if not causes:
+        texts = [capital(f"{where}; {_rest(contents)}") for where in places]
+        return next((text for text in texts if len(text.split()) <= MOST_WORDS), first_words(texts[-1]))
+    better = _better_in_short(main, contents.channels)
+    rest = "" if contents.word == "explained" else f"; {unexplained_words(contents.left)}"
+    still, short = _still_off(contents, main), _still_off(contents, main, metres=False)
+    surely, where, in_metres, off, off_in_metres, plain = places
+    for parts in (
+        (surely, causes, better, rest, still),
+        (where, causes, better, rest, short),
+        (in_metres, causes, better, rest, short),
+        (where, causes, "", rest, short),
+        (off, causes, "", rest, short),
+        (off_in_metres, causes, "", rest, short),
+        (off_in_metres, causes, "", "" if short else rest, short),
+        (plain, causes, "", "", short),
+        ("", causes, "", "" if short else rest, short),
+    ):
+        text = "".join([f"{parts[0]}; " if parts[0] else "", *parts[1:]]) + "."
+        if len(text.split()) <= MOST_WORDS:
+            return capital(text)
+    return first_words(capital(f"{causes}{short or rest}."))
+
+
+def unexplained_words(share: float) -> str:
+    """What stays unexplained given the causes that were named, 0 to 1."""
+    if share >= NEARLY_ALL:
+        return f"that explains less than {100 * (1 - NEARLY_ALL):.0f} % of it"
+    return f"{100 * share:.0f} % stays unexplained"
+
+
+def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) -> Size | None:
+    """The size of the error in the main channel as believed."""
+    before = quoted(channels[main]).before if main in channels else None
+    return None if before is None else channel_size(analysis, main, before, "before")
+
+
+def _still_off(contents: Contents, main: str, metres: bool = True) -> str:
+    """The channel that stays off most with what was found, as a clause, with or without the metres that it leads off.
+
+    Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
+    """
+    known = scales(contents.analysis)
+    left = {}
+    for channel, own in contents.channels.items():
+        after = quoted(own).after
+        if channel in known and after is not None:
+            left[channel] = math.sqrt(max(after**2 - (own.noise_floor or 0.0) ** 2, 0.0))
+    most = max(left, key=lambda c: left[c] / known[c].value, default=None)
+    if most in (None, main) or left[most] < WORTH_A_WORD * known[most].value:
+        return ""
+    size = channel_size(contents.analysis, most, left[most], "after")
+    off = f"{number(left[most])} {contents.channels[most].unit}"
+    return f"; the {channel_words(most)} stays {off} off ({size_words(size, 'both' if metres else 'share')})"
+
+
+def details(contents: Contents) -> list[str]:
+    """What the sentence has no room for: each effect with its numbers and share, values, what is left, what is run
+    forward."""
+    analysis, out = contents.analysis, []
+    for finding in by_share(with_status(analysis, "established"), contents.shares):
+        out.append(_left_out(finding, contents.shares.get(finding.id)))
+    out += [_either(f, analysis) for f in by_share(one_per_class(with_status(analysis, "ambiguous")), contents.shares)]
+    out += [_wrong(name, values, analysis.instead.get(name, ())) for name, values in analysis.values.items()]
+    if contents.word != "no_mismatch" and (with_status(analysis, *CLAIMED) or analysis.wrong_values):
+        main = main_channel(analysis, contents.locations, contents.channels)
+        out.append(_better(main, contents.channels, analysis.corrected))
+    for finding in by_share(with_status(analysis, "suggested"), contents.shares):
+        name, numbers = capital(effect_words(finding.id)), _parameters(finding)
+        out.append(f"{name} is suggested{f' ({numbers})' if numbers else ''}, not established: {finding.objection}.")
+    for name, (values, why) in analysis.suggested_values.items():
+        out.append(_wrong(name, values, why=why))
+    if contents.word in ("partly_explained", "unexplained"):
+        out.append(
+            capital(_rest(contents))
+            + (f" {capital(analysis.unexplained_description)}." if analysis.unexplained_description else "")
+        )
+    out += [_not_found(analysis.absent), *_run_forward(contents.forward)]
+    return [text for text in out if text]
+
+
+def _not_found(limits: Sequence[UpperLimit]) -> str:
+    """What was tested and not found, and how large it may be at most with 95 % probability."""
+    sized = [(effect_words(x.id), percent_words(x.share)) for x in limits if x.share > 0]
+    if not sized:
+        return ""
+    first, rest = sized[:MOST_LIMITS], sized[MOST_LIMITS:]
+    named = [f"{name} (at most {share} of the weight)" for name, share in first]
+    if rest:
+        named.append(f"{len(rest)} others (at most {rest[0][1]})" if len(rest) > 1 else f"{rest[0][0]} ({rest[0][1]})")
+    return f"Not found: {listed(named)}."
+
+
+def _causes(contents: Contents) -> str:
+    """Effects and values that carry nine tenths of the error, in a clause."""
+    analysis = contents.analysis
+    stated = [f for f in one_per_class(with_status(analysis, *CLAIMED)) if not _concerns_the_recording(f)]
+    names = []
+    for finding in carrying(stated, contents.shares):
+        either = dict.fromkeys((finding.id, *(finding.alternatives if finding.status == "ambiguous" else ())))
+        names.append(listed([effect_words(i) for i in either], "or"))
+    clauses = []
+    if names:
+        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+        shown = f"{', '.join(names[:MOST_NAMES])}{more}" if more else listed(names)
+        clauses.append(f"{shown} {'was' if len(names) == 1 else 'were'} left out")
+    wrong = list(analysis.wrong_values.items())
+    for name, values in wrong[: max(1, MOST_NAMES - len(names))]:
+        words, unit = parameter_words(name)
+        refitted = f"{number(values[1], 3)} {unit}".rstrip()
+        clauses.append(f"the {words} is {refitted}, not {number(values[0], 3)}")
+    if len(wrong) > max(1, MOST_NAMES - len(names)):
+        clauses.append(f"{len(wrong) - max(1, MOST_NAMES - len(names))} more values are wrong")
+    return listed(clauses)
+
+
+def _corrected_mistakes(stated: Sequence[Finding]) -> str:
+    """Faults of the recording, corrected before any physics was looked at."""
+    texts = [capital(f.sentence.rstrip(".")) for f in stated]
+    return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
+
+
+def off_words(main: str, channels: Mapping[str, Channel], size: Size | None = None, how: SizeWords = "both") -> str:
+    """How much a channel is off, in words; with its size, as far as asked."""
+    if not main:
+        return "the model and the recordings differ"
+    said = size_words(size, how) if size is not None else ""
+    off = f"{number(quoted(channels[main]).before)} {channels[main].unit} off"
+    return f"the {channel_words(main)} is {off}{f', {said}' if said else ''}"
+
+
+def size_words(size: Size, how: SizeWords = "both") -> str:
+    """`6 % of the weight or 0.060 m after 0.5 s simulated`, or one of the two, or neither."""
+    share = share_words(size) if how in ("both", "share") else ""
+    metres = metres_words(size) if how in ("both", "metres") else ""
+    if how == "metres" and not metres:
+        return share_words(size)
+    return " or ".join(filter(None, (share, metres)))
+
+
+def _better_in_short(main: str, channels: Mapping[str, Channel]) -> str:
+    errors = quoted(channels[main]) if main else None
+    if errors is None or errors.before is None or errors.after is None:
+        return ""
+    unit, floor = channels[main].unit, number(channels[main].noise_floor)
+    if errors.after >= errors.before:
+        return f"; the error is not smaller with this ({number(errors.after)} {unit})"
+    return f"; the error falls to {number(errors.after)} {unit} (noise {floor})"
+
+
+def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
+    """A sentence for every channel that what is delivered makes worse on the runs held out.
+
+    Worse than the vehicle with its values refitted, or than the believed one.
+    """
+    out = []
+    for name, channel in channels.items():
+        errors = channel.rmse.held_out
+        others = [("refitted", errors.refitted), ("believed", errors.before)]
+        known = [(word, value) for word, value in others if value is not None]
+        if errors.after is None or not known or errors.after <= (channel.noise_floor or 0.0):
+            continue
+        word, best = min(known, key=lambda pair: pair[1])
+        if errors.after > (1 + NO_BETTER) * best:
+            out.append(
+                f"On the held-out runs the error of the {channel_words(name)} is larger with the improved vehicle: "
+                f"{number(errors.after)} {channel.unit}; with the {word} values alone {number(best)} {channel.unit}."
+            )
+    return out
+
+
+def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
+    """What the improved vehicle does for the simulation run forward, channel by channel."""
+    groups: dict[str, list[str]] = {"better": [], "no better": [], "worse": []}
+    for name, channel in forward.items():
+        errors = quoted(channel)
+        if not errors.before or errors.after is None:
+            continue
+        change = errors.after / errors.before - 1.0
+        word = "better" if change < -NO_BETTER else "worse" if change > NO_BETTER else "no better"
+        groups[word].append(
+            f"{name.replace('_', ' ')} ({number(errors.before)} before, {number(errors.after)} {channel.unit} after)"
+        )
+    if not any(groups.values()):
+        return []
+    texts = [f"{word}: {listed(own)}" for word, own in groups.items() if own]
+    return [f"Simulated forward for half a second with the improved vehicle, {'; '.join(texts)}."]
+
+
+def _concerns_the_recording(finding: Finding) -> bool:
+    """Whether a finding is a fault of the recording itself, corrected before any physics was looked at."""
+    return finding.form is None and not finding.equation and bool(finding.sentence)
+
+
+def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]) -> str:
+    """The channel in which the mismatch is largest to a pilot: what goes of its error, or all of it where nothing does.
+
+    Of the channels located, those of what was named come first.
+    """
+    inverse = [t.channel for t in analysis.traces]
+    there = [loc.channel for loc in locations if loc.channel in channels]
+    named = [c for f in with_status(analysis, *CLAIMED) for c in f.channels if c in there]
+    pool = named or there or inverse
+
+    explained = bool(with_status(analysis, *CLAIMED) or analysis.wrong_values)
+    known = scales(analysis)
+
+    def size(name: str) -> float:
+        errors = quoted(channels[name])
+        before, after = errors.before or 0.0, errors.after or 0.0
+        off = math.sqrt(max(before**2 - after**2, 0.0)) if explained else before
+        return off / known[name].value if name in known else 0.0
+
+    return max(dict.fromkeys(pool), key=size) if pool else ""
+
+
+def _places(
+    main: str, locations: Sequence[Location], channels: Mapping[str, Channel], analysis: Analysis
+) -> tuple[str, str, str, str, str, str]:
+    """Where and how much the main channel is off, from all that can be said to the least.
+
+    With regime, both sizes and significance; without the significance; with the metres alone; the same two without
+    regime; and the error alone.
+    """
+    size = main_size(analysis, main, channels)
+    both, metres, plain = (off_words(main, channels, size, how) for how in ("both", "metres", ""))
+    here = [loc for loc in locations if loc.channel == main]
+    if not main or not here:
+        return both, both, metres, both, metres, plain
+    best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
+    doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < WORTH_SAYING_P else ""
+    when = _when(best, here, analysis)
+    return f"{when}{both}{doubt}", f"{when}{both}", f"{when}{metres}", both, metres, plain
+
+
+def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
+    """Lead-in that says in which regime, else at what time, the mismatch shows."""
+    regime = best.regime
+    if regime is not None and regime.variable != "time_s" and regime.low is not None and regime.high is not None:
+        name, unit = regime_words(regime.variable)
+        space = f" {unit}" if unit else ""
+        flown = np.concatenate([r[regime.variable] for r in analysis.regimes.values() if regime.variable in r])
+        to_the_end = regime.high >= np.nanquantile(flown, 0.98)
+        from_the_start = regime.low <= np.nanquantile(flown, 0.02)
+        if from_the_start and not to_the_end:
+            return f"up to {number(regime.high)}{space} of {name}, "
+        if to_the_end and not from_the_start:
+            return f"from {number(regime.low)}{space} of {name} on, "
+        if not to_the_end:
+            return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "
+        return ""
+    if best.energy_share < 0.99 and best.start_s is not None and best.stop_s is not None:
+        more = f" (and in {len(here) - 1} more stretches)" if len(here) > 1 else ""
+        return f"from {best.start_s:.1f} to {best.stop_s:.1f} s of {best.run}{more}, "
+    return ""
+
+
+def _parameters(finding: Finding) -> str:
+    shown = [
+        f"{e.symbol} = {plus_minus(e.value, e.low, e.high)}{' ' + e.unit if e.unit not in ('', '-', '1') else ''}"
+        for e in surest(finding.parameters)
+    ]
+    return listed(shown)
+
+
+def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
+    """The parameters that are furthest from zero relative to their intervals, in their order."""
+
+    def beyond(e: Estimate) -> float:
+        width = e.high - e.low
+        return abs(e.value) / max(width, 1e-12 * abs(e.value), 1e-300) if np.isfinite(width) else 0.0
+
+    kept = sorted(range(len(parameters)), key=lambda k: -beyond(parameters[k]))[:most]
+    return [parameters[k] for k in sorted(kept)]
+
+
+def _left_out(finding: Finding, share: float | None) -> str:
+    """An established effect, or a fault of the recording, with its numbers and the share of the error that it takes."""
+    named, sentence, parameters = capital(effect_words(finding.id)), finding.sentence.rstrip("."), _parameters(finding)
+    said = [
+        parameters,
+        "" if finding.probability is None else f"probability {percent(finding.probability)}",
+        "" if share is None else f"{100 * share:.0f} % of the error that goes",
+    ]
+    numbers = f" ({', '.join(filter(None, said))})" if any(said) else ""
+    if _concerns_the_recording(finding):
+        return f"{named}: {sentence}{numbers}."
+    kept_out = f" It is not delivered: {finding.withheld}." if finding.withheld else ""
+    return f"{named} was left out{f': {sentence}' if sentence else ''}{numbers}.{kept_out}"
+
+
+def _either(finding: Finding, analysis: Analysis) -> str:
+    names = [effect_words(i) for i in dict.fromkeys((finding.id, *finding.alternatives))]
+    text = f"{capital('either ' if len(names) > 1 else '')}{listed(names, 'or')} was left out"
+    text += "" if finding.probability is None else f" (probability {percent(finding.probability)})"
+    text += "; this recording cannot show which" if len(names) > 1 else "; this recording cannot settle it"
+    # The next experiment is made for one class; it need not help with another.
+    helps = analysis.next_manoeuvre and (not analysis.next_separates or finding.id in analysis.next_separates)
+    return f"{text}, but this may: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
+
+
+def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequence[str] = (), why: str = "") -> str:
+    """A wrong value, or with `why` one that is only suggested."""
+    believed, refitted, low, high = values
+    words, unit = parameter_words(name)
+    space = f" {unit}" if unit else ""
+    if not np.isfinite(believed):
+        return f"The {words} is {plus_minus(refitted, low, high)}{space}; nothing was believed about it."
+    # Of a ratio that alone is known the least trusted value is called wrong; the reader may know better.
+    other = f" (or, what explains as much here: {listed(list(instead), 'or')})" if instead else ""
+    value = plus_minus(refitted, low, high)
+    if why:
+        believed_words = f"{number(believed, 4)}{space} believed"
+        return f"The {words} is suggested to be {value}{space} ({believed_words}), not established: {why}."
+    return f"The {words} is {value}{space}, not the {number(believed, 4)}{space} believed{other}."
+
+
+def _better(main: str, channels: Mapping[str, Channel], corrected: Sequence[str] = ()) -> str:
+    if not main:
+        return ""
+    channel = channels[main]
+    errors, where = quoted(channel), _said_of(channel)
+    noise = number(channel.noise_floor)
+    if errors.before is not None and errors.after is not None and errors.after >= errors.before:
+        return (
+            f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
+            f"{number(errors.after)} {channel.unit} after."
+        )
+    also = f", and believed values corrected within their trust ({listed(list(corrected))})," if corrected else ""
+    return (
+        f"With this{also} the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
+        f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."
+    )
+
+
+def _said_of(channel: Channel) -> str:
+    held = channel.rmse.held_out.after is not None
+    return "on flights not used for fitting" if held else "on the flight it was fitted to"
+
+
+def _rest(contents: Contents) -> str:
+    analysis = contents.analysis
+    depends = [regime_words(v)[0] for v in analysis.unexplained_depends_on]
+    if with_status(analysis, *CLAIMED) or analysis.wrong_values:
+        text = f"{100 * contents.left:.0f} % of the mismatch stays unexplained"
+    else:
+        text = "none of the known effects explains it"
+    if depends:
+        text += f"; what is left depends on {listed(depends)}"
+    return text + "."
+
+
+def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
+    shown = [c for c in ("force_z", "force_x", "moment_x", "moment_z") if c in channels] or list(channels)
+    chosen = shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]
+    errors = [
+        f"the {channel_words(c)} is {number(quoted(channels[c]).after)} {channels[c].unit} off "
+        f"(noise {number(channels[c].noise_floor)})"
+        for c in chosen
+    ]
+    moved = f", values corrected within their trust ({listed(list(analysis.corrected))})" if analysis.corrected else ""
+    where = _said_of(channels[chosen[0]])
+    text = f"The believed vehicle describes these recordings{moved}: {where}, {listed(errors)}."
+    return text if len(text.split()) <= MOST_WORDS else text.replace(moved, "")

@@ -1,0 +1,467 @@
+"""The verdict on a recording set: a typed model of `verdict.json` and how it follows from an analysis.
+
+The JSON schema in `workflow/schemas/verdict.schema.json` is generated from this model
+(`python -m rotorid.mismatch.tell.verdict --write-schema`). A number that is not known is written as null.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from rotorid.mismatch.decision.findings import Analysis, Finding, Trace, ValueRow, one_per_class, with_status
+from rotorid.mismatch.decision.shares import fitted_part
+from rotorid.mismatch.decision.sizes import Size
+from rotorid.mismatch.delivery.doubts import stopping
+from rotorid.mismatch.tell.consistency import by_share, located_channels, missing_places, share_left, verdict_word
+from rotorid.mismatch.tell.sentences import (
+    Contents,
+    details,
+    first_words,
+    headline,
+    main_channel,
+    main_size,
+    spoken,
+    warnings_of,
+)
+from rotorid.recordings.basis import basis_of
+
+__all__ = ["Verdict", "main_channel", "make_verdict", "one_per_class", "spoken", "with_status"]
+
+SCHEMA_PATH = Path(__file__).parents[4] / "workflow" / "schemas" / "verdict.schema.json"
+SIGNIFICANT_DIGITS = 6
+SMALLEST_P = 1e-300
+
+
+def _rounded(value: float | None) -> float | None:
+    """To six significant digits; what is not a finite number becomes null."""
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f"{float(value):.{SIGNIFICANT_DIGITS - 1}e}")
+
+
+Number = Annotated[float | None, BeforeValidator(_rounded)]
+Probability = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_rounded)]
+Share = Annotated[float, BeforeValidator(_rounded), Field(ge=0, le=1)]
+Magnitude = Annotated[Annotated[float, Field(ge=0)] | None, BeforeValidator(_rounded)]
+Interval = tuple[Number, Number]
+
+
+class Part(BaseModel):
+    """A group of keys of the verdict: none unknown, none missing."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Runs(Part):
+    """Runs used to fit and runs held out."""
+
+    training: tuple[str, ...]
+    held_out: tuple[str, ...]
+
+
+class Errors(Part):
+    """Root mean square error with believed values, with values refitted, and with the established effects."""
+
+    before: Magnitude
+    refitted: Magnitude
+    after: Magnitude
+
+
+class SplitErrors(Part):
+    """Errors on the runs of each kind; null where there is none."""
+
+    training: Errors
+    held_out: Errors
+
+
+class PValues(Part):
+    """p-value that the residual does not depend on the inputs; null for simulation run forward."""
+
+    before: Probability
+    after: Probability
+
+
+class Channel(Part):
+    """One channel's errors relative to its noise, in its unit."""
+
+    unit: str
+    noise_floor: Magnitude
+    rmse: SplitErrors
+    p_value: PValues
+
+
+class Regime(Part):
+    """Range of a variable in which the mismatch shows."""
+
+    variable: str
+    low: Number
+    high: Number
+
+
+class Location(Part):
+    """Where the mismatch shows: a channel of a run, from when to when, in which regime."""
+
+    run: str
+    channel: str
+    start_s: Number
+    stop_s: Number
+    p_value: Probability
+    energy_share: Share = Field(description="Share of the channel's mismatch energy in this run that lies here.")
+    regime: Regime | None
+
+
+class ParameterEstimate(Part):
+    """A parameter of an effect with its 95 % interval."""
+
+    symbol: str
+    value: Number
+    unit: str
+    interval_95: Interval
+
+
+class Gain(Part):
+    """Held-out rmse with the effect over that without it, block-bootstrap interval."""
+
+    rmse_ratio: Magnitude
+    interval_95: Interval
+
+
+class SizeOfError(Part):
+    """Root mean square of an error, or of what an effect does, in a channel's unit and in units that a pilot knows."""
+
+    channel: str
+    rms: Magnitude
+    unit: str
+    share: Magnitude
+    of: str
+    metres_after_half_a_second: Magnitude = Field(
+        description="How far off it alone leads within half a second of simulation; null where it moves nothing."
+    )
+
+
+class BasisOfVerdict(Part):
+    """What the verdict rests on, said before anything else."""
+
+    sentence: str
+    recorded_s: Magnitude
+    in_the_air_s: Magnitude = Field(description="Null for a stand or bench, and where no rotors are recorded.")
+    ground_share: Magnitude = Field(description="Of the time recorded, on the ground with rotors that idle.")
+    not_recorded: tuple[str, ...]
+
+
+class EffectVerdict(Part):
+    """What the data say of one id."""
+
+    id: str
+    status: Literal["established", "ambiguous", "suggested", "absorbed", "not_established"]
+    delivered: bool = Field(description="Whether it stands in one of the three files.")
+    withheld: str = Field(description="Of one that is established or of a class and not delivered: why.")
+    alternatives: tuple[str, ...]
+    sentence: str
+    size: SizeOfError | None = Field(description="What it does where it does most, on the held-out runs.")
+    share: Share | None = Field(
+        description="Part of the squared error between before and after on the held-out runs that goes without it, "
+        "two sensors of one quantity compared among the channels."
+    )
+    equation: str
+    channels: tuple[str, ...]
+    parameters: tuple[ParameterEstimate, ...]
+    probability: Probability = Field(description="Posterior that the id is at work; null where none was computed.")
+    p_value: Probability
+    held_out_gain: Gain | None
+
+
+class Absent(Part):
+    """An id that was tested and not found, and how large it may be all the same."""
+
+    id: str
+    symbol: str = Field(description="Of the parameter that does most; empty of a form whose size has none of its own.")
+    at_most: Magnitude = Field(description="Of the parameter's magnitude, with 95 % probability.")
+    unit: str
+    share_of_weight: Magnitude = Field(
+        description="Root mean square force over the weight, moment over the weight at the rotors' mean distance."
+    )
+
+
+class DoubtOfSet(Part):
+    """Something that stands in the way of believing the verdict."""
+
+    what: str
+    sentence: str
+    stops: bool = Field(description="Whether the set is not judged because of it.")
+
+
+class BelievedValue(Part):
+    """One believed value before and after, with all values free, jointly with the delivered effects."""
+
+    believed: Number
+    estimate: Number
+    interval_95: Interval
+    delivered: Number = Field(description="What stands in improved_vehicle.yaml.")
+    wrong: bool = Field(description="Whether it is among `parameters`.")
+    withheld: str = Field(description="Of a wrong one that is not delivered: why.")
+
+
+class Correlated(Part):
+    """Two believed values of which these recordings know little more than a ratio."""
+
+    values: tuple[str, str]
+    correlation: Number
+
+
+class WrongValue(Part):
+    """A value of vehicle.yaml that the data contradict."""
+
+    believed: Number
+    refitted: Number
+    interval_95: Interval
+
+
+class NotTestable(Part):
+    """An id that no column of the recording allows to test."""
+
+    id: str
+    reason: str
+
+
+class Unexplained(Part):
+    """What the findings leave."""
+
+    share: Share
+    channels: tuple[str, ...]
+    depends_on: tuple[str, ...]
+    description: str
+
+
+class NextExperiment(Part):
+    """What to fly to distinguish the alternatives; empty where nothing is open.
+
+    The separation, in standard errors, is None: `rotorid plan` alone computes it, for what can be flown.
+    """
+
+    manoeuvre: str
+    separates: tuple[str, ...]
+    predicted_separation_sigma: Magnitude
+
+
+class Verdict(Part):
+    """The whole of `verdict.json`."""
+
+    set: str
+    kind: Literal["flight", "stand", "bench"]
+    runs: Runs
+    verdict: Literal["no_mismatch", "explained", "partly_explained", "unexplained", "not_judged"]
+    basis: BasisOfVerdict
+    doubts: tuple[DoubtOfSet, ...]
+    sentence: str
+    size: SizeOfError | None = Field(description="Of the error as believed in the channel that the sentence names.")
+    details: tuple[str, ...] = Field(description="What the sentence has no room for, the largest share first.")
+    warnings: tuple[str, ...] = Field(description="Channels that are worse with what is delivered.")
+    channels: dict[str, Channel]
+    locations: tuple[Location, ...]
+    effects: tuple[EffectVerdict, ...]
+    absent: tuple[Absent, ...]
+    parameters: dict[str, WrongValue]
+    believed_values: dict[str, BelievedValue]
+    correlations: tuple[Correlated, ...]
+    not_testable: tuple[NotTestable, ...]
+    unexplained: Unexplained
+    next_experiment: NextExperiment
+
+    def text(self) -> str:
+        """The file's text."""
+        return json.dumps(self.model_dump(mode="json"), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def schema_text() -> str:
+    """The JSON schema of `verdict.json` as text."""
+    return json.dumps(Verdict.model_json_schema(), indent=1, sort_keys=True) + "\n"
+
+
+def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Mapping[str, Channel]) -> Verdict:
+    """The verdict that an analysis, its locations and the simulation run forward amount to.
+
+    Its word, the share left and the shares of the effects follow from the errors that it prints.
+    """
+    inverse = inverse_channels(analysis)
+    locations = with_missing_places(analysis, locations, inverse)
+    located = located_channels(locations, inverse)
+    left = share_left(inverse, located)
+    shares = analysis.shares
+    word = "not_judged" if stopping(analysis) else verdict_word(analysis, locations, left)
+    contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
+    return Verdict(
+        set=analysis.recordings.name,
+        kind=analysis.recordings.vehicle.kind,
+        runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
+        verdict=word,
+        basis=basis_of_verdict(analysis),
+        doubts=tuple(DoubtOfSet(what=d.what, sentence=d.sentence, stops=d.stops) for d in analysis.doubts),
+        sentence=spoken(headline(contents), analysis),
+        size=size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
+        details=tuple(spoken(text, analysis) for text in details(contents)),
+        warnings=tuple(spoken(text, analysis) for text in warnings_of({**inverse, **forward})),
+        channels=inverse | dict(forward),
+        locations=tuple(locations),
+        effects=tuple(
+            effect_verdict(f, shares.get(f.id), analysis.effect_sizes.get(f.id))
+            for f in by_share(analysis.findings, shares)
+        ),
+        absent=tuple(
+            Absent(id=a.id, symbol=a.symbol, at_most=a.at_most, unit=a.unit, share_of_weight=a.share or None)
+            for a in analysis.absent
+        ),
+        parameters={
+            name: WrongValue(believed=believed, refitted=refitted, interval_95=(low, high))
+            for name, (believed, refitted, low, high) in analysis.values.items()
+        },
+        believed_values={row.name: believed_value_of(row, analysis) for row in analysis.believed_values},
+        correlations=tuple(Correlated(values=pair, correlation=r) for pair, r in analysis.value_correlations.items()),
+        not_testable=tuple(NotTestable(id=i, reason=r) for i, r in sorted(analysis.not_testable.items())),
+        unexplained=Unexplained(
+            share=float(np.clip(contents.left, 0.0, 1.0)),
+            channels=analysis.unexplained_channels,
+            depends_on=analysis.unexplained_depends_on,
+            description=analysis.unexplained_description,
+        ),
+        next_experiment=NextExperiment(
+            manoeuvre=analysis.next_manoeuvre,
+            separates=analysis.next_separates,
+            predicted_separation_sigma=None,
+        ),
+    )
+
+
+def basis_of_verdict(analysis: Analysis) -> BasisOfVerdict:
+    """Time and columns of the recordings as analysed."""
+    found = basis_of(analysis.recordings)
+    return BasisOfVerdict(
+        sentence=found.sentence,
+        recorded_s=found.recorded_s,
+        in_the_air_s=found.in_the_air_s,
+        ground_share=found.ground_share,
+        not_recorded=found.missing,
+    )
+
+
+def size_of(size: Size | None) -> SizeOfError | None:
+    """A size as the file has it."""
+    if size is None:
+        return None
+    return SizeOfError(
+        channel=size.channel,
+        rms=size.rms,
+        unit=size.unit,
+        share=size.share,
+        of=size.words.removeprefix("of "),
+        metres_after_half_a_second=size.metres,
+    )
+
+
+def believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
+    """One row of the table of all believed values."""
+    return BelievedValue(
+        believed=row.believed,
+        estimate=row.estimate,
+        interval_95=(row.low, row.high),
+        delivered=row.delivered,
+        wrong=row.name in analysis.values,
+        withheld=analysis.withheld_values.get(row.name, ""),
+    )
+
+
+def with_missing_places(
+    analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]
+) -> list[Location]:
+    """Locations, and those that the rest of the verdict speaks of and nothing located."""
+    out = list(locations)
+    for channel, p_value in missing_places(analysis, locations, channels):
+        traces = [t for t in analysis.traces if t.channel == channel and len(t.time_s)]
+        for run in dict.fromkeys(t.run for t in traces):
+            own = [t for t in traces if t.run == run]
+            out.append(
+                Location(
+                    run=run,
+                    channel=channel,
+                    start_s=float(own[0].time_s[0]),
+                    stop_s=float(own[-1].time_s[-1]),
+                    p_value=float(np.clip(p_value, SMALLEST_P, 1.0)),
+                    energy_share=1.0,
+                    regime=None,
+                )
+            )
+    return out
+
+
+def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
+    """Errors of every channel that the traces hold, by inverse dynamics."""
+    found, part = {}, fitted_part(analysis)
+    for channel in dict.fromkeys(t.channel for t in analysis.traces):
+        traces = [t for t in analysis.traces if t.channel == channel]
+        before, after = analysis.p_values.get(channel, (None, None))
+        masks = [part(t.run, t.time_s) for t in traces]
+        found[channel] = Channel(
+            unit=traces[0].unit,
+            noise_floor=analysis.noise_floor.get(channel),
+            rmse=SplitErrors(
+                training=_errors(traces, [m > 0 for m in masks]), held_out=_errors(traces, [m < 0 for m in masks])
+            ),
+            p_value=PValues(before=before, after=after),
+        )
+    return found
+
+
+def _errors(traces: Sequence[Trace], masks: Sequence[np.ndarray]) -> Errors:
+    return Errors(
+        **{
+            stage: rms([getattr(t, stage)[mask] for t, mask in zip(traces, masks, strict=True)])
+            for stage in Errors.model_fields
+        }
+    )
+
+
+def rms(parts: Sequence[np.ndarray]) -> float:
+    """Root mean square over stretches, missing samples left out; NaN where nothing is there."""
+    values = np.concatenate([np.ravel(p) for p in parts]) if parts else np.zeros(0)
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
+
+
+def effect_verdict(finding: Finding, share: float | None, size: Size | None = None) -> EffectVerdict:
+    """One entry under `effects`."""
+    return EffectVerdict(
+        id=finding.id,
+        status=finding.status,
+        delivered=finding.delivered,
+        withheld=finding.withheld,
+        alternatives=finding.alternatives,
+        sentence=first_words(f"only suggested: {finding.objection}" if finding.objection else finding.sentence),
+        size=size_of(size),
+        share=share,
+        equation=finding.equation or (finding.form.equation if finding.form else ""),
+        channels=finding.channels,
+        parameters=tuple(
+            ParameterEstimate(symbol=e.symbol, value=e.value, unit=e.unit, interval_95=(e.low, e.high))
+            for e in finding.parameters
+        ),
+        probability=finding.probability,
+        p_value=finding.p_value,
+        held_out_gain=None
+        if finding.gain is None
+        else Gain(rmse_ratio=finding.gain[0], interval_95=(finding.gain[1], finding.gain[2])),
+    )
+
+
+if __name__ == "__main__":
+    if "--write-schema" in sys.argv:
+        SCHEMA_PATH.write_text(schema_text())
+    else:
+        print(schema_text(), end="")

@@ -1,0 +1,56 @@
+"""The probability of each effect of a model that was chosen otherwise, and the status that it leaves it."""
+
+from __future__ import annotations
+
+import pytest
+
+from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.posterior.score import Posterior
+from rotorid.mismatch.posterior.search import Found
+from tests.unit.mismatch.posterior.test_posterior import effect, flight, problem
+
+TERMS = (effect("rotor_drag/a"), effect("ground_effect/a"), effect("frame_drag/a"))
+
+
+def found(beta, active, alike=0.0) -> Found:
+    """The posterior at the effects `active` of a flight with coefficients `beta` of drag, ground and frame."""
+    posterior = Posterior(problem(flight(beta, TERMS, alike=alike)))
+    model = tuple(sorted(f"{one}/a" for one in active))
+    return Found(posterior, model, posterior(model))
+
+
+def claims(*ids: str) -> list[Finding]:
+    return [Finding(i, "established") for i in ids]
+
+
+def test_an_effect_at_work_stays_established_and_one_that_is_not_there_does_not():
+    drag, ground = with_probabilities(
+        claims("rotor_drag", "ground_effect"), found([0.5, 0.0, 0.0], ["rotor_drag", "ground_effect"])
+    )
+    assert drag.status == "established" and drag.probability > 0.99
+    assert ground.status == "not_established" and ground.probability < 0.1
+    assert ground.rule == "probability" and "its probability is" in ground.sentence
+
+
+def test_a_claim_with_collinear_rivals_becomes_a_class_with_them():
+    same = found([0.05, 0.0, 0.0], ["rotor_drag"], alike=10.0)
+    members = ("frame_drag", "ground_effect", "rotor_drag")
+    (alone,) = with_probabilities(claims("rotor_drag"), same)
+    (as_class,) = with_probabilities([Finding("rotor_drag", "ambiguous", alternatives=members)], same)
+    for one in (alone, as_class):
+        assert one.status == "ambiguous" and one.probability > 0.99
+        assert "rotor_drag" in one.alternatives and set(one.alternatives) <= set(members)
+
+
+@pytest.mark.parametrize(("size", "status"), [(0.15, "not_established"), (0.235, "suggested"), (0.4, "established")])
+def test_the_status_follows_from_the_probability(size, status):
+    (drag,) = with_probabilities(claims("rotor_drag"), found([size, 0.0, 0.0], ["rotor_drag"]))
+    assert drag.status == status
+    low, high = {"not_established": (0.0, 0.5), "suggested": (0.5, 0.99), "established": (0.99, 1.0)}[status]
+    assert low <= drag.probability <= high
+
+
+def test_what_the_regression_does_not_decide_stays_as_it_is():
+    lag, dropped = Finding("motor_lag", "established"), Finding("ground_effect", "not_established")
+    assert with_probabilities([lag, dropped], found([0.5, 0.0, 0.0], ["rotor_drag"])) == [lag, dropped]

@@ -1,0 +1,104 @@
+"""What a command did between its samples, which nobody recorded, is free within what it can be."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Motion, SpeedPath
+from rotorid.effects.motor_lag import lagged
+from rotorid.mismatch.instrument.chain import find_chain, moved_between_samples, unknown_courses
+from rotorid.mismatch.instrument.setup import set_up, with_speed
+from rotorid.mismatch.plant.split import parts_of, split_runs
+from rotorid.recordings import RecordingSet, Run, Vehicle
+
+DT_S, TAU_S = 0.01, 0.03
+FINE = 20
+LAG = next(f for f in catalogue()["motor_lag"].speed_forms if f.name == "one constant")
+DELAY = catalogue()["delay"].speed_forms[0]
+
+
+def test_a_lag_of_a_ramp_is_exact_between_samples():
+    """ω = t − τ (1 − exp(−t/τ)) for ω_c = t from rest."""
+    t = np.arange(40) * DT_S
+    found = lagged(t[:, None], TAU_S, TAU_S, DT_S, holds=False)[:, 0]
+    np.testing.assert_allclose(found, t - TAU_S * (1 - np.exp(-t / TAU_S)), atol=1e-12)
+
+
+def test_a_lag_has_its_own_constant_up_and_down_for_a_smooth_command():
+    """Up by the time constant of speeds that grow, down by the other; both from rest on a ramp."""
+    t = np.arange(40) * DT_S
+    down = lagged(-t[:, None], 0.01, TAU_S, DT_S, holds=False)[:, 0]
+    np.testing.assert_allclose(down, -(t - TAU_S * (1 - np.exp(-t / TAU_S))), atol=1e-12)
+
+
+def test_a_smooth_command_is_delayed_without_being_smoothed():
+    """A sine of 10 Hz at 100 Hz, half a sample late: straight lines would take 5 % of it, a cubic takes 0.3 %."""
+    t = np.arange(200) * DT_S
+    wave = np.sin(2 * np.pi * 10 * t)[:, None]
+    late = DELAY.apply(SpeedPath(wave, t, 1.0, holds=False), np.array([0.5 * DT_S]))
+    true = np.sin(2 * np.pi * 10 * (t - 0.5 * DT_S))
+    assert np.abs(late[2:-2, 0] - true[2:-2]).max() < 0.011
+    straight = DELAY.apply(SpeedPath(wave, t, 1.0), np.array([0.5 * DT_S]))
+    assert np.abs(straight[2:-2, 0] - true[2:-2]).max() == pytest.approx(0.05, abs=0.005)
+
+
+def test_the_moments_of_a_parabola_by_hand():
+    """ω = t²: later by δ it is (t − δ)², spread by v it is v more; a cubic between samples is exact for it."""
+    t = np.arange(39) * DT_S / 2
+    moved = moved_between_samples((t**2)[:, None], np.array([0.002, 1e-5]), DT_S, 2)[2:-1, 0]
+    np.testing.assert_allclose(moved, (t[::2][2:-1] - 0.002) ** 2 + 1e-5, atol=1e-12)
+
+
+def test_what_is_not_known_of_a_command():
+    """Half a sample and the variance of a hold, dt²/12; a delay is the first of them already."""
+    np.testing.assert_allclose(unknown_courses((("motor_lag", LAG),), 0.012), [0.006, 1.2e-5])
+    np.testing.assert_allclose(unknown_courses((("delay", DELAY), ("motor_lag", LAG)), 0.012), [1.2e-5])
+    assert not len(unknown_courses((("throttle_curve", catalogue()["throttle_curve"].speed_forms[0]),), 0.012))
+
+
+def lagging_set(between) -> RecordingSet:
+    """Three runs of a rotor with a lag of 30 ms whose command's course between samples is `between(fine command)`."""
+    runs = []
+    for number in range(3):
+        rng = np.random.default_rng(number)
+        t = np.arange(0, 20, DT_S / FINE)
+        knots = np.arange(0, 20.4, 0.4) + 0.1 * rng.random(51)
+        places = np.repeat(knots, 2)[1:-1] + 0.0371 * np.tile([0, 1], 50)
+        course = np.interp(t, places, np.repeat(rng.uniform(400, 900, 50), 2))
+        command = between(course)
+        speed = lagged(command[:, None], TAU_S, TAU_S, DT_S / FINE)[::FINE, 0]
+        read = speed + 0.5 * rng.standard_normal(len(speed))
+        table = {
+            "time_s": t[::FINE],
+            "rotor_command_1_rad_s": course[::FINE],
+            "rotor_speed_1_rad_s": read,
+            "force_z_n": -1.4e-6 * speed**2 + 0.003 * rng.standard_normal(len(speed)),
+        }
+        runs.append(Run(f"run{number}", pd.DataFrame(table)))
+    content = {
+        "name": "scale",
+        "kind": "stand",
+        "rotors": [{"x_m": 0.0, "y_m": 0.0, "spin": "ccw"}],
+        "thrust_coefficient_n_s2": 1.4e-6,
+        "rotor_radius_m": 0.06,
+        "tared": True,
+    }
+    return RecordingSet("scale", Vehicle.model_validate(content), tuple(runs), ("run2",))
+
+
+@pytest.mark.parametrize("between", [lambda x: x, lambda x: np.repeat(x[::FINE], FINE)], ids=["smooth", "holds"])
+def test_a_lag_is_found_whatever_the_command_did_between_its_samples(between):
+    made = lagging_set(between)
+    setup = set_up(parts_of(made, split_runs(made))[0], made)
+    (found,) = [f for f in find_chain(setup).findings if f.id == "motor_lag"]
+    first = found.parameters[0]
+    assert first.low < TAU_S < first.high
+    assert first.high - first.low < 0.04 * TAU_S
+
+
+def test_the_acceleration_of_a_cubic_is_exact():
+    """d(t³)/dt = 3 t²: the kernel has no error of third order, which would read a rotor's inertia too large."""
+    t = np.arange(30) * 0.005
+    motion = with_speed(Motion(time_s=t, rotor_speed=None), (t**3)[:, None])
+    np.testing.assert_allclose(motion.rotor_acceleration[2:-2, 0], 3 * t[2:-2] ** 2, atol=1e-12)
