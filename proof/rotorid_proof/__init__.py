@@ -3,6 +3,8 @@
 OPEN = (
     "ablation",
     "campaign",
+    "changes.pairs",
+    "changes.score",
     "concealed.build",
     "concealed.cases",
     "concealed.planned",

@@ -189,6 +189,28 @@ rule prove_next_flight:
         "../scripts/prove_next_flight.py"
 
 
+rule prove_changes:
+    """Pairs of sets in which it is known what changed, and what `rotorid compare` says: slow, on request."""
+    message:
+        "Proof: what changed between two sets"
+    input:
+        plantings="workflow/plantings.tsv",
+        public=PUBLIC_SHOWN,
+    output:
+        table="results/proof/changes.csv",
+        summary="results/proof/changes_summary.csv",
+    params:
+        so_far="results/changes/rows.csv",
+        recordings="results/recordings",
+        seed=CONFIG.proof.release,
+        concealing=[CODE.of(path) for path in CONCEALING],
+        code=code_of("prove_changes"),
+    log:
+        "results/logs/prove_changes.log",
+    script:
+        "../scripts/prove_changes.py"
+
+
 rule draw_proof:
     """Figures of the proof next to its tables."""
     message:

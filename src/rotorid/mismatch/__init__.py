@@ -17,6 +17,7 @@ OPEN = (
     "analyse",
     "changes",
     "changes.compare",
+    "changes.joint",
     "changes.words",
     "decision.findings",
     "decision.probability",

@@ -1,7 +1,7 @@
 """How far apart two competing models are on recordings not made yet, by the comparison that the engine decides with.
 
-The engine compares models by what they leave in whitened squares (`rotorid.mismatch.comparison`). If model h is true
-with coefficients θ, the best that its rival can do leaves λ = θᵀ S θ more of them, where S is what is left of the
+The engine compares models by what they leave in whitened squares (`rotorid.mismatch.plant.comparison`). If model h is
+true with coefficients θ, the best that its rival can do leaves λ = θᵀ S θ more of them, where S is what is left of the
 normal equations of h's columns once everything that the rival and all believed values (within their trust) could take
 over is projected out. The loss difference that the engine will then find is about λ with a standard deviation of 2 √λ:
 in standard errors of the data the models are √λ apart, give or take one. The normal equations are those of the set as
