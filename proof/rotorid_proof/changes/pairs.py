@@ -27,8 +27,6 @@ class Made:
     sought: tuple[score.Sought, ...] = ()
     fair: tuple[str, ...] = ()
     """Ids that are no wrong names."""
-    must: bool = True
-    """Whether what changed has to be found."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ OTHERS = {
 
 def as_read(recording, name: str) -> RecordingSet:
     """A recording as a user's files would hand it over."""
-    from rotorid_score.concealed.write import write_set
+    from rotorid_proof.concealed.write import write_set
 
     with tempfile.TemporaryDirectory() as folder:
         write_set(recording, Path(folder) / name)
@@ -74,13 +72,12 @@ def as_read(recording, name: str) -> RecordingSet:
 
 def drawn(seed: str, count: int) -> Iterator[Pair]:
     """Drawn pairs of each simulator."""
-    from rotorid_score.concealed import pairs
+    from rotorid_proof.concealed import pairs
 
     def made(name: str) -> Made:
         pair = pairs.make(name)
-        truth = pair.truth
         sets = as_read(pair.base, "base"), as_read(pair.new, "new")
-        return Made(*sets, score.sought_in(truth), tuple(truth["fair"]), not truth["need_not_be_found"])
+        return Made(*sets, score.sought_in(pair.truth), tuple(pair.truth["fair"]))
 
     for name in pairs.names(seed, count):
         yield Pair(f"drawn/{name}", "drawn", partial(made, name))
@@ -88,7 +85,7 @@ def drawn(seed: str, count: int) -> Iterator[Pair]:
 
 def halves(seed: str, count: int) -> Iterator[Pair]:
     """The halves of drawn sets."""
-    from rotorid_score.concealed import drawn as sets
+    from rotorid_proof.concealed import drawn as sets
 
     def made(name: str, key: int) -> Made:
         recording, _, _ = sets.make(name, key)
@@ -105,8 +102,8 @@ def halves(seed: str, count: int) -> Iterator[Pair]:
 
 def planted(recordings: Path, plantings: Path) -> Iterator[Pair]:
     """Plantings of the larger size against the flight untouched, and against another flight of the vehicle."""
-    from rotorid_score.plantings.flights import flight
-    from rotorid_score.plantings.judge import cut
+    from rotorid_proof.plantings.flights import flight
+    from rotorid_proof.plantings.judge import cut
 
     def made(one: Planting, others: tuple[Sequence[str], Sequence[str]] | None) -> Made:
         whole = cut(recordings / flight(one.flight).set, one.flight)
@@ -117,7 +114,7 @@ def planted(recordings: Path, plantings: Path) -> Iterator[Pair]:
             for t in truths
             if not t.unseen
         )
-        return Made(base, new, sought, tuple(i for t in truths for i in (*t.names, *t.fair)), bool(sought))
+        return Made(base, new, sought, tuple(i for t in truths for i in (*t.names, *t.fair)))
 
     for one in read_list(plantings):
         if one.size != "large" or one.family == "pair" or not (recordings / flight(one.flight).set).is_dir():
@@ -162,5 +159,5 @@ def compared(pair: Pair, known: dict[str, Reference]) -> score.Row:
         known.clear()
         known[pair.base] = reference_of(made.base)
     found = changes_from(known[pair.base], made.new)
-    row = score.row_of(pair.name, pair.kind, found, made.sought, made.fair, made.must)
+    row = score.row_of(pair.name, pair.kind, found, made.sought, made.fair)
     return replace(row, seconds=round(time.process_time() - start, 1))

@@ -35,6 +35,8 @@ class Sought:
     """Further ids: a class that holds one of these and nothing foreign names it as well."""
     sizes: Mapping[str, float] | None = None
     """Symbol of its parameters to by how much they are more; None where they are not to be compared."""
+    must: bool = True
+    """Whether it is large enough that it has to be found; else silence is right, too."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +78,7 @@ def classes_of(changes: Changes) -> list[frozenset[str]]:
     return [frozenset({c.id, *c.alternatives}) for c in changes.changes if c.status in CLAIMED]
 
 
-def row_of(
-    pair: str, kind: str, changes: Changes, sought: Sequence[Sought], fair: Iterable[str] = (), must: bool = True
-) -> Row:
+def row_of(pair: str, kind: str, changes: Changes, sought: Sequence[Sought], fair: Iterable[str] = ()) -> Row:
     """The row of a pair.
 
     Parameters
@@ -87,14 +87,12 @@ def row_of(
         What changed.
     fair
         Ids that are no wrong names.
-    must
-        Whether what changed is large enough that it has to be found; else silence is right, too.
     """
     claims = classes_of(changes)
     known = {i for s in sought for i in (s.id, *s.equivalent)} | set(fair)
     wrong = [c for c in claims if not c & known]
     named = [s for s in sought if any(c & {s.id, *s.equivalent} for c in claims)]
-    asked = sought if must else named
+    asked = [s for s in sought if s.must or s in named]
     inside = [ok for s in named for ok in inside_of(changes, s)]
     return Row(
         pair=pair,
@@ -122,6 +120,7 @@ def sought_in(truth: Mapping) -> tuple[Sought, ...]:
             c["id"],
             frozenset(c["equivalent"]),
             {p["symbol"]: p["value"] for p in c["parameters"]} if c.get("form") != "blade" else None,
+            not c["need_not_be_found"],
         )
         for c in truth["changes"]
     )

@@ -38,7 +38,7 @@ class Pair:
     base: Recording
     new: Recording
     truth: dict
-    """`changes`: id, parameters, equivalent ids; `fair`: ids that are no wrong names; `need_not_be_found`."""
+    """`changes`: id, parameters, equivalent ids, `need_not_be_found`; `fair`: ids that are no wrong names."""
 
 
 def names(seed: str, count: int) -> list[str]:
@@ -91,8 +91,8 @@ VALUES = (
 )
 
 
-def truth_of(effects: list[dict], factors: dict[str, float], fair: list[str], small: bool, **more) -> dict:
-    """What has to be found, in the form of `Pair.truth`."""
+def truth_of(effects: list[dict], factors: dict[str, float], fair: list[str], hidden: list[str], **more) -> dict:
+    """What changed, in the form of `Pair.truth`; ids in `hidden` are too small that they had to be found."""
     values = [
         {
             "id": name,
@@ -101,7 +101,8 @@ def truth_of(effects: list[dict], factors: dict[str, float], fair: list[str], sm
         }
         for name, factor in factors.items()
     ]
-    return plain({"changes": [*effects, *values], "fair": fair, "need_not_be_found": small, **more})
+    changes = [{**c, "need_not_be_found": c["id"] in hidden} for c in (*effects, *values)]
+    return plain({"changes": changes, "fair": fair, **more})
 
 
 def beyond(base: list[dict], new: list[dict]) -> list[dict]:
@@ -147,11 +148,11 @@ def pair_of_multibody(seed: int) -> Pair:
     both, changes = str(rng.choice(BOTH_OF_MULTIBODY)), drawn_families(rng, CHANGES_OF_MULTIBODY)
     grade = logger.drawn(str(rng.choice(["lab", "lab", "tele"])), rng, command="lag" in changes or rng.random() < 0.3)
 
-    def draft_of(families: list[str]) -> tuple[multibody.Draft, dict[str, float]]:
+    def draft_of(families: dict[int, str]) -> tuple[multibody.Draft, dict[str, float]]:
         draft, factors = multibody.Draft(quad, np.random.default_rng([seed, 52])), {}
         if "command" in grade.groups:
             draft.world.lag = LAG_S
-        for k, family in enumerate(families):
+        for k, family in families.items():
             draft.rng = np.random.default_rng([seed, 53, k, len(family)])
             if family == "value":
                 draft.quad, name, factor = other_value(draft.quad, draft.rng)
@@ -160,8 +161,8 @@ def pair_of_multibody(seed: int) -> Pair:
                 (slower if family == "lag" else multibody.FAMILIES[family])(draft)
         return draft, factors
 
-    base, _ = draft_of([both])
-    new, factors = draft_of([both, *changes])
+    base, _ = draft_of({0: both})
+    new, factors = draft_of(dict(enumerate([both, *changes])))
     file, _ = multibody.believed(base, np.random.default_rng([seed, 2]), grade)
 
     def flights(draft: multibody.Draft, number: int, count: int = RUNS):
@@ -169,6 +170,11 @@ def pair_of_multibody(seed: int) -> Pair:
         runs = [(tuple(own.choice(course.KINDS, 4)), RUN_S) for _ in range(count)]
         return multibody.recorded(draft, grade, runs, file, seed + number)
 
+    hidden = []
+    for k, family in enumerate(changes, start=1):
+        alone, own_factors = draft_of({k: family})
+        if small(flights(alone, 1, 1)[2]):
+            hidden += [*(e["id"] for e in alone.effects), *own_factors]
     return Pair(
         base=Recording(file, flights(base, 0)[0], form="parquet"),
         new=Recording(file, flights(new, 1)[0], form="parquet"),
@@ -176,7 +182,7 @@ def pair_of_multibody(seed: int) -> Pair:
             beyond(base.effects, new.effects),
             factors,
             new.fair,
-            bool(changes) and small(flights(draft_of(changes)[0], 1, 1)[2]),
+            hidden,
             both=both,
             families=changes,
             grade=grade.name,
@@ -214,11 +220,11 @@ def pair_of_continuous(seed: int) -> Pair:
               0.003 * noise)  # fmt: skip
     styles = tuple(rng.permutation(["sprint", "spin", "stir", "survey"])[:RUNS])
 
-    def sheet_of(families: list[str]) -> tuple[continuous.Sheet, Kit, dict[str, float]]:
+    def sheet_of(families: dict[int, str]) -> tuple[continuous.Sheet, Kit, dict[str, float]]:
         sheet, factors = continuous.Sheet(craft, np.random.default_rng([seed, 62])), {}
         sheet.nature.lag = craft.lag_s
         apply: dict[str, Callable] = {**continuous.FAMILIES, "lag": slower_motors}
-        for k, family in enumerate(families):
+        for k, family in families.items():
             sheet.rng = np.random.default_rng([seed, 63, k, len(family)])
             if family == "value":
                 sheet.craft, name, factor = other_value(sheet.craft, sheet.rng)
@@ -231,17 +237,20 @@ def pair_of_continuous(seed: int) -> Pair:
         sheet.styles = styles
         return sheet, replace(kit, **own), factors
 
-    base, kit_of_base, _ = sheet_of([both])
-    new, kit_of_new, factors = sheet_of([both, *changes])
+    base, kit_of_base, _ = sheet_of({0: both})
+    new, kit_of_new, factors = sheet_of(dict(enumerate([both, *changes])))
     file, _ = continuous.believed(base, np.random.default_rng([seed, 22]), kit)
-    alone, kit_of_alone, _ = sheet_of(changes)
-    alone.styles = styles[:1]
-    found = bool(changes) and not new.edits and small(continuous.recorded(alone, kit_of_alone, file, seed + 1)[2])
+    hidden = []
+    for k, family in enumerate(changes, start=1):
+        alone, own_kit, own_factors = sheet_of({k: family})
+        alone.styles = styles[:1]
+        if not alone.edits and small(continuous.recorded(alone, own_kit, file, seed + 1)[2]):
+            hidden += [*(e["id"] for e in alone.effects), *own_factors]
     return Pair(
         base=Recording(file, continuous.recorded(base, kit_of_base, file, seed)[0], form="parquet"),
         new=Recording(turned(file, new.edits), continuous.recorded(new, kit_of_new, file, seed + 1)[0], form="parquet"),
         truth=truth_of(
-            beyond(base.effects, new.effects), factors, new.fair, found, both=both, families=changes, grade=kit.name
+            beyond(base.effects, new.effects), factors, new.fair, hidden, both=both, families=changes, grade=kit.name
         ),
     )
 

@@ -118,7 +118,8 @@ class ChainTerms:
             )
             at += term.size
         named = (
-            replace(t, form=known[t.key][0], linear=known[t.key][1]) if t.key in known else t for t in evidence.terms
+            replace(t, form=known[t.key][0], linear=known[t.key][1], of_change=True) if t.key in known else t
+            for t in evidence.terms
         )
         offsets = {t.key for t in evidence.terms if t.key.startswith(OF_ROTORS)}
         return held(replace(evidence, terms=tuple(named)), offsets)
@@ -224,6 +225,8 @@ class Option:
 
 Products = Callable[[ChainTerms | None], tuple[Evidence, Evidence]]
 """Evidence of both sets with the second one's columns taken at a chain."""
+BaseAt = Callable[[ChainTerms], Evidence]
+"""Evidence of the first set with its columns taken at another chain than its own."""
 
 
 def option_of(
@@ -266,11 +269,14 @@ def decided_at(
     return Option(found, chain, log_posterior)
 
 
-def options_of(first: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior) -> list[Option]:
+def options_of(
+    first: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior, base_at: BaseAt | None = None
+) -> list[Option]:
     """The most probable changes, and those without each form of the chain that changed in them; the best first.
 
     `first` is None where the chain's columns are not among those compared. Each is sought from several chains: a delay
-    of some samples is not seen from where there is none, nor from where a lag in its place has led to.
+    of some samples is not seen from where there is none, nor from where a lag in its place has led to. Where another
+    chain is found the first set is looked at with it, too (`base_at`): what suits both sets better is no change.
     """
     if first is None:
         return [decided_at(None, products_at, spread, prior)]
@@ -289,6 +295,11 @@ def options_of(first: ChainTerms | None, products_at: Products, spread: np.ndarr
 
     plain = best()
     others = [best(frozenset({t.key})) for t in first.terms if t.key in plain.found.model]
+    if base_at is not None and not np.array_equal(plain.chain.values, first.values):
+        base, moved, new = remembered(first)[0], base_at(plain.chain), remembered(plain.chain)[1]
+        found, log_posterior = weighed_changes(moved, new, spread, prior)
+        gained = 0.5 * float(base.square.sum() - moved.square.sum())
+        others.append(Option(found, plain.chain, log_posterior + gained))
     return sorted([plain, *others], key=lambda o: -o.log_posterior)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from rotorid.mismatch.changes.chain import (
     speed_rows,
     squares_of_speeds,
 )
-from rotorid.mismatch.changes.joint import Joint, Reference, joined_at, joints_of, reference_of
+from rotorid.mismatch.changes.joint import Joint, Reference, evidence_at, joined_at, joints_of, reference_of
 from rotorid.mismatch.changes.notes import command_notes, notes_of
 from rotorid.mismatch.changes.of_instruments import (
     InstrumentReference,
@@ -156,14 +157,14 @@ def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Opt
         at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new)
         return at.base, at.new
 
-    spread = yardstick(joint, reference.runs, prior)
-    options = options_of(first, products_at, spread, prior)
+    spread, base_at = yardstick(joint, reference.runs, prior), partial(evidence_at, reference)
+    options = options_of(first, products_at, spread, prior, base_at)
     found = options[0].found
     if len(found.model) > 1:
         # What changed is known by its form, too, and what its form is wrong by is no second change.
         change = change_of(found) * found.problem.unit
         spread = np.hypot(spread, form_spread(joint.new, change, joint.form_sd))
-        options = options_of(first, products_at, spread, prior)
+        options = options_of(first, products_at, spread, prior, base_at)
     return options
 
 
@@ -196,7 +197,10 @@ def decided_of_speeds(
         def products_at(chain: ChainTerms, filters=filters, own=own) -> tuple[Evidence, Evidence]:
             return own, speed_evidence(speed_rows(both[1], found, chain, first), filters, chain, first)
 
-        options = options_of(first, products_at, first.spread, prior)
+        def base_at(chain: ChainTerms, filters=filters) -> Evidence:
+            return speed_evidence(speed_rows(both[0], found, chain, first), filters, chain, first)
+
+        options = options_of(first, products_at, first.spread, prior, base_at)
         now = options[0].chain
     return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
     ChainTerms,
@@ -29,16 +30,18 @@ from rotorid.mismatch.model.report_runs import as_flown, comparable
 from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, model_filters
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regime import regime_variables
-from rotorid.mismatch.plant.regression import Regression, build
+from rotorid.mismatch.plant.regression import NEVER_EXCITED, Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.posterior.chosen import FORM_SD
-from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
+from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, evidence_from
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings import RecordingSet, Vehicle
 
-FORCES = (0, 1, 2)
-"""Channels of the forces."""
+FORCES, MOMENTS = (0, 1, 2), (3, 4, 5)
+"""Channels of the forces and of the moments."""
+REACH_OF_KNOWN = 3.0
+"""Standard errors by which a coefficient of the first set may be other than its model has it."""
 REGIMES = ("airspeed_m_s", "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
 """Regime variables by which two sets are compared."""
 INERTIA_OF = {3: "inertia_xx", 4: "inertia_yy", 5: "inertia_zz"}
@@ -114,7 +117,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     chain = chain_terms(found, recorded)
     segments, rows = rows_of(found, terms, chain, recorded)
     of_chain = chain.terms if found.commanded else []
-    known = np.append(known_effects(model, [t.key for t in terms]), np.zeros(sum(t.size for t in of_chain)))
+    known = np.append(known_effects(model, terms), np.zeros(sum(t.size for t in of_chain)))
     block_s = block_seconds(rows, model.prepared.thinner.rate_hz)
     regression = regression_of(rows, [*terms, *of_chain], model, block_s)
     evidence = with_known_effects(evidence_from(regression), known)
@@ -137,6 +140,14 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
         recorded=tuple(recorded),
         mistakes=mistakes,
     )
+
+
+def evidence_at(reference: Reference, chain: ChainTerms) -> Evidence:
+    """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
+    found, terms = reference.found, [*reference.terms, *chain.terms]
+    _, rows = rows_of(found, reference.terms, chain, reference.recorded, reference.chain)
+    regression = regression_of(rows, terms, found.model, reference.block_s)
+    return chain.named(with_known_effects(evidence_from(regression), reference.known), reference.chain)
 
 
 def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
@@ -180,7 +191,7 @@ def joined_at(
     segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     of_new = regression_of(rows, terms, model, reference.block_s)
-    evidence = with_known_effects(evidence_from(of_new), reference.known)
+    evidence = within_bounds(with_known_effects(evidence_from(of_new), reference.known), reference)
     inertia, inertia_of_base = (
         inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
     )
@@ -232,6 +243,7 @@ def rows_of(
     rows = assemble_rows(model.prepared, list(terms), segments, model.effects)
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
     rows = as_seen(against_own(rows, model, segments, vehicle), model, [t.key for t in terms])
+    rows = with_other_arms(rows, terms, known_effects(model, terms))
     if columns is not None:
         away = chain.values - (first or chain).values
         rows = [
@@ -263,12 +275,33 @@ def by_run(evidence: Evidence, regression: Regression) -> tuple[Evidence, ...]:
     return tuple(of_environments(evidence, runs == r) for r in dict.fromkeys(runs.tolist()))
 
 
-def known_effects(model: WrenchModel, keys: list[str]) -> np.ndarray:
-    """Coefficients (K,) of the effects that the first set's model holds, on the columns of `keys`."""
-    columns, fit = model.regression.columns(keys), model.selection.fit
+def known_effects(model: WrenchModel, terms: Sequence[Term]) -> np.ndarray:
+    """Coefficients (K,) of the effects that the first set's model holds, on the columns of `terms`."""
+    columns, fit = model.regression.columns([t.key for t in terms]), model.selection.fit
     active = set(model.regression.columns(model.selection.active))
     found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True) if c in active}
     return np.array([found.get(c, 0.0) for c in columns])
+
+
+def with_other_arms(rows: list[Rows], terms: Sequence[Term], known: np.ndarray) -> list[Rows]:
+    """Rows in which another centre of mass gives all known forces another arm, M = −r × F, and not the thrust alone.
+
+    `known` (K,) are the coefficients of the first set's effects.
+    """
+    starts = np.cumsum([0, *(t.size for t in terms)])
+    moved = [
+        (start + axis, axis)
+        for start, term in zip(starts, terms, strict=False)
+        if term.effect in catalogue() and catalogue()[term.effect].moves_centre
+        for axis in range(term.size)
+    ]
+    out = []
+    for own in rows:
+        force, x = own.x[:, FORCES] @ known, own.x.copy()
+        for column, axis in moved:
+            x[:, MOMENTS, column] -= np.nan_to_num(np.cross(np.eye(3)[axis], force))
+        out.append(replace(own, x=x))
+    return out
 
 
 def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
@@ -286,6 +319,27 @@ def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
         gram[place] = np.einsum("ki,ekl,lj->eij", turn, gram[place], turn, optimize=True)
         cross[place] = cross[place] @ turn
     return replace(evidence, gram=gram, cross=cross)
+
+
+def within_bounds(evidence: Evidence, reference: Reference) -> Evidence:
+    """Evidence of the second set whose effects stay physical: no drag may be lost that the first set has not.
+
+    What the first set has is known to a few standard errors of its column; where it never excites one, not at all.
+    """
+    energy = np.einsum("cekk->k", reference.evidence.gram)
+    reach = np.where(energy > NEVER_EXCITED, REACH_OF_KNOWN / np.sqrt(np.maximum(energy, NEVER_EXCITED)), np.inf)
+
+    def bounded(term: EvidenceTerm) -> EvidenceTerm:
+        if term.kind != "effect" or term.of_change:
+            return term
+        at = evidence.start[term.key] + np.arange(len(term.linear))
+        linear = (
+            replace(p, low=p.low - has - far, high=p.high - has + far)
+            for p, has, far in zip(term.linear, reference.known[at], reach[at], strict=True)
+        )
+        return replace(term, linear=tuple(linear), of_change=True)
+
+    return replace(evidence, terms=tuple(bounded(t) for t in evidence.terms))
 
 
 def against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], vehicle: Vehicle | None) -> list[Rows]:

@@ -28,6 +28,8 @@ SAME_SD, SAME_BODY_SD = 0.01, 0.003
 its density by a hundredth), and of mass, inertia and arm."""
 OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
+DERIVED = "rotor_acceleration"
+"""What is a derivative of recorded speeds: how much of it is noise depends on the flight, and is not known."""
 FEWEST_FLIGHTS = 3
 """Two good flights give one difference alone, of which no variance is known."""
 
@@ -48,9 +50,23 @@ def usual_spread(
         if term.kind == "value":
             out[at] = np.hypot(SAME_SD if term.key in OF_THE_AIR else SAME_BODY_SD, hidden[at])
         elif term.effect in catalogue() and term.linear:
-            usual = catalogue()[term.effect].between_flights
-            out[at] = np.hypot(out[at], [usual.get(p.unit, 0.0) for p in term.linear])
+            effect = catalogue()[term.effect]
+            out[at] = np.hypot(out[at], [effect.between_flights.get(p.unit, 0.0) for p in term.linear])
+            if DERIVED in effect.excited_by:
+                out[at] = np.hypot(out[at], hidden_in(base, known)[at])
     return out
+
+
+def hidden_in(evidence: Evidence, known: np.ndarray) -> np.ndarray:
+    """What noise of its own column may hide of each effect's coefficient (K,) at most, in its unit.
+
+    The coefficient is that of the column by itself, given the effects `known` (K,).
+    """
+    own = np.maximum(np.einsum("cekk->k", evidence.gram), NEVER_EXCITED)
+    left = evidence.cross.sum(axis=(0, 1)) - evidence.gram.sum(axis=(0, 1)) @ known
+    size = np.abs(known + left / own)
+    noise = left_by_all(evidence)[np.argmax(np.einsum("cekk->ck", evidence.gram), axis=0)]
+    return np.minimum(size, noise / np.maximum(own * size, TINY))
 
 
 def form_spread(evidence: Evidence, known: np.ndarray, form_sd: float) -> np.ndarray:

@@ -57,6 +57,8 @@ class EvidenceTerm:
     """Whether the form could be two effects."""
     resolution: float = 1.0
     """How many times the size that matters elsewhere its contribution must have."""
+    of_change: bool = False
+    """Whether the bounds in `linear` are those of a change between two sets, and not of the parameters themselves."""
     of_reading: tuple[tuple[int, int], ...] = ()
     """Places in `linear` of parameters stated as p/(1 − s), each with the place of its s (`Form.stated`)."""
 

@@ -91,8 +91,12 @@ def statement(
 
 
 def smallest_class(found: Found, weights: Mapping[Model, float], effect: str, others: Sequence[str]) -> set[str]:
-    """The fewest ids, an effect and some of `others`, of which one is surely at work; as sure as it gets."""
-    members, left = {effect}, set(others) - {effect}
+    """The fewest ids, an effect and some of `others` or of another visited model, of which one is surely at work.
+
+    Two effects may be one of another kind: an offset of the centre of mass and a weaker thrust are a payload.
+    """
+    seen = {found.problem.terms[key].effect for model in weights for key in model if key in found.problem.effects}
+    members, left = {effect}, (set(others) | seen) - {effect, "", *UNKNOWNS}
     while left and share_of(found, weights, members) < SURE and len(members) < MOST_MEMBERS:
         best = max(sorted(left), key=lambda other: share_of(found, weights, {*members, other}))
         members.add(best)
