@@ -22,6 +22,9 @@ from rotorid_proof.intervals import wilson
 WITHIN = 1.5
 """Factor within which a predicted separation counts as right."""
 
+NOTHING = "nothing"
+"""Stands in a question for the model without a suggested effect."""
+
 
 @dataclass(frozen=True)
 class Row:

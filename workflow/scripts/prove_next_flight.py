@@ -16,14 +16,14 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.mismatch.analyse import analyse
 from rotorid.plan.limits import Limits, read_limits
 from rotorid.plan.plan import plan
-from rotorid.plan.questions import Known, known
+from rotorid.plan.questions import Known, known, known_from
 from rotorid.plan.together import joined_sets
 from rotorid.plan.write import sampled
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.report import log
+from rotorid.report.deliver import analysis_of, judge
 from rotorid_proof import next_flight as proof
 
 
@@ -37,15 +37,18 @@ def as_read(recording, write_set, name: str) -> RecordingSet:
 def judged(first: RecordingSet, second: RecordingSet, ids, truth):
     """Outcome, sentence, and both sets as one."""
     whole, _ = joined_sets(first, second)
-    return (*proof.outcome_of(ids, analyse(whole).findings, truth), whole)
+    return (*proof.outcome_of(ids, analysis_of(whole).findings, truth), whole)
 
 
 def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -> proof.Row:
     """What becomes of one set."""
     truth = {answer["effects"][0]["id"]}
     named = next(iter(truth))
-    found: Known = known(first)
+    # As the command does: the plan asks what the verdict leaves open, and nothing that it does not claim.
+    found: Known = known_from(first, judge(first).model_dump(mode="json"))
     classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
+    # What is only suggested is compared with nothing: no class, though the plan asks it too.
+    classes = [ids for ids in classes if len(ids) > 1 and proof.NOTHING not in ids]
     if not classes:
         return proof.Row(case=case.name, truth=named, open="", said="nothing was left open")
     ids = classes[0]
