@@ -5,6 +5,7 @@ OPEN = (
     "campaign",
     "concealed.build",
     "concealed.cases",
+    "concealed.elsewhere",
     "concealed.loaded",
     "concealed.planned",
     "concealed.richsim.scene",

@@ -19,9 +19,10 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.findings import Finding
+from rotorid.plan.changed import Change
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import Known, Question, best_of
-from rotorid.plan.separation import Separation
+from rotorid.plan.separation import Separation, recorded_after
 from rotorid.plan.session import KnownInstrument, SessionPlan
 from rotorid.plan.together import answers, joined_sets
 from rotorid.recordings import RecordingSet, read_set
@@ -64,6 +65,12 @@ class Row:
     """Hash of the code that planned and judged it."""
     kind: str = "flight"
     """Of the set: `flight`, `stand` or `bench`; of the latter two a session is planned in a flight's place."""
+    by_hand: str = ""
+    """The step by hand that is predicted to separate the class furthest, where one is."""
+    by_hand_sigma: float = float("nan")
+    """Separation of the true model from its nearest rival that is predicted for the hover after it."""
+    by_hand_measured: float = float("nan")
+    """The same as recorded."""
 
 
 def as_read(recording, write_set: Callable, name: str) -> RecordingSet:
@@ -149,6 +156,21 @@ def measured(joint: Known | KnownInstrument, question: Question | None, true: st
             beside = [*shared, *keys]
             gain = joint.regression.explained([*beside, *more]) - joint.regression.explained(beside)
             left.append(gain - sum(search.terms[k].size for k in more))
+    return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
+
+
+def measured_after(found: Known, question: Question, change: Change, recorded: RecordingSet, true: str) -> float:
+    """√ of the whitened squares that the true model explains given its nearest rival, in a set and a flight after a
+    step by hand; `recorded` is that flight. As `measured`, by the linear terms that the class needs alone."""
+    joint = recorded_after(found, change, recorded)
+    shared = [*(t.key for t in change.nuisances), *question.shared]
+    own = next(h.keys for h in question.hypotheses if h.id == true)
+    sizes, left = {t.key: t.size for t in joint.terms}, []
+    for name, choices in question.rivals.items():
+        for keys in choices if name != true else ():
+            if more := [k for k in own if k not in keys]:
+                gain = joint.explained([*shared, *keys, *more]) - joint.explained([*shared, *keys])
+                left.append(gain - sum(sizes[k] for k in more))
     return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
 
 

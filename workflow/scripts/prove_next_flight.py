@@ -21,6 +21,23 @@ from rotorid.report.deliver import judge
 from rotorid_proof import next_flight as proof
 
 
+def by_hand(case, answer: dict, found: Known, made, question, true: str, simulator) -> dict:
+    """What the best step by hand is predicted to separate, and does as recorded; empty where none is predicted."""
+    ids = None if question is None else question.ids
+    separated = [
+        (h, s) for h in made.by_hand for own, every in h.questions if own == ids for s in every if s.true == true
+    ]
+    if not separated:
+        return {}
+    hand, expected = max(separated, key=lambda pair: pair[1].sigma)
+    change = hand.change
+    step = {"swapped": change.pairs, "mass_kg": change.mass_kg, "place_m": change.place_m}
+    flown = simulator.record_by_hand(case, answer, hand.hover_s, **step)
+    recorded = proof.as_read(flown, simulator.write_set, "by hand")
+    measured = proof.measured_after(found, question, change, recorded, true)
+    return {"by_hand": change.words, "by_hand_sigma": expected.sigma, "by_hand_measured": measured}
+
+
 def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -> proof.Row:
     """What becomes of one set."""
     truth = {answer["effects"][0]["id"]}
@@ -59,6 +76,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
         standard_outcome=outcome["standard"],
         said=said["planned"],
     )
+    row = replace(row, **by_hand(case, answer, found, made, question, named, simulator))
     if expected is None:
         return row
     low, high = expected.interval_95
