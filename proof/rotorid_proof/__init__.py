@@ -7,6 +7,8 @@ OPEN = (
     "changes.score",
     "concealed.build",
     "concealed.cases",
+    "concealed.elsewhere",
+    "concealed.loaded",
     "concealed.planned",
     "concealed.richsim.scene",
     "decisions.bench",

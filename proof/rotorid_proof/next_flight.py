@@ -2,25 +2,38 @@
 
 A row is one concealed set that the engine left open, or that holds a pair of confusers flown so that little
 distinguishes them. The plan knows the set alone; the simulator that made it records the planned flight, and as a
-yardstick a standard flight of the same length; both sets are judged together by the engine.
+yardstick a standard flight of the same length; both sets are judged together by the engine. Of stands and benches the
+same with sessions in place of flights.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Finding
+from rotorid.plan.changed import Change
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import Known, Question, best_of
-from rotorid.plan.separation import Separation
-from rotorid.plan.together import answers
+from rotorid.plan.separation import Separation, recorded_after
+from rotorid.plan.session import KnownInstrument, SessionPlan
+from rotorid.plan.together import answers, joined_sets
+from rotorid.recordings import RecordingSet, read_set
+from rotorid.report.deliver import analysis_of
 from rotorid_proof.intervals import wilson
 
 WITHIN = 1.5
 """Factor within which a predicted separation counts as right."""
+
+NOTHING = "nothing"
+"""Stands in a question for the model without a suggested effect."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,56 @@ class Row:
     said: str = ""
     judged_by: str = ""
     """Hash of the code that planned and judged it."""
+    kind: str = "flight"
+    """Of the set: `flight`, `stand` or `bench`; of the latter two a session is planned in a flight's place."""
+    by_hand: str = ""
+    """The step by hand that is predicted to separate the class furthest, where one is."""
+    by_hand_sigma: float = float("nan")
+    """Separation of the true model from its nearest rival that is predicted for the hover after it."""
+    by_hand_measured: float = float("nan")
+    """The same as recorded."""
+
+
+def as_read(recording, write_set: Callable, name: str) -> RecordingSet:
+    """A simulator's recording as a user's files would hand it over."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_set(recording, Path(folder) / name)
+        return read_set(Path(folder) / name)
+
+
+def judged(first: RecordingSet, second: RecordingSet, ids: tuple[str, ...], truth: set[str]):
+    """Outcome, sentence, and both sets as one, as `rotorid together` judges them."""
+    whole, _ = joined_sets(first, second)
+    return (*outcome_of(ids, analysis_of(whole).findings, truth), whole)
+
+
+def classes_in(found: Known | KnownInstrument) -> list[tuple[str, ...]]:
+    """Ids of every class that is open; what is only suggested is compared with nothing and is no class."""
+    classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
+    return [ids for ids in classes if len(ids) > 1 and NOTHING not in ids]
+
+
+def rows_of(cases: Sequence, row_of: Callable, kept: Path, code: str) -> pd.DataFrame:
+    """A row of every case, by `row_of(case)`, each written to `kept` as it comes.
+
+    A row of another `code` stays in `kept` until its case is judged anew; a case that cannot be judged is named on the
+    standard error stream and has none.
+    """
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
+    done = {r["case"] for r in rows if str(r["judged_by"]) == code}
+    for case in cases:
+        if case.name in done:
+            continue
+        try:
+            row = replace(row_of(case), judged_by=code)
+        except InputError as error:
+            print(f"{case.name}: {error}", file=sys.stderr)
+            continue
+        rows = [r for r in rows if r["case"] != case.name] + table([row]).to_dict("records")
+        pd.DataFrame(rows).to_csv(kept, index=False)
+        print(rows[-1], file=sys.stderr, flush=True)
+    return pd.DataFrame(rows)
 
 
 def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:
@@ -61,13 +124,13 @@ def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[s
     return ("right" if named <= truth else "wrong"), answer.sentence
 
 
-def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
+def predicted(plan: Plan | SessionPlan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
     """Separation of the true model from its nearest rival; None where the truth is none of the class."""
     found = [s for own, separations in plan.questions if set(own) == set(ids) for s in separations]
     return next((s for s in found if s.true in truth), None)
 
 
-def measured(joint: Known, question: Question | None, true: str) -> float:
+def measured(joint: Known | KnownInstrument, question: Question | None, true: str) -> float:
     """√ of the whitened squares that the true model still explains given its nearest rival, in both sets together.
 
     This is what the engine asks before it names a class: is the term still needed with the other in its place? Of each
@@ -96,13 +159,31 @@ def measured(joint: Known, question: Question | None, true: str) -> float:
     return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
 
 
+def measured_after(found: Known, question: Question, change: Change, recorded: RecordingSet, true: str) -> float:
+    """√ of the whitened squares that the true model explains given its nearest rival, in a set and a flight after a
+    step by hand; `recorded` is that flight. As `measured`, by the linear terms that the class needs alone."""
+    joint = recorded_after(found, change, recorded)
+    shared = [*(t.key for t in change.nuisances), *question.shared]
+    own = next(h.keys for h in question.hypotheses if h.id == true)
+    sizes, left = {t.key: t.size for t in joint.terms}, []
+    for name, choices in question.rivals.items():
+        for keys in choices if name != true else ():
+            if more := [k for k in own if k not in keys]:
+                gain = joint.explained([*shared, *keys, *more]) - joint.explained([*shared, *keys])
+                left.append(gain - sum(sizes[k] for k in more))
+    return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
+
+
 def table(rows: list[Row]) -> pd.DataFrame:
     """The rows as a table."""
     return pd.DataFrame([asdict(r) for r in rows], columns=[f.name for f in fields(Row)])
 
 
-def summary(rows: pd.DataFrame) -> pd.DataFrame:
-    """Shares over the sets that were open, with 95 % intervals (Wilson), and how many they are of."""
+def summary(rows: pd.DataFrame, what: str = "flight") -> pd.DataFrame:
+    """Shares over the sets that were open, with 95 % intervals (Wilson), and how many they are of.
+
+    `what` was planned: a `flight` or a `session`.
+    """
     sigmas = ["predicted_sigma", "predicted_low", "predicted_high", "measured_sigma", "standard_sigma"]
     rows = rows.assign(**{name: rows[name].replace("", np.nan).astype(float) for name in sigmas})
     asked = rows[rows["open"].fillna("") != ""]
@@ -117,14 +198,14 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     counted = (
         ("settled rightly, of all open", asked["outcome"] == "right"),
         ("settled wrongly, of all open", asked["outcome"] == "wrong"),
-        ("settled rightly, where a flight was planned", planned["outcome"] == "right"),
-        ("settled rightly by a standard flight as long", planned["standard_outcome"] == "right"),
-        ("settled wrongly by a standard flight as long", planned["standard_outcome"] == "wrong"),
+        (f"settled rightly, where a {what} was planned", planned["outcome"] == "right"),
+        (f"settled rightly by a standard {what} as long", planned["standard_outcome"] == "right"),
+        (f"settled wrongly by a standard {what} as long", planned["standard_outcome"] == "wrong"),
         (f"prediction within a factor of {WITHIN:g}", (ratio < WITHIN) & (ratio > 1 / WITHIN)),
         ("measured within the interval stated", inside),
         ("planned at least twice as fast (squares a second)", fast),
-        ("separated further than by a standard flight as long", faster["measured_sigma"] > faster["standard_sigma"]),
-        ("outcome no worse than of a standard flight as long", ~worse),
+        (f"separated further than by a standard {what} as long", faster["measured_sigma"] > faster["standard_sigma"]),
+        (f"outcome no worse than of a standard {what} as long", ~worse),
     )
     out = []
     for name, hits in counted:

@@ -211,6 +211,24 @@ rule prove_changes:
         "../scripts/prove_changes.py"
 
 
+rule prove_next_session:
+    """The same of stands and benches, drawn for the release: on request."""
+    message:
+        "Proof: the next session of stands and benches"
+    output:
+        table="results/proof/next_flight_stands.csv",
+        summary="results/proof/next_flight_stands_summary.csv",
+    params:
+        so_far="results/next_flight/rows_stands.csv",
+        release=CONFIG.proof.release or "development",
+        concealing=[CODE.of(path) for path in CONCEALING],
+        code=code_of("prove_next_session"),
+    log:
+        "results/logs/prove_next_session.log",
+    script:
+        "../scripts/prove_next_session.py"
+
+
 rule draw_proof:
     """Figures of the proof next to its tables."""
     message:

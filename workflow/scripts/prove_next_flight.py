@@ -7,45 +7,44 @@
 - Writes the row of every set as it comes, so that an interrupted proof goes on where it stopped.
 """
 
-import sys
-import tempfile
 import warnings
 from dataclasses import replace
 from pathlib import Path
 
-import pandas as pd
-
-from rotorid.errors import InputError
-from rotorid.mismatch.analyse import analyse
 from rotorid.plan.limits import Limits, read_limits
 from rotorid.plan.plan import plan
-from rotorid.plan.questions import Known, known
-from rotorid.plan.together import joined_sets
+from rotorid.plan.questions import Known, known, known_from
 from rotorid.plan.write import sampled
-from rotorid.recordings import RecordingSet, read_set
+from rotorid.recordings import RecordingSet
 from rotorid.report import log
+from rotorid.report.deliver import judge
 from rotorid_proof import next_flight as proof
 
 
-def as_read(recording, write_set, name: str) -> RecordingSet:
-    """A recording as a user's files would hand it over."""
-    with tempfile.TemporaryDirectory() as folder:
-        write_set(recording, Path(folder) / name)
-        return read_set(Path(folder) / name)
-
-
-def judged(first: RecordingSet, second: RecordingSet, ids, truth):
-    """Outcome, sentence, and both sets as one."""
-    whole, _ = joined_sets(first, second)
-    return (*proof.outcome_of(ids, analyse(whole).findings, truth), whole)
+def by_hand(case, answer: dict, found: Known, made, question, true: str, simulator) -> dict:
+    """What the best step by hand is predicted to separate, and does as recorded; empty where none is predicted."""
+    ids = None if question is None else question.ids
+    separated = [
+        (h, s) for h in made.by_hand for own, every in h.questions if own == ids for s in every if s.true == true
+    ]
+    if not separated:
+        return {}
+    hand, expected = max(separated, key=lambda pair: pair[1].sigma)
+    change = hand.change
+    step = {"swapped": change.pairs, "mass_kg": change.mass_kg, "place_m": change.place_m}
+    flown = simulator.record_by_hand(case, answer, hand.hover_s, **step)
+    recorded = proof.as_read(flown, simulator.write_set, "by hand")
+    measured = proof.measured_after(found, question, change, recorded, true)
+    return {"by_hand": change.words, "by_hand_sigma": expected.sigma, "by_hand_measured": measured}
 
 
 def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -> proof.Row:
     """What becomes of one set."""
     truth = {answer["effects"][0]["id"]}
     named = next(iter(truth))
-    found: Known = known(first)
-    classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
+    # As the command does: the plan asks what the verdict leaves open, and nothing that it does not claim.
+    found: Known = known_from(first, judge(first).model_dump(mode="json"))
+    classes = proof.classes_in(found)
     if not classes:
         return proof.Row(case=case.name, truth=named, open="", said="nothing was left open")
     ids = classes[0]
@@ -61,8 +60,8 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     }
     outcome, measured, said = {}, {}, {}
     for name, reference in references.items():
-        second = as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
-        outcome[name], said[name], whole = judged(first, second, ids, truth)
+        second = proof.as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
+        outcome[name], said[name], whole = proof.judged(first, second, ids, truth)
         if question is not None:
             measured[name] = proof.measured(known(whole), question, named)
     row = proof.Row(
@@ -77,6 +76,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
         standard_outcome=outcome["standard"],
         said=said["planned"],
     )
+    row = replace(row, **by_hand(case, answer, found, made, question, named, simulator))
     if expected is None:
         return row
     low, high = expected.interval_95
@@ -102,28 +102,16 @@ def main(
     from rotorid_proof.concealed.richsim import scene
 
     allowed = read_limits(Path(limits))
-    kept = Path(so_far)
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
     # Where speeds are commands alone a set takes minutes: those come last of a draw.
     listed = [*simulator.look_alikes(), *simulator.ambiguous()]
     listed = sorted(listed, key=lambda case: "speed" not in case.settings.groups)
     cases = [simulator.drawn_anew(case, number) for number in draws for case in listed][:most]
-    done = {r["case"] for r in rows if str(r["judged_by"]) == code}
-    for case in cases:
-        if case.name in done:
-            continue
+
+    def row(case) -> proof.Row:
         recording, answer, _ = scene.make(case.settings, case.seed)
-        first = as_read(recording, simulator.write_set, "first")
-        try:
-            row = replace(row_of(case, answer, first, simulator, allowed), judged_by=code)
-            rows = [r for r in rows if r["case"] != case.name] + proof.table([row]).to_dict("records")
-        except InputError as error:
-            print(f"{case.name}: {error}", file=sys.stderr)
-            continue
-        pd.DataFrame(rows).to_csv(kept, index=False)
-        print(rows[-1], file=sys.stderr, flush=True)
-    found = pd.DataFrame(rows)
+        return row_of(case, answer, proof.as_read(recording, simulator.write_set, "first"), simulator, allowed)
+
+    found = proof.rows_of(cases, row, Path(so_far), code)
     found.to_csv(table, index=False)
     proof.summary(found).to_csv(summary, index=False)
 

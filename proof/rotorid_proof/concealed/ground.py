@@ -196,9 +196,12 @@ def prandtl_ishlinskii(x, amount, full):
 
 
 def bench_run(plan, purpose, axis, amounts, rng):
-    """Reference, true reading before noise, and time on the fine clock."""
+    """Reference, true reading before noise, and time on the fine clock; `purpose` is a name, or loads (n, 3) of t."""
     dt = 1 / plan.rate_hz / FINE
     t = np.arange(int(plan.seconds / dt)) * dt
+    if callable(purpose):
+        load = purpose(t)
+        return t, load, sense(plan, np.concatenate([load, np.zeros((len(t), 3))], axis=1), t, amounts)
     course = bench_load(purpose, t, rng)
     load = np.zeros((len(t), 3))
     sign = {"x": 1.0, "y": 1.0, "z": -1.0}
@@ -301,13 +304,16 @@ SPINS = np.array([1.0, -1.0, 1.0, -1.0])
 
 
 def stand_run(plan, purpose, tilt, amounts, rng):
-    """Time, command, speed, voltage, height, roll, pitch and the true reading, on the fine clock."""
+    """Time, command, speed, voltage, height, roll, pitch and the true reading, on the fine clock.
+
+    `purpose` is a name, or throttles (n, k) as a function of the time.
+    """
     dt = 1 / plan.rate_hz / FINE
     t = np.arange(int(plan.seconds / dt)) * dt
     k = plan.rotors
     hubs = HUBS[:k] if k > 1 else np.zeros((1, 3))
     spins = SPINS[:k]
-    u = throttles(purpose, t, k, rng)
+    u = purpose(t) if callable(purpose) else throttles(purpose, t, k, rng)
     command = u * TOP
     voltage = 16.4 - 0.9 * np.cumsum(u.mean(axis=1)) * dt / plan.seconds - 0.5 * u.mean(axis=1)
     speed = command.copy()
@@ -468,24 +474,48 @@ def simulate(plan, factors, seed):
                     table[name] = load[:, k]
         else:
             tilt = TILTS[number % len(TILTS)] if plan.rotors > 1 else (0.0, 0.0)
-            t, u, command, speed, voltage, height, reading = stand_run(plan, purpose, tilt, amounts, rng)
-            table = {"time_s": t}
-            for i in range(plan.rotors):
-                if "speed" in plan.columns:
-                    table[f"rotor_speed_{i + 1}_rad_s"] = speed[:, i]
-                if "command" in plan.columns:
-                    table[f"rotor_command_{i + 1}_rad_s"] = command[:, i]
-                if "throttle" in plan.columns:
-                    table[f"throttle_{i + 1}"] = u[:, i]
-            if "battery" in plan.columns:
-                table["battery_voltage_v"] = voltage
-            if "height" in plan.columns:
-                table["height_m"] = height
-            if plan.rotors > 1:
-                table["roll_rad"], table["pitch_rad"] = np.full(len(t), tilt[0]), np.full(len(t), tilt[1])
+            t, *made, reading = stand_run(plan, purpose, tilt, amounts, rng)
+            table = {"time_s": t} | stand_columns(plan, tilt, *made)
         pick = slice(0, len(t), FINE)
         out[f"run{number + 1:02d}"] = ({k: v[pick] for k, v in table.items()}, reading[pick])
     return out
+
+
+def stand_columns(plan, tilt, u, command, speed, voltage, height):
+    """What a stand records next to the reading."""
+    table = {}
+    for i in range(plan.rotors):
+        if "speed" in plan.columns:
+            table[f"rotor_speed_{i + 1}_rad_s"] = speed[:, i]
+        if "command" in plan.columns:
+            table[f"rotor_command_{i + 1}_rad_s"] = command[:, i]
+        if "throttle" in plan.columns:
+            table[f"throttle_{i + 1}"] = u[:, i]
+    if "battery" in plan.columns:
+        table["battery_voltage_v"] = voltage
+    if "height" in plan.columns:
+        table["height_m"] = height
+    if plan.rotors > 1:
+        table["roll_rad"], table["pitch_rad"] = np.full(len(speed), tilt[0]), np.full(len(speed), tilt[1])
+    return table
+
+
+def resolution(plan, factors):
+    """Steps (6,) of the reading."""
+    sigma = np.array([plan.force_noise_n] * 3 + [plan.moment_noise_n_m] * 3)
+    coarse = next((f for c, f in zip(plan.hidden, factors, strict=True) if c.id == "quantisation"), None)
+    return sigma * plan.step_share if coarse is None else sigma * UNITS["quantisation"][0]["q"] * coarse
+
+
+def written(plan, known, noisy, rng):
+    """The table of a run: what is known, speeds with a tachometer's noise, and readings (n, 6)."""
+    columns = {k: np.array(v) for k, v in known.items()}
+    for key in list(columns):
+        if key.startswith("rotor_speed"):
+            columns[key] = columns[key] * (1 + 0.0005 * rng.standard_normal(len(noisy)))
+    for c in channels_of(plan):
+        columns[AXES[c]] = noisy[:, c]
+    return pd.DataFrame(columns)
 
 
 def noise_of(plan, n, rng):
@@ -562,23 +592,13 @@ def make(plan, seed):
         )
     shown = simulate(plan, tuple(factors), seed)
     tables, oracle, ideals = {}, {}, {}
-    step = np.array([plan.force_noise_n] * 3 + [plan.moment_noise_n_m] * 3) * plan.step_share
-    coarse = next((f for c, f in zip(plan.hidden, factors, strict=True) if c.id == "quantisation"), None)
-    if coarse is not None:
-        step = np.array([plan.force_noise_n] * 3 + [plan.moment_noise_n_m] * 3) * UNITS["quantisation"][0]["q"] * coarse
+    step = resolution(plan, factors)
     gain = dict(plan.wrong).get("reading_gain", 1.0)
     for name, (known, reading) in shown.items():
         reading = reading.copy()
         reading[:, :3] *= gain
         noisy = np.round((reading + noises[name]) / step) * step
-        columns = {k: np.array(v) for k, v in known.items()}
-        run_rng = np.random.default_rng([seed, 5, len(tables)])
-        for key in list(columns):
-            if key.startswith("rotor_speed"):
-                columns[key] = columns[key] * (1 + 0.0005 * run_rng.standard_normal(len(noisy)))
-        for c in channels:
-            columns[AXES[c]] = noisy[:, c]
-        tables[name] = pd.DataFrame(columns)
+        tables[name] = written(plan, known, noisy, np.random.default_rng([seed, 5, len(tables)]))
         ideals[name] = pd.DataFrame({"time_s": known["time_s"], **{AXES[c]: reading[:, c] for c in channels}})
         off = reading - response(plan, still, shown, name)
         remainder = noisy - reading

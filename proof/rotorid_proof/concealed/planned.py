@@ -126,4 +126,48 @@ def record(case: Case, answer: dict, references: dict[str, manoeuvres.Reference]
     return Recording(vehicle, runs, (), plan.form)
 
 
-__all__ = ["ambiguous", "drawn_anew", "grid", "look_alikes", "record", "reference_of", "standard", "write_set"]
+def record_by_hand(case: Case, answer: dict, duration_s: float, swapped=(), mass_kg=0.0, place_m=(0.0, 0.0, 0.0)):
+    """A hover of the case's vehicle after a step by hand, as it would have been recorded.
+
+    Propellers of the places `swapped` (pairs, from 0) changed places, or a mass was attached at `place_m` (body axes
+    from the believed centre of mass, m).
+    """
+    plan = replace(case.settings, runs=(), trim_s=0.0)
+    airframe = AIRFRAMES[plan.vehicle]
+    hidden = (*plan.hidden, *scene._needs(plan.hidden))
+    sizes = {e["id"]: e["amount"] for e in answer["effects"]}
+    world, _ = scene._world(airframe, hidden, [sizes[h.id] for h in hidden], case.seed)
+    values = world.values
+    for i, j in swapped:
+        for name in ("cf", "cq"):
+            values[name] = np.array(values[name])
+            values[name][[i, j]] = values[name][[j, i]]
+    if mass_kg:
+        mass, place, centre = values["mass"], np.array(place_m), values["centre_m"]
+        after = (mass * centre + mass_kg * place) / (mass + mass_kg)
+        inertia = np.array(values["inertia"], float)
+        for m, at in ((mass, centre - after), (mass_kg, place - after)):
+            inertia = inertia + m * (at @ at * np.eye(3) - np.outer(at, at))
+        values |= {"mass": mass + mass_kg, "centre_m": after, "inertia": inertia}
+    t = np.arange(-WARM_UP_S, duration_s, airframe.step_s)
+    still = np.zeros((len(t), 3))
+    at = still - np.array([0.0, 0.0, 5.0])
+    flat = np.zeros((len(t), airframe.n))
+    reference = manoeuvres.Reference(t, at, still, still, np.zeros(len(t)), still, flat)
+    flight = scene._fly(plan, airframe, world, reference, 0, case.seed)
+    _, table = scene._record(plan, airframe, world, flight, 200, case.seed)
+    vehicle, _ = scene._believed(plan, airframe, world)
+    return Recording(vehicle, {"by hand": table}, (), plan.form)
+
+
+__all__ = [
+    "ambiguous",
+    "drawn_anew",
+    "grid",
+    "look_alikes",
+    "record",
+    "record_by_hand",
+    "reference_of",
+    "standard",
+    "write_set",
+]

@@ -66,29 +66,20 @@ def plan(
 def flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder: Path, step):
     """Plan a flight and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.plan import plan as make_plan
-    from rotorid.plan.questions import known
+    from rotorid.plan.questions import known_from
     from rotorid.plan.write import text, write
-    from rotorid.recordings.sufficient import sufficient
 
-    suggested = [e["id"] for e in content["effects"] if e["status"] == "suggested"]
-    made = make_plan(known(sufficient(source), suggested, claimed_in(content)), allowed, wishes, step)
+    made = make_plan(known_from(source, content), allowed, wishes, step)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.pieces else None
 
 
-def claimed_in(content: dict) -> set[str]:
-    """Ids that a verdict claims, and the members of its classes."""
-    claims = [e for e in content["effects"] if e["status"] in ("established", "ambiguous")]
-    return {i for e in claims for i in (e["id"], *e["alternatives"])}
-
-
 def session_plan(source, content: dict, allowed, folder: Path, step):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
-    from rotorid.plan.session import known_instrument, plan_session
+    from rotorid.plan.session import known_instrument_from, plan_session
     from rotorid.plan.write_session import text, write
-    from rotorid.recordings.sufficient import sufficient
 
-    made = plan_session(known_instrument(sufficient(source), claimed_in(content)), allowed, step)
+    made = plan_session(known_instrument_from(source, content), allowed, step)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.steps else None
 

@@ -2,6 +2,7 @@
 would."""
 
 OPEN = (
+    "changed",
     "limits",
     "page",
     "plan",

@@ -46,4 +46,9 @@ STEPS: dict[str, str] = {
 
 def by_hand(ids: Sequence[str]) -> tuple[str, ...]:
     """Manual steps that set one id of a class apart from the others, in the class's order, each once."""
-    return tuple(dict.fromkeys(STEPS[i] for i in ids if i in STEPS))
+    return tuple(steps_of(ids).values())
+
+
+def steps_of(ids: Sequence[str]) -> dict[str, str]:
+    """The same, to the id that each step is there for."""
+    return {i: STEPS[i] for i in dict.fromkeys(ids) if i in STEPS}

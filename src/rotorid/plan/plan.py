@@ -17,6 +17,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.mismatch.plant.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
 from rotorid.plan.candidates import STANDARD, Piece, Reference, candidates, joined, smaller, standard
+from rotorid.plan.handled import Handled, handled
 from rotorid.plan.intervals import Width, check_wishes, widths
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import Known
@@ -102,6 +103,8 @@ class Plan(Forecast):
     limits: Limits
     others: tuple[Forecast, ...] = ()
     """What else was considered as a whole, the better one first."""
+    by_hand: tuple[Handled, ...] = ()
+    """Steps by hand whose separation is predicted, the better one first."""
     tried: tuple[Tried, ...] = ()
     unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
     not_testable: tuple[tuple[str, str], ...] = ()
@@ -339,4 +342,7 @@ def plan(
     if (piece := standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
         found.append(forecast(known, limits, "standard", (piece,), wishes))
     found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
-    return Plan(**vars(found[0]), **about, others=tuple(found[1:]), tried=tuple(judged), not_testable=reasons)
+    hover = next((t.piece for t in options if t.piece.name == "hover" and t.information is not None), None)
+    hands = () if hover is None else handled(known, limits, hover, LEAST_S, BETWEEN_S, progress)
+    about |= {"others": tuple(found[1:]), "by_hand": hands, "tried": tuple(judged), "not_testable": reasons}
+    return Plan(**vars(found[0]), **about)

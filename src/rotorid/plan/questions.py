@@ -25,6 +25,7 @@ from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.plan.between import ChainQuestion, chain_question
 from rotorid.recordings import RecordingSet
+from rotorid.recordings.sufficient import sufficient
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,24 @@ def known(
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
     return Known(recordings, prepared, found, findings, tuple(questions), tuple(chains), tuple(unanswerable))
+
+
+def known_from(recordings: RecordingSet, verdict: dict) -> Known:
+    """A set fitted, with the questions that its verdict leaves open; `verdict` is the content of its verdict.json.
+
+    Raises
+    ------
+    InputError
+        The set is no flight, or does not suffice.
+    """
+    suggested = [e["id"] for e in verdict["effects"] if e["status"] == "suggested"]
+    return known(sufficient(recordings), suggested, claimed_in(verdict))
+
+
+def claimed_in(verdict: dict) -> set[str]:
+    """Ids that a verdict (the content of its verdict.json) claims, and the members of its classes."""
+    claims = [e for e in verdict["effects"] if e["status"] in ("established", "ambiguous")]
+    return {i for e in claims for i in (e["id"], *e["alternatives"])}
 
 
 def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Question | None:

@@ -31,6 +31,7 @@ from rotorid.mismatch.posterior.prior import Prior
 from rotorid.plan.between import interval as chain_interval
 from rotorid.plan.between import squares
 from rotorid.plan.candidates import Reference
+from rotorid.plan.changed import Change
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import Hypothesis, Known, Question
 from rotorid.plan.simulate import Flown, World, commands, fly, recorded
@@ -178,18 +179,30 @@ def flown(world: World, reference: Reference, limits: Limits) -> tuple[Flown, ..
     return tuple(fly(world, reference, s * fast, limits.middle_m, slow and s * slow) for s in SLOWER_LOOPS)
 
 
-def of_flights(known: Known, flights: Sequence[Flown], world: World, terms: Sequence[Term]) -> Information:
-    """What a reference would hold, flown with each of the loops."""
-    found = [of_flight(known, flight, world, terms) for flight in flights]
+def of_flights(
+    known: Known, flights: Sequence[Flown], world: World, terms: Sequence[Term], change: Change | None = None
+) -> Information:
+    """What a reference would hold, flown with each of the loops; after a `change` of the vehicle by hand, if any."""
+    found = [of_flight(known, flight, world, terms, change) for flight in flights]
     squares = [i.squares for i in found if i.squares is not None]
     grams = np.stack([i.gram for i in found])
     return Information(grams, np.stack(squares) if squares else None, found[0].seconds, found[0].shares)
 
 
-def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) -> Information:
-    """What a flight would hold, in the columns of the set's regression."""
+def of_flight(
+    known: Known, flight: Flown, world: World, terms: Sequence[Term], change: Change | None = None
+) -> Information:
+    """What a flight would hold, in the columns of the set's regression.
+
+    After a `change` by hand the columns are those of the changed vehicle in the parameters of the set, less what the
+    nuisances of the change take over.
+    """
     rate = own_rate_hz(known)
     model, prepared = known.fitted.model, known.prepared
+    acting, nuisances = list(terms), []
+    if change is not None:
+        prepared = replace(prepared, vehicle=change.vehicle)
+        acting, nuisances = [change.term(t) for t in terms], list(change.nuisances)
 
     def segments_of(flight: Flown) -> list[Segment]:
         run = recorded(flight, world, columns_of(known), rate, "planned")
@@ -208,15 +221,48 @@ def of_flight(known: Known, flight: Flown, world: World, terms: Sequence[Term]) 
     if known.fitted.commanded:
         segments = path_segments(segments, *known.fitted.chain, prepared.thinner.cutoff_hz)
     effects = model.effects if model.effects is not None else chosen(model)
-    rows = assemble_rows(prepared, list(terms), segments, effects)
+    acting = [*nuisances, *acting]
+    rows = assemble_rows(prepared, acting, segments, effects if change is None else list(world.effects))
     rate_hz = prepared.thinner.rate_hz
-    own = build(rows, list(terms), known.regression.filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
+    own = build(rows, acting, known.regression.filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
     every = known.regression.columns([t.key for t in terms])
     gram, shares = np.zeros_like(known.regression.gram[0]), np.zeros_like(known.regression.gram[0])
-    gram[np.ix_(every, every)] = own.gram.sum(axis=0)
+    gram[np.ix_(every, every)] = own.gram.sum(axis=0) if change is None else after_change(own, terms, change)
     seconds = float(flight.motion.time_s[-1] - flight.motion.time_s[0])
-    shares[np.ix_(every, every)] = seconds * shares_of(rows, prepared.vehicle)
+    if change is None:
+        shares[np.ix_(every, every)] = seconds * shares_of(rows, prepared.vehicle)
     return Information(gram, np.array(apart) if apart else None, seconds, shares)
+
+
+def after_change(own: Regression, terms: Sequence[Term], change: Change) -> np.ndarray:
+    """Normal equations (K, K) of terms in the parameters of before a change, its nuisances projected out."""
+    share = np.concatenate([np.full(t.size, change.shares.get(t.key, 1.0)) for t in terms])
+    kept, out = own.columns([t.key for t in terms]), own.columns([t.key for t in change.nuisances])
+    total = own.gram.sum(axis=0)
+    gram = total[np.ix_(kept, kept)]
+    if len(out):
+        precision = np.concatenate([1.0 / np.square(t.prior_sd) for t in change.nuisances])
+        pull = total[np.ix_(out, kept)]
+        gram = gram - pull.T @ np.linalg.solve(total[np.ix_(out, out)] + np.diag(precision), pull)
+    return share[:, None] * gram * share
+
+
+def recorded_after(known: Known, change: Change, recorded: RecordingSet) -> Regression:
+    """Normal equations of a set and of a flight `recorded` after a change by hand, in the terms that a question needs
+    and the nuisances of the change; every block of both is fitted."""
+    model, terms = known.fitted.model, asked_terms(known)
+    acting = [*change.nuisances, *(change.term(t) for t in terms)]
+    prepared = replace(known.prepared, vehicle=change.vehicle)
+    segments = prepare_like(prepared, replace(recorded, vehicle=change.vehicle))[0]
+    starts = dict(zip([t.key for t in model.terms], np.cumsum([0, *(t.size for t in model.terms)]), strict=False))
+    at = np.concatenate([starts[t.key] + np.arange(t.size) for t in terms])
+    extra = sum(t.size for t in change.nuisances)
+    share = np.concatenate([np.ones(extra), *(np.full(t.size, change.shares.get(t.key, 1.0)) for t in terms)])
+    rows = [replace(r, x=np.pad(r.x[:, :, at], ((0, 0), (0, 0), (extra, 0)))) for r in model.rows]
+    rows += [replace(r, x=r.x * share) for r in assemble_rows(prepared, acting, segments, None)]
+    rate_hz = prepared.thinner.rate_hz
+    filters = expecting(known, []).regression.filters
+    return build(rows, acting, filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
 
 
 def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:

@@ -34,10 +34,11 @@ from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.plan.limits import SessionLimits
 from rotorid.plan.plan import Tried, chosen_pieces, share_reached
-from rotorid.plan.questions import Question, question_of
+from rotorid.plan.questions import Question, claimed_in, question_of
 from rotorid.plan.separation import Information, Separation, of_set, separations, smallest_separation
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
+from rotorid.recordings.sufficient import sufficient
 
 REST_S = 2.0
 """Unloaded before and after every step."""
@@ -160,6 +161,14 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
         else:
             questions.append(question)
     return replace(holder, questions=tuple(questions), unanswerable=tuple(unanswerable))
+
+
+def known_instrument_from(recordings: RecordingSet, verdict: dict) -> KnownInstrument:
+    """A stand's or bench's set fitted, with the questions that its verdict (content of verdict.json) leaves open.
+
+    InputError where the set does not suffice.
+    """
+    return known_instrument(sufficient(recordings), claimed_in(verdict))
 
 
 def through(t: np.ndarray, levels: Sequence[float]) -> np.ndarray:
@@ -371,4 +380,13 @@ def words_of_steps(steps: Sequence[Step]) -> list[str]:
     return out
 
 
-__all__ = ["CHANNELS", "KnownInstrument", "SessionPlan", "Step", "known_instrument", "plan_session", "words_of_steps"]
+__all__ = [
+    "CHANNELS",
+    "KnownInstrument",
+    "SessionPlan",
+    "Step",
+    "known_instrument",
+    "known_instrument_from",
+    "plan_session",
+    "words_of_steps",
+]

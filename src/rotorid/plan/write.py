@@ -17,7 +17,8 @@ import pandas as pd
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.plan import mission
-from rotorid.plan.by_hand import by_hand
+from rotorid.plan.by_hand import steps_of
+from rotorid.plan.handled import Handled
 from rotorid.plan.intervals import SHARE
 from rotorid.plan.plan import Forecast, Plan
 from rotorid.plan.separation import Questions, Separation
@@ -175,7 +176,7 @@ def summary(plan: Plan) -> dict:
             **forecast_as_data(plan, plan.limits.target_sigma),
             "others": [forecast_as_data(f, plan.limits.target_sigma) for f in plan.others],
             "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
-            "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
+            "by_hand": by_hand_as_data(plan),
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
             "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
             "limits": plan.limits.model_dump(mode="json"),
@@ -234,9 +235,45 @@ def open_ids(plan: Plan) -> list[tuple[str, ...]]:
 
 
 def in_words(plan: Plan) -> list[str]:
-    """Manual steps, as sentences."""
-    steps = dict.fromkeys(step for ids in open_ids(plan) for step in by_hand(ids))
-    return [f"By hand: {step}." for step in steps]
+    """Manual steps, as sentences; with the separation where one is predicted."""
+    found = {h.of: f" {expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
+    return [f"By hand: {step}.{found.get(i, '')}" for i, step in manual_steps(plan).items()]
+
+
+def manual_steps(plan: Plan) -> dict[str, str]:
+    """Manual steps, to the id that each is there for."""
+    return steps_of([i for ids in open_ids(plan) for i in ids])
+
+
+def expected_by_hand(step: Handled, target: float) -> str:
+    """What a step by hand is expected to separate, as a sentence."""
+    settles = "this settles it" if step.sigma >= target else "this alone does not settle it"
+    words = step.words[0].upper() + step.words[1:]
+    return (
+        f"{words}, and hover for {step.hover_s:.0f} s (about {step.minutes:.0f} min in all): {step.sigma:.1f} standard "
+        f"errors at the least, {settles}."
+    )
+
+
+def by_hand_as_data(plan: Plan) -> list[dict]:
+    """Manual steps, for JSON; `predicted` is null where no separation is."""
+    target, found = plan.limits.target_sigma, {h.of: h for h in plan.by_hand}
+    return [
+        {
+            "id": i,
+            "step": step,
+            "predicted": None
+            if i not in found
+            else {
+                "words": found[i].words,
+                "hover_s": found[i].hover_s,
+                "minutes": found[i].minutes,
+                "predicted_separation_sigma": found[i].sigma,
+                "questions": questions_as_data(found[i].questions, target),
+            },
+        }
+        for i, step in manual_steps(plan).items()
+    ]
 
 
 def steps(plan: Plan) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.io.text.writing import all_or_none, rounded
-from rotorid.plan.by_hand import by_hand
+from rotorid.plan.by_hand import steps_of
 from rotorid.plan.session import SessionForecast, SessionPlan, words_of_steps
 from rotorid.plan.write import outcome, questions_as_data, words_of
 from rotorid.recordings import columns as c
@@ -44,8 +44,13 @@ def text(plan: SessionPlan) -> list[str]:
 
 def in_words(plan: SessionPlan) -> list[str]:
     """Manual steps, as sentences."""
+    return [f"By hand: {step}." for step in manual_steps(plan).values()]
+
+
+def manual_steps(plan: SessionPlan) -> dict[str, str]:
+    """Manual steps, to the id that each is there for."""
     every = [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
-    return [f"By hand: {step}." for step in dict.fromkeys(step for ids in every for step in by_hand(ids))]
+    return steps_of([i for ids in every for i in ids])
 
 
 def summary(plan: SessionPlan) -> dict:
@@ -70,7 +75,7 @@ def summary(plan: SessionPlan) -> dict:
                 for other in plan.others
             ],
             "not_by_loading": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
-            "by_hand": [line.removeprefix("By hand: ") for line in in_words(plan)],
+            "by_hand": [{"id": i, "step": step, "predicted": None} for i, step in manual_steps(plan).items()],
             "limits": plan.limits.model_dump(mode="json"),
         }
     )
