@@ -202,7 +202,7 @@ rule prove_changes:
     params:
         so_far="results/changes/rows.csv",
         recordings="results/recordings",
-        seed=CONFIG.proof.release,
+        seed=CONFIG.proof.release or "development",
         concealing=[CODE.of(path) for path in CONCEALING],
         code=code_of("prove_changes"),
     log:

@@ -171,9 +171,12 @@ def problem_of_changes(
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
-    # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change.
-    sd, known = np.hypot(sd, prior.value_reach * in_units(spread, unit)), np.diag(gram) > 0
-    sd[known] = np.maximum(sd[known], prior.change_reach / np.sqrt(np.diag(gram)[known]))
+    # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change. What
+    # is stated of a nuisance stays.
+    own = np.concatenate([np.zeros(0, int), *(columns_of[key] for key in effects)])
+    usual = in_units(spread, unit)
+    alike = prior.change_reach * looks_like(spectra[1].weighed(variance[1]).gram, usual)
+    sd[own] = np.hypot(np.hypot(sd, prior.value_reach * usual), alike)[own]
     for key, effect in effects.items():
         if effect in NAMES.values() and (own := unit[columns_of[key]]).all():
             sd[columns_of[key]] = prior.freed_sd[0] / own
@@ -226,6 +229,13 @@ def difference_products(base: Weighed, new: Weighed, variance: float) -> tuple[n
     """
     inverse = np.linalg.inv(base.gram + new.gram + np.eye(len(base.cross)) / variance)
     return new.gram - new.gram @ inverse @ new.gram, new.cross - new.gram @ inverse @ (base.cross + new.cross)
+
+
+def looks_like(gram: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """One-sigma (K,) of each coefficient by itself where all coefficients differ by their `spread` (K,), scaled."""
+    own = np.diag(gram)
+    seen = np.sqrt((gram**2) @ spread**2)
+    return np.divide(seen, own, out=np.zeros(len(own)), where=own > 0)
 
 
 def in_units(spread: np.ndarray, unit: np.ndarray) -> np.ndarray:

@@ -28,8 +28,8 @@ class Prior:
     freed_reach: float = 0.6
     """Relative change that such a value may have at most: one further off is a mistake of its own (`doubts`)."""
     change_reach: float = 10.0
-    """One-sigma of a change between two sets of flights at least, in units of what noise and the usual difference of
-    flights leave unknown of it: its estimate then shrinks by a hundredth."""
+    """One-sigma of a change between two sets of flights at least, in units of what it looks like where nothing changed:
+    its estimate then shrinks by a hundredth."""
     slack: float = 1.5
     """Standard errors by which a coefficient may lie beyond its physical bound, as an estimate of one on the bound."""
     shown: float = 2.0

@@ -1,0 +1,91 @@
+"""The posterior over changes on small made-up sets, and what the first set says of the second's columns."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rotorid.mismatch.changes.joint import with_other_arms, within_bounds
+from rotorid.mismatch.changes.problem import decide_changes, leftover_of, unit_of
+from rotorid.mismatch.changes.usual import hidden_in, usual_spread
+from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
+from rotorid.mismatch.posterior.leftover import spectrum_of
+from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.statements import statements_of
+from tests.unit.mismatch.posterior.test_posterior import OFFSET, effect, flight
+
+DRAG, LIFT = "drag/plain", "lift/plain"
+TERMS = (OFFSET, effect(DRAG), effect(LIFT), effect("both/plain"))
+
+
+def made(beta: list[float], seed: int, noise: float = 1.0):
+    """A set whose residual is `beta` times its columns; the last column is the sum of the two before it."""
+    own = flight([*beta, 0.0], TERMS, seed, noise=noise)
+    x = own.x.copy()
+    x[:, :, 3] = x[:, :, 1] + x[:, :, 2]
+    return replace(own, x=x, y=own.y - own.x @ [*beta, 0.0] + x @ [*beta, 0.0]).evidence()
+
+
+def decided(new, spread: float = 0.0):
+    return decide_changes(made([0.0, 0.5, 0.0], 1), new, np.array([0.0, spread, spread, spread]), Prior())
+
+
+def test_what_both_sets_have_is_no_change_and_what_one_has_more_is():
+    assert decided(made([0.0, 0.5, 0.0], 2)).model == ()
+    assert decided(made([0.0, 0.9, 0.0], 2)).model == (DRAG,)
+
+
+def test_a_change_far_beyond_what_flights_differ_by_is_not_drawn_to_nothing():
+    """Ten times as large as flights differ by, and a hundred times as large as a row's noise."""
+    (said,) = statements_of(decided(made([0.0, 100.5, 0.0], 2), spread=10.0))
+    (size,) = said.parameters
+    assert size.value == pytest.approx(100.0, rel=0.03) and size.low < 100.0 < size.high
+
+
+def test_two_changes_that_may_be_one_of_another_kind_are_each_in_a_class_with_it():
+    found = decided(made([0.0, 1.0, 0.5], 2), spread=0.02)
+    ids = {i for s in statements_of(found) for i in (s.id, *s.alternatives)}
+    assert "both" in ids
+
+
+def test_a_set_that_is_shaken_has_a_leftover_of_its_own():
+    calm, alike = made([0.0, 0.5, 0.0], 1), made([0.0, 0.5, 0.0], 2)
+    shaken = made([0.0, 0.5, 0.0], 3, noise=12.0)
+    for other, apart in ((alike, False), (shaken, True)):
+        unit = unit_of(calm, other)
+        first, second = leftover_of((spectrum_of(calm, unit), spectrum_of(other, unit)), np.zeros(4), Prior())
+        assert bool(second[0] > 10.0 * max(first[0], 0.1)) is apart
+
+
+def test_a_change_stays_within_what_is_physical_given_what_the_first_set_has():
+    def term(low: float) -> EvidenceTerm:
+        return EvidenceTerm(DRAG, "effect", "drag", 1, (np.inf,), linear=(LinearParameter("k", "1", low, 9.0, 0.0),))
+
+    new = replace(made([0.0, 0.5, 0.0], 2), terms=(OFFSET, term(0.0), *TERMS[2:]))
+    reference = SimpleNamespace(evidence=new, known=np.array([0.0, 0.5, 0.0, 0.0]))
+    bounded = next(t for t in within_bounds(new, reference).terms if t.key == DRAG)
+    assert bounded.of_change and -0.7 < bounded.linear[0].low < -0.5
+    still = replace(new, gram=new.gram * (np.arange(4) != 1), cross=new.cross * (np.arange(4) != 1))
+    unseen = SimpleNamespace(evidence=still, known=np.zeros(4))
+    assert np.isinf(next(t for t in within_bounds(new, unseen).terms if t.key == DRAG).linear[0].low)
+
+
+def test_another_centre_of_mass_gives_a_known_drag_another_arm():
+    drag_n, lever = np.array([2.0, 0.0, 0.0]), 5
+    terms = [Term("drag", "effect", "rotor_drag"), Term("centre", "effect", "com_offset", size=2)]
+    x = np.zeros((4, 12, 3))
+    x[:, 0:3, 0] = drag_n
+    (own,) = with_other_arms([Rows("run", np.arange(4.0), np.zeros((4, 12)), x)], terms, np.array([1.0, 0.0, 0.0]))
+    assert np.allclose(own.x[:, lever, 2], 2.0)  # M = −(0, r, 0) × (2, 0, 0) = (0, 0, 2 r)
+    assert np.array_equal(own.x[:, :, :2], x[:, :, :2])
+
+
+def test_of_a_derivative_of_speeds_noise_may_hide_as_much_as_there_is():
+    set_of = made([0.0, 0.5, 0.0], 1)
+    hidden = hidden_in(set_of, np.zeros(4))
+    assert 0.0 < hidden[1] < 0.5 and hidden[2] <= abs(hidden[1]) + 0.5
+    spun = replace(set_of, terms=(OFFSET, replace(TERMS[1], effect="rotor_acceleration_torque"), *TERMS[2:]))
+    usual = [usual_spread(own, own, np.zeros(4), np.ones(1)) for own in (set_of, spun)]
+    assert usual[1][1] > usual[0][1]
