@@ -114,7 +114,7 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
         found = joint.decide(joint.base, joint.new, yardstick(joint, reference.runs, prior), prior)
-        stated, notes = statements_of(found), ()
+        stated, notes = statements_of(found, one_for_several=True), ()
     limits = limits_of(found, joint.squares)
     if of_speeds:
         stated = (*stated, *changes_in(of_speeds[0], prior))
@@ -208,7 +208,7 @@ def decided_of_speeds(
 def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]:
     """What is stated of the best option; a part of the chain in whose place another would do is one of a class."""
     out = []
-    for stated in statements_of(options[0].found):
+    for stated in statements_of(options[0].found, one_for_several=True):
         others = others_in_place(options, stated.id, prior)
         if others and stated.status in CLAIMED:
             members = tuple(sorted({stated.id, *stated.alternatives, *others}))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -54,13 +55,20 @@ class Statement:
         return f"its probability is {100 * self.probability:.0f} %"
 
 
-def statements_of(found: Found) -> tuple[Statement, ...]:
-    """A statement for each named effect of the most probable model, the surest first."""
+def statements_of(found: Found, one_for_several: bool = False) -> tuple[Statement, ...]:
+    """A statement for each named effect of the most probable model, the surest first.
+
+    With `one_for_several` a class may hold an effect that explains alone what several do together: an offset of the
+    centre of mass and a weaker thrust are a payload.
+    """
     at = scored(found.problem, found.model)
     named = [key for key in found.model if found.problem.terms[key].effect not in {"", *UNKNOWNS}]
     # Everything is visited before shares are taken over what was visited.
     seen = [(key, substitutes(found, key), odds_of(found, key)) for key in named]
     weights = weights_of(found)
+    if one_for_several:
+        more = visited_instead(found, weights)
+        seen = [(key, (*others, *more), odds) for key, others, odds in seen]
     stated = [statement(found, at, weights, key, others, odds) for key, others, odds in seen]
     return tuple(sorted(stated, key=lambda s: -s.odds))
 
@@ -90,13 +98,16 @@ def statement(
     )
 
 
-def smallest_class(found: Found, weights: Mapping[Model, float], effect: str, others: Sequence[str]) -> set[str]:
-    """The fewest ids, an effect and some of `others` or of another visited model, of which one is surely at work.
+def visited_instead(found: Found, weights: Mapping[Model, float]) -> set[str]:
+    """Named ids of other visited models that the most probable one has not: of a class with one that it has, that one
+    is at work anyway."""
+    own, visited = ({found.problem.terms[k].effect for k in keys} for keys in (found.model, chain(*weights)))
+    return visited - own - {"", *UNKNOWNS}
 
-    Two effects may be one of another kind: an offset of the centre of mass and a weaker thrust are a payload.
-    """
-    seen = {found.problem.terms[key].effect for model in weights for key in model if key in found.problem.effects}
-    members, left = {effect}, (set(others) | seen) - {effect, "", *UNKNOWNS}
+
+def smallest_class(found: Found, weights: Mapping[Model, float], effect: str, others: Sequence[str]) -> set[str]:
+    """The fewest ids, an effect and some of `others`, of which one is surely at work; as sure as it gets."""
+    members, left = {effect}, set(others) - {effect}
     while left and share_of(found, weights, members) < SURE and len(members) < MOST_MEMBERS:
         best = max(sorted(left), key=lambda other: share_of(found, weights, {*members, other}))
         members.add(best)

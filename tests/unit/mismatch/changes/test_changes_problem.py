@@ -13,7 +13,7 @@ from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.statements import statements_of
+from rotorid.mismatch.posterior.statements import statements_of, visited_instead
 from tests.unit.mismatch.posterior.test_posterior import OFFSET, effect, flight
 
 DRAG, LIFT = "drag/plain", "lift/plain"
@@ -44,10 +44,13 @@ def test_a_change_far_beyond_what_flights_differ_by_is_not_drawn_to_nothing():
     assert size.value == pytest.approx(100.0, rel=0.03) and size.low < 100.0 < size.high
 
 
-def test_two_changes_that_may_be_one_of_another_kind_are_each_in_a_class_with_it():
-    found = decided(made([0.0, 1.0, 0.5], 2), spread=0.02)
-    ids = {i for s in statements_of(found) for i in (s.id, *s.alternatives)}
-    assert "both" in ids
+def test_an_effect_may_stand_for_several_but_what_is_stated_itself_is_no_rival():
+    found = decided(made([0.0, 1.0, 0.85], 2))
+    assert found.model == ("both/plain", LIFT)
+    plain, classes = ({s.id: s for s in statements_of(found, several)} for several in (False, True))
+    assert plain["both"].alternatives == classes["both"].alternatives == ("both", "drag")
+    assert classes["lift"].status == plain["lift"].status == "suggested"
+    assert visited_instead(found, {found.model: 0.9, (DRAG, LIFT): 0.05, ("both/plain",): 0.05}) == {"drag"}
 
 
 def test_a_set_that_is_shaken_has_a_leftover_of_its_own():
