@@ -241,7 +241,7 @@ def problem_without_leftover(base: Evidence, new: Evidence) -> Problem:
     """The problem of all changes between two sets where all that no change explains is white noise."""
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    return problem_of_changes(new, spectra, np.zeros((2, len(new.channels))), np.zeros(len(unit)), Prior())
+    return problem_of_changes(new, spectra, np.zeros(len(new.channels)), np.zeros(len(unit)), Prior())
 
 
 def decide_instrument_changes(
@@ -257,11 +257,11 @@ def decide_instrument_changes(
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     starts = [np.zeros(len(unit)), difference_of(spectra)]
-    white = Posterior(problem_of_changes(new, spectra, np.zeros((2, len(new.channels))), spread, prior))
+    white = Posterior(problem_of_changes(new, spectra, np.zeros(len(new.channels)), spread, prior))
     if of_time := [k for k, effect in white.problem.effects.items() if takes_time(effect)]:
         best = max(of_time, key=lambda k: white((k,)))
         starts.append(change_of(Found(white, (best,), white((best,)))))
-    best, *others = (settled(new, spectra, leftover_of(spectra, d, prior), spread, prior, sizes) for d in starts)
+    best, *others = (settled(new, spectra, leftover_of(spectra, d), spread, prior, sizes) for d in starts)
     for found in others:
         if joint(spectra, found, spread) - joint(spectra, best, spread) > prior.leftover_nats:
             best = found

@@ -66,7 +66,7 @@ def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pr
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     nothing, all_of_it = np.zeros(len(unit)), difference_of(spectra)
-    large, small = (settled(new, spectra, leftover_of(spectra, d, prior), spread, prior) for d in (nothing, all_of_it))
+    large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
     of_large, of_small = (joint(spectra, found, spread) for found in (large, small))
     chosen, value = (small, of_small) if of_small - of_large > prior.leftover_nats else (large, of_large)
     return chosen, value - 0.5 * float(new.square.sum())
@@ -86,7 +86,7 @@ def settled(
     prior: Prior,
     sizes: np.ndarray | None = None,
 ) -> Found:
-    """The most probable changes and their leftover, from a `variance` (2, C) of the leftover in each set.
+    """The most probable changes and their leftover, from a `variance` (C,) of the leftover.
 
     `sizes` (C, K, K) are products that the sizes of contributions are taken from where they are not those of `new`.
     """
@@ -94,7 +94,7 @@ def settled(
     for _ in range(ROUNDS):
         found = most_probable(problem_of_changes(new, spectra, variance, spread, prior, sizes), starts)
         starts = [(), found.model]
-        before, variance = variance, leftover_of(spectra, change_of(found), prior)
+        before, variance = variance, leftover_of(spectra, change_of(found))
         if np.array_equal(before, variance):
             break
     return found
@@ -103,16 +103,11 @@ def settled(
 def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) -> float:
     """Log posterior of changes and leftover together, nats, less a constant."""
     variance = found.problem.variance
-    base, new = (s.weighed(v) for s, v in zip(spectra, variance, strict=True))
+    base, new = (s.weighed(variance) for s in spectra)
     free = FREE * spectra[1].rows
     of_common = integrated(base.gram + new.gram, base.cross + new.cross, np.full(len(base.cross), free))
     of_usual = integrated(*difference_products(base, new, free), in_units(spread, spectra[1].unit) ** 2)
-    return (
-        found.log_posterior
-        + of_common
-        + of_usual
-        + sum(s.evidence_of(v) for s, v in zip(spectra, variance, strict=True))
-    )
+    return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in spectra)
 
 
 def integrated(gram: np.ndarray, cross: np.ndarray, variance: np.ndarray) -> float:
@@ -123,19 +118,16 @@ def integrated(gram: np.ndarray, cross: np.ndarray, variance: np.ndarray) -> flo
     return float(0.5 * scaled @ np.linalg.solve(inner, scaled) - 0.5 * np.linalg.slogdet(inner)[1])
 
 
-def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray, prior: Prior) -> np.ndarray:
-    """The variance of each channel's leftover in both sets, (2, C), with one fit of all columns for both.
+def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray) -> np.ndarray:
+    """The variance of each channel's leftover, (C,), with one fit of all columns for both sets.
 
-    It is the same in both unless one of its own for each is more probable by far: a damaged propeller shakes a vehicle.
     `change` (K,) is what the second set's coefficients are more, in units of the spectra.
     """
     base, new = (s.weighed(np.zeros(len(s.channels))) for s in spectra)
     gram = base.gram + new.gram
     common = np.linalg.solve(gram + RIDGE * np.eye(len(gram)), base.cross + new.cross - new.gram @ change)
-    gains = np.array([s.gains_of_leftover(b) for s, b in zip(spectra, (common, common + change), strict=True)])
-    of_both = gains.sum(axis=0)
-    apart = gains.max(axis=2).sum(axis=0) - of_both.max(axis=1) > 2.0 * prior.leftover_nats
-    return VARIANCES[np.where(apart, gains.argmax(axis=2), of_both.argmax(axis=1))]
+    gains = spectra[0].gains_of_leftover(common) + spectra[1].gains_of_leftover(common + change)
+    return VARIANCES[np.argmax(gains, axis=1)]
 
 
 def difference_of(spectra: tuple[Spectrum, Spectrum]) -> np.ndarray:
@@ -160,7 +152,7 @@ def problem_of_changes(
     prior: Prior,
     sizes: np.ndarray | None = None,
 ) -> Problem:
-    """The problem that two sets pose on the same columns, with a leftover of `variance` (2, C) in each set and channel.
+    """The problem that two sets pose on the same columns, with a leftover of `variance` (C,) in each channel.
 
     Every effect may have changed, in any direction, and every value.
     """
@@ -175,7 +167,7 @@ def problem_of_changes(
     # is stated of a nuisance stays.
     own = np.concatenate([np.zeros(0, int), *(columns_of[key] for key in effects)])
     usual = in_units(spread, unit)
-    alike = prior.change_reach * looks_like(spectra[1].weighed(variance[1]).gram, usual)
+    alike = prior.change_reach * looks_like(spectra[1].weighed(variance).gram, usual)
     sd[own] = np.hypot(np.hypot(sd, prior.value_reach * usual), alike)[own]
     for key, effect in effects.items():
         if effect in NAMES.values() and (own := unit[columns_of[key]]).all():
@@ -215,7 +207,7 @@ def products_of_changes(
     spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """S̃ (K, K) and s̃ (K,) of the module's equations, scaled."""
-    base, new = (s.weighed(v) for s, v in zip(spectra, variance, strict=True))
+    base, new = (s.weighed(variance) for s in spectra)
     gram, cross = difference_products(base, new, FREE * spectra[1].rows)
     usual = in_units(spread, spectra[1].unit) ** 2
     gram, cross = np.hsplit(np.linalg.solve(np.eye(len(cross)) + gram * usual, np.column_stack([gram, cross])), [-1])

@@ -64,8 +64,7 @@ class Problem:
     rows: float
     """Whitened squares that the model of all columns leaves: the number of rows, as the whitening counts them."""
     variance: np.ndarray
-    """(C,) variance of the leftover's coefficients in each channel, (2, C) of two sets; all products are weighed by it
-    already."""
+    """(C,) variance of the leftover's coefficients in each channel; all products are weighed by it already."""
     prior: Prior
     channel_gram: np.ndarray
     """(C, K, K) products in each channel with the leftover in them: how large a contribution is."""

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.changes.joint import with_other_arms, within_bounds
-from rotorid.mismatch.changes.problem import decide_changes, leftover_of, unit_of
+from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
-from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.statements import statements_of, visited_instead
 from tests.unit.mismatch.posterior.test_posterior import OFFSET, effect, flight
@@ -51,15 +50,6 @@ def test_an_effect_may_stand_for_several_but_what_is_stated_itself_is_no_rival()
     assert plain["both"].alternatives == classes["both"].alternatives == ("both", "drag")
     assert classes["lift"].status == plain["lift"].status == "suggested"
     assert visited_instead(found, {found.model: 0.9, (DRAG, LIFT): 0.05, ("both/plain",): 0.05}) == {"drag"}
-
-
-def test_a_set_that_is_shaken_has_a_leftover_of_its_own():
-    calm, alike = made([0.0, 0.5, 0.0], 1), made([0.0, 0.5, 0.0], 2)
-    shaken = made([0.0, 0.5, 0.0], 3, noise=12.0)
-    for other, apart in ((alike, False), (shaken, True)):
-        unit = unit_of(calm, other)
-        first, second = leftover_of((spectrum_of(calm, unit), spectrum_of(other, unit)), np.zeros(4), Prior())
-        assert bool(second[0] > 10.0 * max(first[0], 0.1)) is apart
 
 
 def test_a_change_stays_within_what_is_physical_given_what_the_first_set_has():
