@@ -27,9 +27,9 @@ class Prior:
     """Least and largest relative one-sigma of such a value, else `value_reach` times its trust."""
     freed_reach: float = 0.6
     """Relative change that such a value may have at most: one further off is a mistake of its own (`doubts`)."""
-    change_reach: float = 10.0
+    change_reach: float = 5.0
     """One-sigma of a change between two sets of flights at least, in units of what it looks like where nothing changed:
-    its estimate then shrinks by a hundredth."""
+    its estimate then shrinks by four hundredths. Wider ones let large changes that cancel be found."""
     slack: float = 1.5
     """Standard errors by which a coefficient may lie beyond its physical bound, as an estimate of one on the bound."""
     shown: float = 2.0
