@@ -362,34 +362,31 @@ def apart(known: Known, question: Question, true: Hypothesis, gram: np.ndarray) 
 
     Which form of the true model it is the set may not know either: each has draws by its probability.
     """
-    forms = (true, *true.others)
-    whole = sum(h.weight for h in forms)
-    found = [apart_in(known, question, h, gram, max(1, round(DRAWS * h.weight / whole))) for h in forms]
-    return {rival: np.concatenate([f[rival] for f in found]) for rival in found[0] if all(rival in f for f in found)}
-
-
-def apart_in(
-    known: Known, question: Question, true: Hypothesis, gram: np.ndarray, count: int = DRAWS
-) -> dict[str, np.ndarray]:
-    """As `apart` of one form of a true model, in `count` draws."""
-    regression = known.regression
-    columns = regression.columns(true.keys)
-    draws = drawn(true, gram[np.ix_(columns, columns)])[:count]
+    regression, forms = known.regression, (true, *true.others)
+    keys_of_true = tuple(dict.fromkeys(k for h in forms for k in h.keys))
+    columns, whole = regression.columns(keys_of_true), sum(h.weight for h in forms)
+    places, parts = {c: i for i, c in enumerate(columns)}, []
+    for form in forms:
+        own = regression.columns(form.keys)
+        draws = drawn(form, gram[np.ix_(own, own)], max(1, round(DRAWS * form.weight / whole)))
+        parts.append(np.zeros((len(draws), len(columns))))
+        parts[-1][:, [places[c] for c in own]] = draws
+    theta = np.concatenate(parts)
     out = {}
     for rival in question.ids:
         squares = []
         for keys in question.rivals[rival] if rival != true.id else ():
             # Where the rival shares a term with the true model, only what is the true model's own counts.
-            if own := [k for k in true.keys if k not in keys]:
-                theta = draws[:, np.isin(columns, regression.columns(own))]
-                squares.append(squares_left(regression, gram, own, [*question.shared, *keys], theta))
+            if own := [k for k in keys_of_true if k not in keys]:
+                counting = theta[:, np.isin(columns, regression.columns(own))]
+                squares.append(squares_left(regression, gram, own, [*question.shared, *keys], counting))
         if squares:
             out[rival] = np.sqrt(np.min(squares, axis=0))
     return out
 
 
-def drawn(true: Hypothesis, gram: np.ndarray) -> np.ndarray:
-    """Draws of a model's coefficients (DRAWS, k).
+def drawn(true: Hypothesis, gram: np.ndarray, count: int = DRAWS) -> np.ndarray:
+    """Draws of a model's coefficients, `count` of DRAWS, (count, k).
 
     What the set does not know of them is not as large as its doubt: the columns of one model are taken to contribute
     alike, so the coefficients, in units of their columns' length in the normal equations `gram` (k, k), are normal
@@ -403,7 +400,7 @@ def drawn(true: Hypothesis, gram: np.ndarray) -> np.ndarray:
     fits = [-(np.log(values + v) + along**2 / (values + v)).sum() for v in variances]
     variance = variances[int(np.argmax(fits))]
     kept = variance / (values + variance)
-    normal = np.random.default_rng(0).standard_normal((DRAWS, len(unit)))
+    normal = np.random.default_rng(0).standard_normal((DRAWS, len(unit)))[:count]
     return (kept * along + normal * np.sqrt(kept * values)) @ vectors.T * unit
 
 
