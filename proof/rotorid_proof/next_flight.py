@@ -19,6 +19,8 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.plant.regression import Regression
+from rotorid.mismatch.plant.rows import Term
 from rotorid.plan.changed import Change
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import Known, Question, best_of
@@ -130,13 +132,15 @@ def predicted(plan: Plan | SessionPlan, ids: tuple[str, ...], truth: set[str]) -
     return next((s for s in found if s.true in truth), None)
 
 
-def measured(joint: Known | KnownInstrument, question: Question | None, true: str) -> float:
+def measured(
+    first: Known | KnownInstrument, joint: Known | KnownInstrument, question: Question | None, true: str
+) -> float:
     """√ of the whitened squares that the true model still explains given its nearest rival, in both sets together.
 
     This is what the engine asks before it names a class: is the term still needed with the other in its place? Of each
-    rival every form of the question as it was asked of the first set is tried; what as many coefficients explain of
-    noise alone is taken off. NaN where truth is none of the models, or is no term of forces and moments (between
-    command and rotor speed).
+    rival every form of the question as it was asked of the `first` set is tried, with the coefficients that it had
+    there (`as_asked`); what as many coefficients explain of noise alone is taken off. NaN where truth is none of the
+    models, or is no term of forces and moments (between command and rotor speed).
     """
     if question is None or true not in question.rivals:
         return float("nan")
@@ -148,15 +152,33 @@ def measured(joint: Known | KnownInstrument, question: Question | None, true: st
 
     if not able(true):
         return float("nan")
-    own = best_of(joint.regression, shared, able(true), search.terms)
+    regression = as_asked(first.regression, joint.regression)
+    own = best_of(regression, shared, able(true), search.terms)
     left = []
     for keys in (keys for name in question.rivals if name != true for keys in able(name)):
         more = [k for k in own if k not in keys]
         if more:
             beside = [*shared, *keys]
-            gain = joint.regression.explained([*beside, *more]) - joint.regression.explained(beside)
+            gain = regression.explained([*beside, *more]) - regression.explained(beside)
             left.append(gain - sum(search.terms[k].size for k in more))
     return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
+
+
+def as_asked(first: Regression, joint: Regression) -> Regression:
+    """The joint regression with the forms of the first set: of a form that has more coefficients in both sets together
+    (crosstalk from loads that the first set has not) those of the first alone."""
+    asked = {t.key: t for t in first.terms}
+    places = {}
+    for term in joint.terms:
+        if term.key in asked and term.size > asked[term.key].size:
+            had = symbols(asked[term.key])
+            places[term.key] = np.array([i for i, symbol in enumerate(symbols(term)) if symbol in had], int)
+    return joint.narrowed(places)
+
+
+def symbols(term: Term) -> list[str]:
+    """Symbols of the linear parameters of a term, in the order of its columns."""
+    return [term.form.parameters[i].symbol for i in term.form.linear]
 
 
 def measured_after(found: Known, question: Question, change: Change, recorded: RecordingSet, true: str) -> float:

@@ -63,7 +63,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
         second = proof.as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
         outcome[name], said[name], whole = proof.judged(first, second, ids, truth)
         if question is not None:
-            measured[name] = proof.measured(known(whole), question, named)
+            measured[name] = proof.measured(found, known(whole), question, named)
     row = proof.Row(
         case=case.name,
         truth=named,

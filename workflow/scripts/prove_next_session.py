@@ -62,7 +62,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: SessionLi
             continue
         second = proof.as_read(simulator.record(case, answer, as_table(found, steps)), simulator.write_set, "second")
         outcome[name], said[name], whole = proof.judged(first, second, ids, truth)
-        measured[name] = proof.measured(known_instrument(whole), question, named)
+        measured[name] = proof.measured(found, known_instrument(whole), question, named)
     row = proof.Row(
         case=case.name,
         truth=named,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from rotorid.plan.between import ChainQuestion, chain_question
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.sufficient import sufficient
 
+LEAST_WEIGHT = 0.05
+"""Relative probability from which a form may as well be the true one."""
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -39,6 +42,10 @@ class Hypothesis:
     """Coefficients of these, (k,)."""
     covariance: np.ndarray
     """Theirs, (k, k)."""
+    weight: float = 1.0
+    """Probability of this form on the set, relative to the most probable one of its id."""
+    others: tuple[Hypothesis, ...] = ()
+    """Other forms of the id that the set does not distinguish from this one."""
 
 
 @dataclass(frozen=True)
@@ -164,8 +171,7 @@ def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Questi
         if not choices:
             continue
         rivals[i] = tuple(choices)
-        best = (own,) if i == finding.id else best_of(search.regression, shared, choices, search.terms)
-        hypotheses.append(hypothesis(search.regression, shared, i, best))
+        hypotheses.append(hypothesis_of(search.regression, shared, i, choices, search.terms, own))
     if len(ids) == 1:
         hypotheses.append(Hypothesis("nothing", (), np.zeros(0), np.zeros((0, 0))))
         rivals["nothing"] = ((),)
@@ -181,6 +187,22 @@ def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[
         return regression.explained([*shared, *keys]) - COST_PER_PARAMETER * sum(terms[k].size for k in keys)
 
     return max(choices, key=worth)
+
+
+def hypothesis_of(
+    regression: Regression, shared: Sequence[str], name: str, choices, terms: dict[str, Term], own: str
+) -> Hypothesis:
+    """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good."""
+
+    def worth(keys: tuple[str, ...]) -> float:
+        return regression.explained([*shared, *keys]) - COST_PER_PARAMETER * sum(terms[k].size for k in keys)
+
+    best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
+    weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
+    others = (
+        replace(hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > LEAST_WEIGHT
+    )
+    return replace(hypothesis(regression, shared, name, best), others=tuple(others))
 
 
 def hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: tuple[str, ...]) -> Hypothesis:

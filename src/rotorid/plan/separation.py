@@ -1,13 +1,16 @@
 """How far apart two competing models are on recordings not made yet, by the comparison that the engine decides with.
 
 The engine compares models by what they leave in whitened squares (`rotorid.mismatch.plant.comparison`). If model h is
-true with coefficients θ, the best that its rival can do leaves λ = θᵀ S θ more of them, where S is what is left of the
-normal equations of h's columns once everything that the rival and all believed values (within their trust) could take
-over is projected out. The loss difference that the engine will then find is about λ with a standard deviation of 2 √λ:
-in standard errors of the data the models are √λ apart, give or take one. The normal equations are those of the set as
-recorded plus those of the simulated flight, through the same filters (the instruments' noise and what the model left).
+true with coefficients θ, the best that its rival can do leaves λ more of them: what is left of h's contribution once
+the rival's terms and all that both share are fitted to it, with the priors and within the limits of the engine's own
+fit. A believed value moves at a cost and no further than its limit: without one the rotors' distance would take over
+most of a moment. The loss difference that the engine will then find is about λ with a standard deviation of 2 √λ: in
+standard errors of the data the models are √λ apart, give or take one. The normal equations are those of the set as
+recorded plus those of the part of the simulated flight that will be fitted, through the same filters (the instruments'
+noise and what the model left).
 
-A separation is the median over draws of θ, as doubtful as the set leaves it. How fast the vehicle's loops are is known
+A separation is the median over draws of θ, as doubtful as the set leaves it, and over the forms of h that the set does
+not distinguish. How fast the vehicle's loops are is known
 roughly: a flight is simulated with the bandwidths as stated and with slower ones (SLOWER_LOOPS), and the smaller median
 is the one stated. The interval is over all draws of both.
 """
@@ -26,7 +29,7 @@ from rotorid.mismatch.plant.comparison import ENVIRONMENT_S
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regression import Regression, autoregression, build, ridge_inverse
 from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.mismatch.plant.split import training_rule
+from rotorid.mismatch.plant.split import HELD_OUT_SHARE, training_rule
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.plan.between import interval as chain_interval
 from rotorid.plan.between import squares
@@ -43,6 +46,8 @@ LEAST_RATE_HZ = 400.0
 SLOWER_LOOPS = (1.0, 0.7)
 """Shares of the stated bandwidths that flights are simulated with: what is asked of quick motions only a loop as fast
 as stated flies."""
+FITTED_SHARE = 1.0 - HELD_OUT_SHARE
+"""Share of a later recording that the joint judgement fits: the rest is held out (`rotorid.plan.together`)."""
 SIZES = np.geomspace(1e-2, 1e2, 41)
 """Sizes, of the coefficients found, among which that of a model's coefficients is looked for."""
 
@@ -69,6 +74,11 @@ class Information:
             self.seconds + other.seconds,
             self.shares + other.shares,
         )
+
+    def share(self, of: float) -> Information:
+        """A share of it: a part of the recordings in which the same is done."""
+        squares = None if self.squares is None else of * self.squares
+        return Information(of * self.gram, squares, of * self.seconds, of * self.shares)
 
     @property
     def each(self) -> list[np.ndarray]:
@@ -182,11 +192,15 @@ def flown(world: World, reference: Reference, limits: Limits) -> tuple[Flown, ..
 def of_flights(
     known: Known, flights: Sequence[Flown], world: World, terms: Sequence[Term], change: Change | None = None
 ) -> Information:
-    """What a reference would hold, flown with each of the loops; after a `change` of the vehicle by hand, if any."""
+    """What the fitted part of a flight would hold, flown with each of the loops.
+
+    After a `change` of the vehicle by hand all of the flight is compared with the set.
+    """
     found = [of_flight(known, flight, world, terms, change) for flight in flights]
     squares = [i.squares for i in found if i.squares is not None]
     grams = np.stack([i.gram for i in found])
-    return Information(grams, np.stack(squares) if squares else None, found[0].seconds, found[0].shares)
+    whole = Information(grams, np.stack(squares) if squares else None, found[0].seconds, found[0].shares)
+    return whole.share(FITTED_SHARE) if change is None else whole
 
 
 def of_flight(
@@ -286,7 +300,9 @@ def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
     again = build(
         model.rows, model.terms, filters, rule, block_seconds(model.rows, rate_hz), rate_hz, model.contributions.noisy
     )
-    return replace(known, whitened=again.without_winds())
+    whitened = again.without_winds()
+    whitened.limit = regression.limit
+    return replace(known, whitened=whitened)
 
 
 def own_rate_hz(known: Known) -> float:
@@ -294,41 +310,83 @@ def own_rate_hz(known: Known) -> float:
     return 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
 
 
-def left_over(regression: Regression, gram: np.ndarray, own: Sequence[str], others: Sequence[str]) -> np.ndarray:
-    """What is left of normal equations (K, K) of terms (k, k) once others could take over what they can."""
+def squares_left(
+    regression: Regression, gram: np.ndarray, own: Sequence[str], others: Sequence[str], theta: np.ndarray
+) -> np.ndarray:
+    """λ (D,): whitened squares that remain of terms with coefficients `theta` (D, k) once others take what they can.
+
+    `gram` (K, K) are the normal equations. The others are fitted as the engine fits them: each with its prior, and no
+    believed value further off than its limit (`Regression.limit`). The squares are those of the rows alone, as those
+    that `Regression.explained` compares: what a prior asks of the others is no misfit.
+    """
     a, b = regression.columns(own), regression.columns([k for k in others if k not in own])
-    inner = ridge_inverse(gram[np.ix_(b, b)] + np.diag(regression.precision[b]))
-    pull = gram[np.ix_(b, a)]
-    left = gram[np.ix_(a, a)] - pull.T @ inner @ pull
-    return (left + left.T) / 2
+    normal = gram[np.ix_(b, b)] + np.diag(regression.precision[b])
+    pull = theta @ gram[np.ix_(a, b)]
+    limit = regression.limit[b]
+    taken = within(normal, pull, limit)
+    left = np.einsum("dk,kl,dl->d", theta, gram[np.ix_(a, a)], theta)
+    left += np.einsum("dk,kl,dl->d", taken, gram[np.ix_(b, b)], taken) - 2 * np.einsum("dk,dk->d", taken, pull)
+    return np.maximum(left, 0.0)
 
 
-def rivals_left(known: Known, question: Question, true: Hypothesis, rival: str, gram: np.ndarray):
-    """S of every form of a rival, and which of the true model's coefficients it is of."""
-    out = []
-    for keys in question.rivals[rival]:
-        own = [k for k in true.keys if k not in keys]
-        if own:
-            # Where the rival shares a term with the true model, only what is the true model's own counts.
-            at = np.flatnonzero(np.isin(known.regression.columns(true.keys), known.regression.columns(own)))
-            out.append((left_over(known.regression, gram, own, [*question.shared, *keys]), at))
-    return out
+def within(normal: np.ndarray, right: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    """Solutions (D, n) of normal equations (n, n) for many right sides (D, n), each coefficient within `limit` (n,).
+
+    As the engine's own fit (`rotorid.mismatch.plant.regression.bounded`): what is furthest out is held at its limit,
+    until nothing is out.
+    """
+    free = ridge_inverse(normal)
+    solution = right @ free
+    held = np.zeros(right.shape, bool)
+    for _ in range(int(np.isfinite(limit).sum())):
+        out = np.where(held, 0.0, np.abs(solution) / limit)
+        worst = out.argmax(axis=1) if out.shape[1] else np.zeros(0, int)
+        beyond = np.flatnonzero(out[np.arange(len(out)), worst] > 1.0) if out.shape[1] else worst
+        if not len(beyond):
+            break
+        worst = worst[beyond]
+        held[beyond, worst] = True
+        solution[beyond, worst] = np.sign(solution[beyond, worst]) * limit[worst]
+        # The same coefficients are held in many of them: solved together.
+        patterns, which = np.unique(held[beyond], axis=0, return_inverse=True)
+        for number, pattern in enumerate(patterns):
+            at, rest = beyond[which.ravel() == number], np.flatnonzero(~pattern)
+            known = np.where(pattern, solution[at], 0.0)
+            moved = (right[at] - known @ normal)[:, rest] @ ridge_inverse(normal[np.ix_(rest, rest)])
+            solution[at[:, None], rest] = moved
+    return solution
 
 
 def apart(known: Known, question: Question, true: Hypothesis, gram: np.ndarray) -> dict[str, np.ndarray]:
-    """√λ (DRAWS,) of a true model against every rival, the best of its forms in each draw of the coefficients."""
-    draws = drawn(true, gram[np.ix_(*[known.regression.columns(true.keys)] * 2)])
+    """√λ (n,) of a true model against every rival, the best of its forms in each draw of the coefficients.
+
+    Which form of the true model it is the set may not know either: each has draws by its probability.
+    """
+    regression, forms = known.regression, (true, *true.others)
+    keys_of_true = tuple(dict.fromkeys(k for h in forms for k in h.keys))
+    columns, whole = regression.columns(keys_of_true), sum(h.weight for h in forms)
+    places, parts = {c: i for i, c in enumerate(columns)}, []
+    for form in forms:
+        own = regression.columns(form.keys)
+        draws = drawn(form, gram[np.ix_(own, own)], max(1, round(DRAWS * form.weight / whole)))
+        parts.append(np.zeros((len(draws), len(columns))))
+        parts[-1][:, [places[c] for c in own]] = draws
+    theta = np.concatenate(parts)
     out = {}
     for rival in question.ids:
-        forms = [] if rival == true.id else rivals_left(known, question, true, rival, gram)
-        squares = [np.einsum("dk,kl,dl->d", draws[:, at], left, draws[:, at]) for left, at in forms]
+        squares = []
+        for keys in question.rivals[rival] if rival != true.id else ():
+            # Where the rival shares a term with the true model, only what is the true model's own counts.
+            if own := [k for k in keys_of_true if k not in keys]:
+                counting = theta[:, np.isin(columns, regression.columns(own))]
+                squares.append(squares_left(regression, gram, own, [*question.shared, *keys], counting))
         if squares:
-            out[rival] = np.sqrt(np.maximum(np.min(squares, axis=0), 0.0))
+            out[rival] = np.sqrt(np.min(squares, axis=0))
     return out
 
 
-def drawn(true: Hypothesis, gram: np.ndarray) -> np.ndarray:
-    """Draws of a model's coefficients (DRAWS, k).
+def drawn(true: Hypothesis, gram: np.ndarray, count: int = DRAWS) -> np.ndarray:
+    """Draws of a model's coefficients, `count` of DRAWS, (count, k).
 
     What the set does not know of them is not as large as its doubt: the columns of one model are taken to contribute
     alike, so the coefficients, in units of their columns' length in the normal equations `gram` (k, k), are normal
@@ -342,7 +400,7 @@ def drawn(true: Hypothesis, gram: np.ndarray) -> np.ndarray:
     fits = [-(np.log(values + v) + along**2 / (values + v)).sum() for v in variances]
     variance = variances[int(np.argmax(fits))]
     kept = variance / (values + variance)
-    normal = np.random.default_rng(0).standard_normal((DRAWS, len(unit)))
+    normal = np.random.default_rng(0).standard_normal((DRAWS, len(unit)))[:count]
     return (kept * along + normal * np.sqrt(kept * values)) @ vectors.T * unit
 
 

@@ -35,7 +35,15 @@ from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.plan.limits import SessionLimits
 from rotorid.plan.plan import Tried, chosen_pieces, share_reached
 from rotorid.plan.questions import Question, claimed_in, question_of
-from rotorid.plan.separation import Information, Separation, of_set, separations, smallest_separation
+from rotorid.plan.separation import (
+    FITTED_SHARE,
+    Information,
+    Separation,
+    of_set,
+    separations,
+    smallest_separation,
+)
+from rotorid.plan.together import in_thirds
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
@@ -290,19 +298,24 @@ def asked(known: KnownInstrument) -> list[Term]:
 
 
 def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Information:
-    """What a step would hold, in the columns of the set's regression."""
-    model, name = known.model, "planned"
+    """What the fitted part of a step would hold, in the columns of the set's regression."""
+    return of_run(known, Run("planned", table_of(known, step)), terms).share(FITTED_SHARE)
+
+
+def of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Information:
+    """What a run after the set would hold, in the columns of the set's regression."""
+    model, name = known.model, run.name
     session, first = model.setup.session, known.recordings.runs[0].name
+    begins, seconds = float(run.time_s[0]), float(run.time_s[-1] - run.time_s[0])
     if session is not None:
-        later = session.start_s | {name: max(session.start_s.values(), default=0.0) + session.length_s}
+        later = session.start_s | {name: max(session.start_s.values(), default=0.0) + session.length_s + begins}
         warm = {name: session.first_temperature_c[first]} if first in session.first_temperature_c else {}
         session = replace(
             session,
-            first_s={**session.first_s, name: 0.0},
+            first_s={**session.first_s, name: begins},
             start_s=later,
             first_temperature_c={**session.first_temperature_c, **warm},
         )
-    run = Run(name, table_of(known, step))
     unseen = RecordingSet(name, known.recordings.vehicle, (run,), ())
     setup = with_unseen(replace(model.setup, session=session), unseen)
     own = setup.loadings[len(model.setup.loadings) :]
@@ -315,19 +328,27 @@ def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Inform
     every = known.regression.columns([t.key for t in terms])
     gram = np.zeros_like(known.regression.gram[0])
     gram[np.ix_(every, every)] = added.gram.sum(axis=0)
-    return Information(gram, None, step.duration_s)
+    return Information(gram, None, seconds)
+
+
+def fitted_runs(known: KnownInstrument, steps: Sequence[Step]) -> list[Run]:
+    """The runs of a session that the joint judgement fits: whole steps, or parts of the steps of a short session."""
+    runs = tuple(Run(f"step{i + 1:02d}", table_of(known, s)) for i, s in enumerate(steps))
+    whole = in_thirds(RecordingSet("planned", known.recordings.vehicle, runs, None))
+    fitted = split_runs(whole).training if len(whole.runs) >= 3 else [r.name for r in whole.runs]
+    return [r for r in whole.runs if r.name in fitted]
 
 
 def forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> SessionForecast:
     """What is expected of steps taken."""
     # What is mounted alike, and what is done alike, follows each other.
     taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
-    before = of_set(known)
+    steps, terms, before = tuple(t.piece for t in taken), asked(known), of_set(known)
     after = before
-    for t in taken:
-        after = after + t.information
+    for run in fitted_runs(known, steps) if steps else ():
+        after = after + of_run(known, run, terms)
     questions = tuple((q.ids, tuple(separations(known, q, before, after))) for q in known.questions)
-    return SessionForecast(name, tuple(t.piece for t in taken), questions)
+    return SessionForecast(name, steps, questions)
 
 
 def standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]:

@@ -1,14 +1,15 @@
 """The separation predicted from normal equations is the loss difference that the engine then finds."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rotorid.mismatch.plant.regression import build
+from rotorid.mismatch.plant.regression import bounded, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.plan.questions import Hypothesis, Question
-from rotorid.plan.separation import Information, drawn, left_over, log_odds, separations
+from rotorid.plan.separation import Information, drawn, log_odds, separations, squares_left, within
 
 RATE = 40.0
 THETA = 0.3
@@ -49,17 +50,46 @@ def known_of(reg):
     return SimpleNamespace(regression=reg)
 
 
-def size_of(reg) -> float:
-    """λ of a with THETA against the best form of b."""
+def size_of(reg, theta: float = THETA) -> float:
+    """λ of a with `theta` against the best form of b."""
     forms = (["mass", "b/form"], ["mass", "b/other"])
-    return min(THETA**2 * left_over(reg, reg.gram.sum(axis=0), ["a/form"], others)[0, 0] for others in forms)
+    gram, own = reg.gram.sum(axis=0), np.array([[theta]])
+    return min(float(squares_left(reg, gram, ["a/form"], others, own)[0]) for others in forms)
 
 
-def test_prediction_is_the_difference_that_a_fit_finds() -> None:
-    # Trust enters the prediction as what it costs to move a value; `explained` counts the rows alone.
-    reg = regression(1, 1e-9, 0.9, trust=10.0)
+@pytest.mark.parametrize("trust", [10.0, 0.05, 0.001])
+def test_prediction_is_the_difference_that_a_fit_finds(trust: float) -> None:
+    # Where the mass is trusted hardly at all, as usual, and so much that it hardly moves.
+    reg = regression(1, 1e-9, 0.9, trust)
     found = reg.explained(["mass", "a/form"]) - reg.explained(["mass", "b/form"])
     assert size_of(reg) == pytest.approx(found, rel=1e-3)
+
+
+def test_no_value_moves_beyond_the_limit_of_the_fit() -> None:
+    # A contribution of which the mass would take over more than its limit.
+    rng, theta = np.random.default_rng(0), 3.0
+    x = np.zeros((2000, 12, 4))
+    x[:, 0, 0] = rng.standard_normal(2000)
+    x[:, 0, 1] = 0.5 * x[:, 0, 0] + 0.1 * rng.standard_normal(2000)
+    x[:, 0, 2:] = rng.standard_normal((2000, 2))
+    y = np.zeros((2000, 12))
+    y[:, 0] = theta * x[:, 0, 1]
+    rows = [Rows("run", np.arange(2000) / RATE, y, x)]
+    reg = build(rows, terms(10.0), {0: np.array([1.0])}, lambda run, t: True, 1.0, RATE)
+    found = reg.explained(["mass", "a/form"]) - max(reg.explained(["mass", k]) for k in ("b/form", "b/other"))
+    assert size_of(reg, theta) == pytest.approx(found, rel=1e-3)
+    free = reg.with_room(np.inf)
+    assert size_of(free, theta) < 0.2 * size_of(reg, theta)
+
+
+def test_many_right_sides_are_solved_within_limits_as_the_fit_solves_one() -> None:
+    rng = np.random.default_rng(4)
+    root = rng.standard_normal((5, 9))
+    normal, right = root @ root.T, 10 * rng.standard_normal((50, 5))
+    limit = np.array([np.inf, 0.5, 0.2, np.inf, 0.1])
+    expected = [bounded(normal, r, limit)[0] for r in right]
+    assert within(normal, right, limit) == pytest.approx(np.array(expected), rel=1e-4, abs=1e-4)
+    assert (np.abs(expected) > 0.99 * limit).any(axis=0)[[1, 2, 4]].all()
 
 
 def test_with_noise_the_difference_lies_within_its_own_standard_deviation() -> None:
@@ -96,8 +126,21 @@ def test_of_two_loops_the_worse_is_stated_and_the_interval_is_over_both() -> Non
 
 def test_copies_cannot_be_told_apart() -> None:
     reg = regression(3, 1.0, 1.0)
-    left = left_over(reg, reg.gram.sum(axis=0), ["a/form"], ["mass", "b/form"])
-    assert THETA**2 * left[0, 0] < 1e-3
+    left = squares_left(reg, reg.gram.sum(axis=0), ["a/form"], ["mass", "b/form"], np.array([[THETA]]))
+    assert left[0] < 1e-3
+
+
+def test_a_form_that_the_set_does_not_distinguish_has_draws_too() -> None:
+    reg = regression(2, 1.0, 0.9)
+    once = Information(reg.gram.sum(axis=0))
+    (a,) = QUESTION.hypotheses
+    # Another form of a, three times as probable, contributes a tenth.
+    small = replace(a, beta=a.beta / 10, covariance=a.covariance / 100, weight=3.0)
+    question = replace(QUESTION, hypotheses=(replace(a, others=(small,)),))
+    (plain,) = separations(known_of(reg), QUESTION, once, once)
+    (both,) = separations(known_of(reg), question, once, once)
+    assert both.sigma < plain.sigma / 4
+    assert both.interval_95[1] == pytest.approx(plain.interval_95[1], rel=0.2)
 
 
 def test_draws_are_as_doubtful_as_the_set_and_no_larger_than_what_it_found() -> None:

@@ -127,7 +127,9 @@ def test_a_session_settles_an_open_question_and_is_written(known, tmp_path: Path
     assert {other.name for other in (plan, *plan.others)} == {"chosen", "second", "standard"}
     assert all(plan.reached(6.0) >= other.reached(6.0) - 0.01 for other in plan.others)
     said = write_session.text(plan)
-    assert any(line.startswith("The standard session (slow steps along z") for line in said)
+    # Of sessions that reach as much the shortest is the plan: here the standard one reaches more.
+    stated = any(line.startswith("The standard session (slow steps along z") for line in said)
+    assert stated == (plan.name != "standard")
     written = json.loads((tmp_path / "plan" / "plan.json").read_text())["others"]
     assert [o["name"] for o in written] == [o.name for o in plan.others] and all(o["steps"] for o in written)
     assert said[0].startswith(f"Record {len(plan.steps)} runs") and any(line.startswith("By hand") for line in said)

@@ -12,7 +12,7 @@ Fuller, Measurement Error Models, 1987, ch. 2).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -229,6 +229,13 @@ class Regression:
         wider = replace(self)  # fits remembered are those of the narrower limits
         wider.limit = np.maximum(self.limit, least)
         return wider
+
+    def narrowed(self, places: Mapping[str, np.ndarray]) -> Regression:
+        """The same where of some terms (keys of `places`) these columns of their own (numbers from 0) count alone."""
+        narrow = replace(self)
+        narrow.limit = self.limit
+        narrow._where = self._where | {key: self._where[key][at] for key, at in places.items()}
+        return narrow
 
     def given(self, cols: np.ndarray, beta: np.ndarray) -> Regression:
         """The same where the coefficients `beta` (k,) of the columns `cols` are known: what they add is taken off."""
