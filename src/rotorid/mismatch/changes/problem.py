@@ -35,6 +35,9 @@ LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 """Relative change of a value up to which it does not matter, and the largest."""
 LEAST_GAIN = 0.005
 """The least one of a reading's gain."""
+FREE = 10.0
+"""Variance of what is common to both sets, in units of what one row determines. With 1 what the first set hardly excites is
+taken for a change; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
 UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
 RIDGE = 1e-4
@@ -101,9 +104,9 @@ def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) 
     """Log posterior of changes and leftover together, nats, less a constant."""
     variance = found.problem.variance
     base, new = (s.weighed(variance) for s in spectra)
-    rows = spectra[1].rows
-    of_common = integrated(base.gram + new.gram, base.cross + new.cross, np.full(len(base.cross), rows))
-    of_usual = integrated(*difference_products(base, new, rows), in_units(spread, spectra[1].unit) ** 2)
+    free = FREE * spectra[1].rows
+    of_common = integrated(base.gram + new.gram, base.cross + new.cross, np.full(len(base.cross), free))
+    of_usual = integrated(*difference_products(base, new, free), in_units(spread, spectra[1].unit) ** 2)
     return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in spectra)
 
 
@@ -205,15 +208,18 @@ def products_of_changes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """S̃ (K, K) and s̃ (K,) of the module's equations, scaled."""
     base, new = (s.weighed(variance) for s in spectra)
-    gram, cross = difference_products(base, new, spectra[1].rows)
+    gram, cross = difference_products(base, new, FREE * spectra[1].rows)
     usual = in_units(spread, spectra[1].unit) ** 2
     gram, cross = np.hsplit(np.linalg.solve(np.eye(len(cross)) + gram * usual, np.column_stack([gram, cross])), [-1])
     return 0.5 * (gram + gram.T), cross[:, 0]
 
 
-def difference_products(base: Weighed, new: Weighed, rows: float) -> tuple[np.ndarray, np.ndarray]:
-    """S (K, K) and s (K,): products of the second set with what is common to both integrated out, scaled."""
-    inverse = np.linalg.inv(base.gram + new.gram + np.eye(len(base.cross)) / rows)
+def difference_products(base: Weighed, new: Weighed, free: float) -> tuple[np.ndarray, np.ndarray]:
+    """S (K, K) and s (K,): products of the second set with what is common to both integrated out, scaled.
+
+    `free` is the variance of the common coefficients.
+    """
+    inverse = np.linalg.inv(base.gram + new.gram + np.eye(len(base.cross)) / free)
     return new.gram - new.gram @ inverse @ new.gram, new.cross - new.gram @ inverse @ (base.cross + new.cross)
 
 
