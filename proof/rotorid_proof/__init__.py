@@ -31,6 +31,7 @@ OPEN = (
     "plots",
     "quoted",
     "real",
+    "row_by_row",
     "show",
     "studies",
     "without_rules",

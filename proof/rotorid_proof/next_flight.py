@@ -8,16 +8,11 @@ same with sessions in place of flights.
 
 from __future__ import annotations
 
-import sys
-import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
-from pathlib import Path
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 import pandas as pd
 
-from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.plant.regression import Regression
 from rotorid.mismatch.plant.rows import Term
@@ -27,7 +22,7 @@ from rotorid.plan.questions import Known, Question, best_of
 from rotorid.plan.separation import Separation, recorded_after
 from rotorid.plan.session import KnownInstrument, SessionPlan
 from rotorid.plan.together import answers, joined_sets
-from rotorid.recordings import RecordingSet, read_set
+from rotorid.recordings import RecordingSet
 from rotorid.report.deliver import analysis_of
 from rotorid_proof.intervals import wilson
 
@@ -75,13 +70,6 @@ class Row:
     """The same as recorded."""
 
 
-def as_read(recording, write_set: Callable, name: str) -> RecordingSet:
-    """A simulator's recording as a user's files would hand it over."""
-    with tempfile.TemporaryDirectory() as folder:
-        write_set(recording, Path(folder) / name)
-        return read_set(Path(folder) / name)
-
-
 def judged(first: RecordingSet, second: RecordingSet, ids: tuple[str, ...], truth: set[str]):
     """Outcome, sentence, and both sets as one, as `rotorid together` judges them."""
     whole, _ = joined_sets(first, second)
@@ -92,29 +80,6 @@ def classes_in(found: Known | KnownInstrument) -> list[tuple[str, ...]]:
     """Ids of every class that is open; what is only suggested is compared with nothing and is no class."""
     classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
     return [ids for ids in classes if len(ids) > 1 and NOTHING not in ids]
-
-
-def rows_of(cases: Sequence, row_of: Callable, kept: Path, code: str) -> pd.DataFrame:
-    """A row of every case, by `row_of(case)`, each written to `kept` as it comes.
-
-    A row of another `code` stays in `kept` until its case is judged anew; a case that cannot be judged is named on the
-    standard error stream and has none.
-    """
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
-    done = {r["case"] for r in rows if str(r["judged_by"]) == code}
-    for case in cases:
-        if case.name in done:
-            continue
-        try:
-            row = replace(row_of(case), judged_by=code)
-        except InputError as error:
-            print(f"{case.name}: {error}", file=sys.stderr)
-            continue
-        rows = [r for r in rows if r["case"] != case.name] + table([row]).to_dict("records")
-        pd.DataFrame(rows).to_csv(kept, index=False)
-        print(rows[-1], file=sys.stderr, flush=True)
-    return pd.DataFrame(rows)
 
 
 def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:

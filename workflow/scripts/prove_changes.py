@@ -7,16 +7,13 @@
 - Writes the row of every pair as it comes, so that an interrupted proof goes on where it stopped.
 """
 
-import sys
 import warnings
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-import pandas as pd
-
-from rotorid.errors import InputError
 from rotorid.report import log
 from rotorid_proof.changes import pairs, score
+from rotorid_proof.row_by_row import rows_of
 
 
 def main(
@@ -29,34 +26,14 @@ def main(
     code: str = "",
     drawn_pairs: int = 100,
     drawn_halves: int = 100,
-    only: str = "",
-    part: int = 0,
-    parts: int = 1,
 ) -> None:
     """Write `table` (a row a pair) and `summary`; rows are kept in `so_far` as they come.
 
-    A row of another `code` stays until its pair is compared anew. `only` takes pairs whose name begins so; `part` of
-    `parts` takes every so many.
+    Of each simulator `drawn_pairs` pairs and `drawn_halves` sets are drawn from `seed`, the hash of a commit.
     """
     warnings.simplefilter("ignore")
-    kept = Path(so_far)
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    rows = pd.read_csv(kept, keep_default_na=False).to_dict("records") if kept.is_file() else []
-    done = {r["pair"] for r in rows if str(r["judged_by"]) == code}
     chosen = pairs.pairs_of(seed, Path(recordings), Path(plantings), drawn_pairs, drawn_halves)
-    known: dict = {}
-    for pair in [p for p in chosen if p.name.startswith(only)][part::parts]:
-        if pair.name in done:
-            continue
-        try:
-            row = replace(pairs.compared(pair, known), judged_by=code)
-        except (InputError, RuntimeError) as error:
-            print(f"{pair.name}: {error}", file=sys.stderr, flush=True)
-            continue
-        rows = [r for r in rows if r["pair"] != row.pair] + score.table([row]).to_dict("records")
-        pd.DataFrame(rows).to_csv(kept, index=False)
-        print(f"{row.pair}: {row.changed or 'nothing'} -> {row.claims or 'nothing'}", file=sys.stderr, flush=True)
-    found = pd.DataFrame(rows)
+    found = rows_of(chosen, partial(pairs.compared, known={}), score.table, Path(so_far), code, key="pair")
     found.to_csv(table, index=False)
     score.summary(found).to_csv(summary, index=False)
 

@@ -19,6 +19,7 @@ from rotorid.recordings import RecordingSet
 from rotorid.report import log
 from rotorid.report.deliver import judge
 from rotorid_proof import next_flight as proof
+from rotorid_proof.row_by_row import as_read, rows_of
 
 
 def by_hand(case, answer: dict, found: Known, made, question, true: str, simulator) -> dict:
@@ -33,7 +34,7 @@ def by_hand(case, answer: dict, found: Known, made, question, true: str, simulat
     change = hand.change
     step = {"swapped": change.pairs, "mass_kg": change.mass_kg, "place_m": change.place_m}
     flown = simulator.record_by_hand(case, answer, hand.hover_s, **step)
-    recorded = proof.as_read(flown, simulator.write_set, "by hand")
+    recorded = as_read(flown, simulator.write_set, "by hand")
     measured = proof.measured_after(found, question, change, recorded, true)
     return {"by_hand": change.words, "by_hand_sigma": expected.sigma, "by_hand_measured": measured}
 
@@ -60,7 +61,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     }
     outcome, measured, said = {}, {}, {}
     for name, reference in references.items():
-        second = proof.as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
+        second = as_read(simulator.record(case, answer, {name: reference}), simulator.write_set, "second")
         outcome[name], said[name], whole = proof.judged(first, second, ids, truth)
         if question is not None:
             measured[name] = proof.measured(found, known(whole), question, named)
@@ -109,9 +110,9 @@ def main(
 
     def row(case) -> proof.Row:
         recording, answer, _ = scene.make(case.settings, case.seed)
-        return row_of(case, answer, proof.as_read(recording, simulator.write_set, "first"), simulator, allowed)
+        return row_of(case, answer, as_read(recording, simulator.write_set, "first"), simulator, allowed)
 
-    found = proof.rows_of(cases, row, Path(so_far), code)
+    found = rows_of(cases, row, proof.table, Path(so_far), code)
     found.to_csv(table, index=False)
     proof.summary(found).to_csv(summary, index=False)
 

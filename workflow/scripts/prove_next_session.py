@@ -20,6 +20,7 @@ from rotorid.recordings import RecordingSet
 from rotorid.report import log
 from rotorid.report.deliver import judge
 from rotorid_proof import next_flight as proof
+from rotorid_proof.row_by_row import as_read, rows_of
 
 
 def standard_as_long(made: SessionPlan) -> list[Step]:
@@ -60,7 +61,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: SessionLi
     for name, steps in {"planned": list(made.steps), "standard": standard_as_long(made)}.items():
         if not steps:
             continue
-        second = proof.as_read(simulator.record(case, answer, as_table(found, steps)), simulator.write_set, "second")
+        second = as_read(simulator.record(case, answer, as_table(found, steps)), simulator.write_set, "second")
         outcome[name], said[name], whole = proof.judged(first, second, ids, truth)
         measured[name] = proof.measured(found, known_instrument(whole), question, named)
     row = proof.Row(
@@ -92,11 +93,11 @@ def main(table: str, summary: str, so_far: str, release: str, code: str = "", dr
 
     def row(case) -> proof.Row:
         recording, answer, _ = simulator.make(case.settings, case.seed)
-        first = proof.as_read(recording, simulator.write_set, "first")
+        first = as_read(recording, simulator.write_set, "first")
         return row_of(case, answer, first, simulator, SessionLimits())
 
     cases = [case for number in range(draws) for case in simulator.look_alikes(release, number)]
-    found = proof.rows_of(cases, row, Path(so_far), code)
+    found = rows_of(cases, row, proof.table, Path(so_far), code)
     found.to_csv(table, index=False)
     proof.summary(found, "session").to_csv(summary, index=False)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from rotorid.recordings import RecordingSet, read_set
 from rotorid_proof.changes import score
 from rotorid_proof.plantings.plan import Planting, read_list
 from rotorid_proof.plantings.sow import plant
+from rotorid_proof.row_by_row import as_read
 
 
 @dataclass(frozen=True)
@@ -65,22 +65,14 @@ DRIFTING = ("skewed",)
 """Families of which the second half differs from the first: a clock that runs too fast is later there."""
 
 
-def as_read(recording, name: str) -> RecordingSet:
-    """A recording as a user's files would hand it over."""
-    from rotorid_proof.concealed.write import write_set
-
-    with tempfile.TemporaryDirectory() as folder:
-        write_set(recording, Path(folder) / name)
-        return read_set(Path(folder) / name)
-
-
 def drawn(seed: str, count: int) -> Iterator[Pair]:
     """Drawn pairs of each simulator."""
     from rotorid_proof.concealed import pairs
+    from rotorid_proof.concealed.write import write_set
 
     def made(name: str) -> Made:
         pair = pairs.make(name)
-        sets = as_read(pair.base, "base"), as_read(pair.new, "new")
+        sets = as_read(pair.base, write_set, "base"), as_read(pair.new, write_set, "new")
         return Made(*sets, score.sought_in(pair.truth), tuple(pair.truth["fair"]))
 
     for name in pairs.names(seed, count):
@@ -90,10 +82,11 @@ def drawn(seed: str, count: int) -> Iterator[Pair]:
 def halves(seed: str, count: int) -> Iterator[Pair]:
     """The halves of drawn sets."""
     from rotorid_proof.concealed import drawn as sets
+    from rotorid_proof.concealed.write import write_set
 
     def made(name: str, key: int) -> Made:
         recording, _, _ = sets.make(name, key)
-        return Made(*score.halves(as_read(recording, "set")))
+        return Made(*score.halves(as_read(recording, write_set, "set")))
 
     for number in range(count):
         for simulator in ("multibody", "continuous"):

@@ -36,8 +36,8 @@ LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 LEAST_GAIN = 0.005
 """The least one of a reading's gain."""
 FREE = 10.0
-"""Variance of what is common to both sets, in units of what one row determines. With 1 what the first set hardly
-excites is taken for a change; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
+"""Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
+name; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
 UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
 RIDGE = 1e-4

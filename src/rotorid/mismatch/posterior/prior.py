@@ -29,7 +29,7 @@ class Prior:
     """Relative change that such a value may have at most: one further off is a mistake of its own (`doubts`)."""
     change_reach: float = 5.0
     """One-sigma of a change between two sets of flights at least, in units of what it looks like where nothing changed:
-    its estimate then shrinks by four hundredths. Wider ones let large changes that cancel be found."""
+    an estimate that nothing else limits shrinks by four hundredths. Ten lets large changes be found that cancel."""
     slack: float = 1.5
     """Standard errors by which a coefficient may lie beyond its physical bound, as an estimate of one on the bound."""
     shown: float = 2.0
