@@ -79,6 +79,7 @@ EFFECT = Effect(
     confusers=("inertia_products",),
     separating_manoeuvre="record ten seconds at rest before take-off",
     kind="sensor",
-    # Assumed: a zero that was averaged before take-off, and a board on rubber that turns a little.
-    between_flights={"rad/s": 0.01, "rad": 0.003},
+    # Zeros: against the recorded attitude they differ by 0.001 rad/s between four flights of NeuroBEM, by 0.003 between
+    # six of imrc's, widened for so few. Alignment: assumed, of a board on rubber that turns a little.
+    between_flights={"rad/s": 0.004, "rad": 0.003},
 )

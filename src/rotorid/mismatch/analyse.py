@@ -6,7 +6,7 @@ established, and on the believed values, 4. what is left.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_
 from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.decide import coefficients, exchangeable, throttle_or_thrust, wrench_findings
+from rotorid.mismatch.decision.decide import coefficients, throttle_or_thrust, wrench_findings
 from rotorid.mismatch.decision.evidence import weighed
 from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, Trace
 from rotorid.mismatch.decision.probability import with_probabilities
@@ -42,7 +42,6 @@ from rotorid.mismatch.model.payload_windows import loads, on_board
 from rotorid.mismatch.model.prepare import Prepared, prepare
 from rotorid.mismatch.model.refitted import refitted, values_alone
 from rotorid.mismatch.model.report_runs import on_every_run, scaled_by_run
-from rotorid.mismatch.model.value_sides import sides_of_values
 from rotorid.mismatch.model.values import (
     changed_vehicle,
     contract_values,
@@ -225,7 +224,7 @@ def account(
         next_separates=fly.separates,
         force_source=model.segments[0].force_source,
         notes=(*choice.remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
-        instead=instead_of(model, values),
+        instead=instead_in_words(found.instead),
         corrected=within_trust.in_words(moved),
     )
 
@@ -343,14 +342,11 @@ def not_testable(prepared: Prepared, chain: CommandChain | None, findings: list[
     return {k: v for k, v in reasons.items() if k not in known}
 
 
-def instead_of(model: WrenchModel, values: Values) -> dict[str, tuple[str, ...]]:
+def instead_in_words(instead: Mapping[str, Sequence[Values]]) -> dict[str, tuple[str, ...]]:
     """Contract name of a wrong value to others, in words, that would explain as much in its place."""
-    if not values:
-        return {}
-    found = exchangeable(sides_of_values(model).judging, model.selection, values)
     return {
         PARAMETER_NAMES[key]: tuple(filter(None, (" with ".join(within_trust.in_words(x)) for x in as_well)))
-        for key, as_well in found.items()
+        for key, as_well in instead.items()
     }
 
 

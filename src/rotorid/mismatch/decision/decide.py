@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
@@ -16,14 +16,13 @@ from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.decision.select import (
     LEAST_PROMISE,
     LEAST_TRANSFER,
-    SHARE_OF_LARGEST,
     SMALLEST_SIZE,
     VALUE_FLOOR,
     Search,
     Selection,
 )
 from rotorid.mismatch.plant.contributions import Contributions
-from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression
+from rotorid.mismatch.plant.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.plant.rows import CHANNELS, Rows
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
@@ -193,23 +192,19 @@ def fails_elsewhere(
 def wrong_values(
     regression: Regression,
     selection: Selection,
-    reverse: Regression | None,
     size_of: Callable[[str, float], float],
     moving: bool = True,
     refused: Collection[str] = (),
-    measured_moment: bool = True,
 ) -> dict[str, tuple[float, float]]:
     """The fewest believed values that must change: relative change and one-sigma.
 
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
     counts, but only up to MOST_DISTRUST per value: a number may be far off, and a wrong mass must not be
-    sold as a wrong thrust and three wrong inertias. A value is named only where the regression from the other side
-    (`reverse`, with `measured_moment` that with measured moments as regressors) agrees, where it survives on the
-    held-out part, and where it matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative
-    change)`). `moving` is False on a stand, where a mass only weighs; `refused` values are not called wrong.
+    sold as a wrong thrust and three wrong inertias. A value is named only where it survives on the held-out part, and
+    where it matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is
+    False on a stand, where a mass only weighs; `refused` values are not called wrong.
     """
     regression = regression.with_room(LEAST_ROOM)
-    reverse = None if reverse is None else reverse.with_room(LEAST_ROOM)
     nuisance = regression.keys_of("nuisance", "wind")
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
@@ -235,20 +230,16 @@ def wrong_values(
     at_limits: list[list[str]] = []
     while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
         fit = regression.fit(always + named, loose=loose)
-        other = reverse.fit(always + named, loose=loose) if reverse is not None else fit
         certainty, pinned = {}, False
         for key in named:
             beta, covariance = coefficients(regression, fit, key)
             change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
-            check = float(coefficients(reverse or regression, other, key)[0][0])
             noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
-            agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
-            agrees = not rules.VALUE_AGREES(not agrees)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
             fails = rules.VALUE_TRANSFER(fails_elsewhere(regression, always, named, key, loose))
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not agrees or not matters:
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:
             # Two values that run away together say nothing against either of them alone.
@@ -261,60 +252,13 @@ def wrong_values(
     if not named:
         return {}
     fit = regression.fit(always + named, jackknife=True, loose=loose)
-    other = fit if reverse is None else reverse.fit(always + named, loose=loose)
     out = {}
     for key in named:
         beta, covariance = coefficients(regression, fit, key)
         change, sd = float(beta[0]), float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
         if moving:
             change, sd = relative_change(key, change, sd)
-            check = float(coefficients(reverse or regression, other, key)[0][0])
-            apart = change - relative_change(key, check, 0.0, reverse is not None and measured_moment)[0]
-            # The truth lies between the two sides: as a uniform distribution has it, a twelfth of the square.
-            sd = float(np.hypot(sd, apart / np.sqrt(12)))
         out[key] = change, sd
-    return out
-
-
-def exchangeable(
-    regression: Regression, selection: Selection, values: Iterable[str]
-) -> dict[str, list[dict[str, tuple[float, float]]]]:
-    """To each value called wrong what would explain as much in its place: relative changes and one-sigmas.
-
-    Often a recording knows a ratio alone (thrust over mass, torque over inertia); which of two is called wrong rests
-    then on what the user trusts. As much: given the others it explains less than a further value must, or than any
-    form is wrong by. Where no other value does so alone, the two that leave it least (an arm is both inertias as well).
-    """
-    named = list(values)
-    regression = regression.with_room(VALUE_LIMITS[1])
-    always = regression.keys_of("nuisance", "wind") + selection.active
-    loose = dict.fromkeys(regression.keys_of("value"), WIDEST_TRUST)
-    unnamed = [k for k in loose if k not in named]
-
-    def fitted(keys: list[str]) -> Fit:
-        return regression.fit([*always, *keys], loose=loose)
-
-    def replaced(key: str, others: tuple[str, ...]) -> tuple[float, dict[str, tuple[float, float]]]:
-        """What a value still explains given others (infinite where one is at its limit), and their changes."""
-        fit = fitted([*(k for k in named if k != key), *others])
-        changes = {}
-        for other in others:
-            beta, covariance = coefficients(regression, fit, other)
-            if abs(beta[0]) > 0.98 * regression.limit[regression.start[other]]:
-                return np.inf, {}
-            sd = float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
-            changes[other] = relative_change(other, float(beta[0]), sd)
-        return fitted([*named, *others]).gain - fit.gain, changes
-
-    out: dict[str, list[dict[str, tuple[float, float]]]] = {}
-    for key in named:
-        alone = fitted(named).gain - fitted([k for k in named if k != key]).gain
-        most = max(COST_PER_VALUE, SHARE_OF_LARGEST**2 * alone)
-        found = [replaced(key, (other,)) for other in unnamed]
-        if not any(still < most for still, _ in found):
-            found = sorted((replaced(key, two) for two in combinations(unnamed, 2)), key=lambda f: f[0])[:1]
-        if as_well := [changes for still, changes in found if still < most]:
-            out[key] = as_well
     return out
 
 

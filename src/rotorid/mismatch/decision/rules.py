@@ -157,7 +157,6 @@ THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a
 
 # Believed values
 
-VALUE_AGREES = rule("value_agrees", "A wrong value is found by the forward and by the inverse regression.")
 VALUE_TRANSFER = rule("value_transfer", "The gain that a wrong value predicts is realised where it was not fitted.")
 VALUE_IN_QUESTION = rule(
     "value_in_question", "A value that a member of an open class would change is not called wrong."

@@ -115,7 +115,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
 
     def values_in(model: ReadingModel, selection: Selection, refused: Collection[str] = ()) -> Values:
         size = sizes_of_values(model)
-        return wrong_values(model.regression, selection, None, size, moving=False, refused=refused)
+        return wrong_values(model.regression, selection, size, moving=False, refused=refused)
 
     def among(model: ReadingModel, terms: list[Term]) -> ReadingModel:
         kept = {t.key for t in terms}

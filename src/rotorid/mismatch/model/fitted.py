@@ -7,8 +7,8 @@ known, 4. less what may as well be nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,16 +16,15 @@ from rotorid.effects.catalogue import ids_of_stage
 from rotorid.effects.contract import CURVE, Form
 from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.decide import coefficients, wrong_values
+from rotorid.mismatch.decision.decide import coefficients
 from rotorid.mismatch.decision.findings import Reason
 from rotorid.mismatch.decision.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.model.delivered import Values
+from rotorid.mismatch.model.gains import wrong_values_of
 from rotorid.mismatch.model.gusts import with_gusts
 from rotorid.mismatch.model.payload_windows import Windows, changes, loads, payload_windows_of, with_payload_on_board
 from rotorid.mismatch.model.prepare import Prepared
-from rotorid.mismatch.model.refitted import size_of_value
 from rotorid.mismatch.model.swinging import hung, like, price, swinging_term, with_likely_length
-from rotorid.mismatch.model.value_sides import sides_of_values
 from rotorid.mismatch.model.within_trust import beyond_trust
 from rotorid.mismatch.model.wrench import (
     WrenchModel,
@@ -62,6 +61,8 @@ class Fitted:
     """None where no command is recorded."""
     measured: bool
     """Whether rotor speeds are measured."""
+    instead: Mapping[str, Sequence[Values]] = field(default_factory=dict)
+    """To each value called wrong what would explain as much in its place."""
 
     @property
     def prepared(self) -> Prepared:
@@ -82,7 +83,8 @@ def fitted(prepared: Prepared) -> Fitted:
         model = refined_model(prepared, *turning(prepared))
     else:
         chain, model = with_chain(prepared, chain)
-    return Fitted(model, values_called_wrong(model, ()), chain, measured)
+    found = wrong_values_of(model)
+    return Fitted(model, found.values, chain, measured, found.instead)
 
 
 def turning(prepared: Prepared, chain: CommandChain | None = None):
@@ -116,7 +118,7 @@ def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, W
 
 def strains(model: WrenchModel) -> bool:
     """Whether the recordings ask a value that is not called wrong to move beyond its trust."""
-    return beyond_trust(model, values_called_wrong(model, ()), model.selection.active)
+    return beyond_trust(model, wrong_values_of(model).values, model.selection.active)
 
 
 def only_scales(result: SpeedResult) -> bool:
@@ -239,14 +241,6 @@ def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
     """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
     runs = dict.fromkeys([*(s.run for s in prepared.segments), *prepared.unseen])
     return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(RUN_TRUST,), run=r) for r in runs)]
-
-
-def values_called_wrong(model: WrenchModel, refused: Sequence[str]) -> Values:
-    """Believed values that the model's recordings contradict, less those refused."""
-    sides, size = sides_of_values(model), size_of_value(model)
-    return wrong_values(
-        sides.judging, model.selection, sides.agreeing, size, refused=refused, measured_moment=sides.measured_moment
-    )
 
 
 def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:

@@ -29,7 +29,7 @@ def values_alone(model: WrenchModel) -> Values:
     if model.wind is not None:
         return {}
     nothing = Selection([], model.selection.fit)
-    return wrong_values(model.search.regression, nothing, None, size_of_value(model))
+    return wrong_values(model.search.regression, nothing, size_of_value(model))
 
 
 def size_of_value(model: WrenchModel) -> Callable[[str, float], float]:

@@ -25,6 +25,16 @@ class Prior:
     """Nats that a believed value costs which may be wrong by more than that."""
     freed_sd: tuple[float, float] = (0.15, 0.5)
     """Least and largest relative one-sigma of such a value, else `value_reach` times its trust."""
+    right_sd: float = 0.004
+    """Relative one-sigma of a believed value that is right: nobody knows one better."""
+    most_freed: int = 3
+    """Values that are called wrong at once at most."""
+    gain_bias: tuple[float, float] = (0.14, 0.10)
+    """One-sigma that a gain between force or moment and motion is biased by, over √(leftover / own part of its
+    column): of all frequencies, and of those of `model.gains.VALUE_BAND`. Measured on 44 sets: the bias of right values
+    is 0.2 % (rms) where that root is below 0.03, 3 % where it is 0.1 to 0.3, 25 % above."""
+    gain_freedom: float = 30.0
+    """Degrees of freedom of a gain's variance."""
     freed_reach: float = 0.6
     """Relative change that such a value may have at most: one further off is a mistake of its own (`doubts`)."""
     change_reach: float = 5.0
