@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import lsq_linear
-from scipy.stats import chi2, f
+from scipy.special import chdtrc, fdtrc
 
 from rotorid.mismatch.plant.comparison import LEAST_RUNS, Comparison, environments, folds
 from rotorid.mismatch.plant.rows import Rows, Term
@@ -209,6 +209,8 @@ class Regression:
         return np.concatenate(parts) if parts else np.zeros(0, int)
 
     def __post_init__(self):
+        # Blocks last in memory: what is read of a pair of columns are all of its blocks.
+        self.gram = np.ascontiguousarray(self.gram.transpose(1, 2, 0)).transpose(2, 0, 1)
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
         self._total_gram = self.gram[self.training].sum(axis=0)
         self._total_cross = self.cross[self.training].sum(axis=0)
@@ -325,13 +327,11 @@ class Regression:
 
     def _normal(self, cols: np.ndarray, mask: np.ndarray):
         share = mask.sum() / len(mask)
-        grid = np.ix_(cols, cols)
+        grid = cols[:, None], cols
         if mask is self.training:
             gram, cross = self._total_gram[grid], self._total_cross[cols]
         else:
-            index = np.flatnonzero(mask)
-            gram = self.gram[np.ix_(index, cols, cols)].sum(axis=0)
-            cross = self.cross[np.ix_(index, cols)].sum(axis=0)
+            gram, cross = self.gram.transpose(1, 2, 0)[grid] @ mask, mask @ self.cross[:, cols]
         bias = limited_bias(gram, self.bias_gram[grid] * share)
         return gram, cross, bias, self.bias_cross[cols] * share
 
@@ -370,14 +370,17 @@ class Regression:
         beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
         self._fit_held_out_scales(cols, beta, mask)
         count = int(mask.sum())
-        every, explained = self.gram[:, cols[:, None], cols], self.cross[:, cols]
-        pull = every @ beta
-        scores, blocks = (explained - pull)[mask], every[mask]
+        every, explained = self.gram.transpose(1, 2, 0)[cols[:, None], cols], self.cross[:, cols]
+        pull = (beta @ every).T
+        scores = (explained - pull)[mask]
         if len(where):
-            blocks[:, where] = self.apart.gram[mask][:, own[:, None], cols]
-            scores[:, where] = self.apart.cross[mask][:, own] - blocks[:, where] @ beta
+            apart = self.apart.gram[:, own[:, None], cols]
+            scores[:, where] = (self.apart.cross[:, own] - apart @ beta)[mask]
         scores -= (bias_cross - bias @ beta) / count
         if jackknife:
+            blocks = every.transpose(2, 0, 1)[mask]
+            if len(where):
+                blocks[:, where] = apart[mask]
             eye = np.eye(len(cols))
             scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
         spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
@@ -552,7 +555,7 @@ class Regression:
         on noisy columns a true one would keep 1 − 2 λ of its promise where a share λ of the energy is noise.
         """
         _, _, bias, bias_cross = self._normal(cols, self.training)
-        gram, cross = self.gram[np.ix_(index, cols, cols)], self.cross[np.ix_(index, cols)]
+        gram, cross = self.gram[:, cols[:, None], cols][index], self.cross[np.ix_(index, cols)]
         return gram - bias / len(index), cross - bias_cross / len(index)
 
     def _doubt(self, index: np.ndarray, cols: np.ndarray, fold: np.ndarray, inverses: np.ndarray) -> np.ndarray:
@@ -603,7 +606,7 @@ class Regression:
         degrees = np.maximum((w > 0).sum(axis=0) - 1, 1)
         scale = w.sum(axis=0) - (w**2).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-300)
         spread = np.maximum(0.0, (q - degrees) / np.maximum(scale, 1e-300))
-        p = float(min(1.0, len(cols) * chi2.sf(q, degrees).min()))
+        p = float(min(1.0, len(cols) * chdtrc(degrees, q).min()))
         return spread / len(b), p
 
     def beyond(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -660,7 +663,7 @@ class Regression:
         q = len(b)
         if count - q < 2:
             return 1.0
-        return float(f.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
+        return float(fdtrc(q, count - q, statistic * (count - q) / (q * (count - 1))))
 
 
 def projected(
