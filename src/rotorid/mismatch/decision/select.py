@@ -11,7 +11,7 @@ import numpy as np
 
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Reason
-from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
+from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, hotelling, quadratic_form
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
@@ -135,9 +135,9 @@ class Search:
         cols = self.regression.columns([key])
         where = len(fit.columns) - len(cols) + np.arange(len(cols))
         beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
-        p_value = self.regression.wald(fit, cols, self.blocks)
-        gain = fit.gain - base.gain
         statistic = quadratic_form(beta, covariance)
+        p_value = hotelling(statistic, len(beta), self.blocks)
+        gain = fit.gain - base.gain
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         if physical:

@@ -212,8 +212,9 @@ class Regression:
         # Blocks last in memory: what is read of a pair of columns are all of its blocks.
         self.gram = np.ascontiguousarray(self.gram.transpose(1, 2, 0)).transpose(2, 0, 1)
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
-        self._total_gram = self.gram[self.training].sum(axis=0)
-        self._total_cross = self.cross[self.training].sum(axis=0)
+        self._total_gram = self.gram.transpose(1, 2, 0) @ self.training
+        self._total_cross = self.training @ self.cross
+        self._share = float(self.training.mean())
         self._place_apart = np.full(len(self._total_cross), -1)
         if self.apart is not None:
             self._place_apart[self.apart.columns] = np.arange(len(self.apart.columns))
@@ -306,28 +307,32 @@ class Regression:
         place = self._place_apart[cols]
         return np.flatnonzero(place >= 0), place[place >= 0]
 
-    def _equations(self, cols: np.ndarray, mask: np.ndarray):
+    def _equations(self, whole: tuple[np.ndarray, ...], cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
         """What `_normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
-        gram, cross, bias, bias_cross = self._normal(cols, mask)
+        if self.apart is None:
+            return whole
         where, own = self._apart(cols)
-        if len(where):
-            share, grid = mask.sum() / len(mask), np.ix_(own, cols)
-            if mask is self.training:
-                gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
-            else:
-                gram[where] = self.apart.gram[mask][:, own[:, None], cols].sum(axis=0)
-                cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
-            noise = self.apart.bias_gram[grid] * share
-            at = np.arange(len(where))
-            # As `limited_bias`, column by column: these channels' products alone are no symmetric matrix.
-            most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[at, where], 1e-300)
-            bias[where] = noise * np.minimum(1.0, most)[:, None]
-            bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
+        gram, cross, bias, bias_cross = (part.copy() for part in whole)
+        share, grid = self._share_of(mask), (own[:, None], cols)
+        if mask is self.training:
+            gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
+        else:
+            gram[where] = self.apart.gram[mask][:, *grid].sum(axis=0)
+            cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
+        noise = self.apart.bias_gram[grid] * share
+        # As `limited_bias`, column by column: these channels' products alone are no symmetric matrix.
+        most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[np.arange(len(where)), where], 1e-300)
+        bias[where] = noise * np.minimum(1.0, most)[:, None]
+        bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
         return gram, cross, bias, bias_cross
 
-    def _normal(self, cols: np.ndarray, mask: np.ndarray):
-        share = mask.sum() / len(mask)
-        grid = cols[:, None], cols
+    def _share_of(self, mask: np.ndarray) -> float:
+        """Share of the blocks that are in a mask."""
+        return self._share if mask is self.training else float(mask.mean())
+
+    def _normal(self, cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Products of columns with each other (k, k) and with the response (k,) in a mask, and the noise's of both."""
+        share, grid = self._share_of(mask), (cols[:, None], cols)
         if mask is self.training:
             gram, cross = self._total_gram[grid], self._total_cross[cols]
         else:
@@ -358,15 +363,16 @@ class Regression:
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
         cols = self.columns(keys)
-        gram, cross, bias, bias_cross = self._equations(cols, mask)
+        whole = self._normal(cols, mask)
+        gram, cross, bias, bias_cross = self._equations(whole, cols, mask)
         where, own = self._apart(cols)
         precision = self.precision
         if loose:
             precision = precision.copy()
             for key, sd in loose.items():
                 precision[self.columns([key])] = 1.0 / sd**2
-        prior = np.diag(precision[cols])
-        normal = gram - bias + prior
+        prior = precision[cols]
+        normal = raised(gram - bias, prior)
         beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
         self._fit_held_out_scales(cols, beta, mask)
         count = int(mask.sum())
@@ -386,17 +392,16 @@ class Regression:
         spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse.T
         # With the ridge, or two columns that are copies of each other would seem to be known.
-        noise = gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))
+        noise = raised(gram, prior + held + RIDGE * normal.diagonal())
         noise[:, where] = noise[where].T
         plain = inverse @ noise @ inverse.T
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
-        uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
+        uncorrected = ridge_inverse(raised(gram, prior + held)) @ (cross + held * at)
         values = np.isfinite(self.limit[cols])
         shift = trusted(DOUBT_OF_CORRECTION * (beta - uncorrected), normal, values, precision[cols])
         covariance = at_least(robust, plain) + np.outer(shift, shift)
         # What the regressors' noise adds to a block is no misfit: left in, a model that shrinks them all would be best.
-        if len(where):
-            bias, bias_cross = self._normal(cols, mask)[2:]
+        _, _, bias, bias_cross = whole
         added = float(beta @ bias @ beta - 2 * beta @ bias_cross) / count
         rss = self.square - 2 * explained @ beta + pull @ beta - added
         gain = float((self.square - rss)[mask].sum())
@@ -431,11 +436,10 @@ class Regression:
 
     def _explains(self, keys: tuple[str, ...]) -> float:
         cols = self.columns(keys)
-        gram, cross, bias, bias_cross = self._equations(cols, self.training)
-        normal = gram - bias + np.diag(self.precision[cols])
-        beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
-        if len(self._apart(cols)[0]):
-            gram, cross, bias, bias_cross = self._normal(cols, self.training)
+        whole = self._normal(cols, self.training)
+        gram, cross, bias, bias_cross = self._equations(whole, cols, self.training)
+        beta = bounded(raised(gram - bias, self.precision[cols]), cross - bias_cross, self.limit[cols])[0]
+        gram, cross, bias, bias_cross = whole
         return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
 
     def folds(self, whole_runs: bool) -> np.ndarray:
@@ -476,8 +480,8 @@ class Regression:
         found, inverses = [], []
         for out in range(fold.max() + 1):
             mask = self.training & (fold != out)
-            gram, cross, bias, bias_cross = self._equations(cols, mask)
-            normal = gram - bias + np.diag(precision[cols])
+            gram, cross, bias, bias_cross = self._equations(self._normal(cols, mask), cols, mask)
+            normal = raised(gram - bias, precision[cols])
             beta, inverse = bounded(normal, cross - bias_cross, self.limit[cols])[:2]
             found.append(beta)
             # Of a column that only this fold excites nothing is known without it.
@@ -616,10 +620,10 @@ class Regression:
         """
         others, own = self.columns(keys), self.columns([key])
         gram = self._total_gram
-        inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
+        inner = ridge_inverse(raised(gram[others[:, None], others], self.precision[others]))
         with np.errstate(divide="ignore"):
             most = MOST_DISTRUST / np.sqrt(self.precision[others])
-        pull = gram[np.ix_(others, own)] @ beta
+        pull = gram[others[:, None], own] @ beta
         taken = -inner @ pull
         if (np.abs(taken) > most).any():
             # |B x + B⁻ᵀ pull|² with Bᵀ B the normal matrix is the same square, completed; in units of each column.
@@ -647,10 +651,10 @@ class Regression:
         """Share of a term's energy along `beta` that the others of `keys` could not take over, and the share of that
         which is noise of the regressors."""
         cols, direction = self.beyond([k for k in keys if k != key], key, beta)
-        gram, bias = self._total_gram, self.bias_gram * self.training.mean()
-        own, grid = self.columns([key]), np.ix_(cols, cols)
-        whole = beta @ gram[np.ix_(own, own)] @ beta
-        energy, noise = direction @ gram[grid] @ direction, direction @ bias[grid] @ direction
+        own, grid = self.columns([key]), (cols[:, None], cols)
+        whole = beta @ self._total_gram[own[:, None], own] @ beta
+        energy = direction @ self._total_gram[grid] @ direction
+        noise = self._share * (direction @ self.bias_gram[grid] @ direction)
         return float(energy / max(whole, 1e-300)), float(noise / max(energy, 1e-300))
 
     def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
@@ -659,11 +663,12 @@ class Regression:
         where = np.argsort(fit.columns)[where]
         b = fit.beta[where]
         cov = fit.covariance[np.ix_(where, where)]
-        statistic = quadratic_form(b, cov)
-        q = len(b)
-        if count - q < 2:
-            return 1.0
-        return float(fdtrc(q, count - q, statistic * (count - q) / (q * (count - 1))))
+        return hotelling(quadratic_form(b, cov), len(b), count)
+
+
+def hotelling(statistic: float, q: int, count: int) -> float:
+    """p-value of Hotelling's T² of q coefficients over blocks."""
+    return float(fdtrc(q, count - q, statistic * (count - q) / (q * (count - 1)))) if count - q >= 2 else 1.0
 
 
 def projected(
@@ -701,8 +706,14 @@ def trusted(shift: np.ndarray, normal: np.ndarray, values: np.ndarray, precision
 
 def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
-    dead = diagonal <= NEVER_EXCITED
-    return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+    return np.where(diagonal <= NEVER_EXCITED, 0.0, 1.0 / np.sqrt(np.maximum(diagonal, NEVER_EXCITED)))
+
+
+def raised(matrix: np.ndarray, by: np.ndarray | float) -> np.ndarray:
+    """A square matrix with more on its diagonal."""
+    out = matrix.copy()
+    out.flat[:: len(out) + 1] += by
+    return out
 
 
 def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
@@ -722,31 +733,33 @@ def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
         at[worst] = np.sign(solution[worst]) * limit[worst]
         # One more number on the diagonal is a change of rank one (Sherman and Morrison).
         column, row = inverse[:, worst], inverse[worst]
-        inverse = inverse - np.outer(column, row) * (held[worst] / (1.0 + held[worst] * column[worst]))
+        inverse = inverse - column[:, None] * row * (held[worst] / (1.0 + held[worst] * column[worst]))
     return solution, inverse, held, at
 
 
 def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric normal matrix, scaled to unit diagonal, with a trace of ridge."""
-    scale = inverse_root(np.diag(matrix))
-    scaled = matrix * np.outer(scale, scale) + RIDGE * np.eye(len(matrix))
-    return np.linalg.inv(scaled) * np.outer(scale, scale)
+    scale = inverse_root(matrix.diagonal())
+    units = scale[:, None] * scale
+    return np.linalg.inv(raised(matrix * units, RIDGE)) * units
 
 
 def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """The noise's Gram matrix, held to MOST_ATTENUATION of the energy in every direction."""
     if not len(gram):
         return bias
-    scale = inverse_root(np.diag(gram))
-    if (np.diag(bias) * scale**2).sum() <= MOST_ATTENUATION * 1e-9:
+    scale = inverse_root(gram.diagonal())
+    units = scale[:, None] * scale
+    within = bias * units
+    if within.trace() <= MOST_ATTENUATION * 1e-9:
         return bias  # less than the limit in any direction that is kept below
-    scaled = gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram))
-    if np.trace(np.linalg.solve(scaled, bias * np.outer(scale, scale))) <= MOST_ATTENUATION:
+    scaled = raised(gram * units, 1e-9)
+    if np.linalg.solve(scaled, within).trace() <= MOST_ATTENUATION:
         return bias  # the shares of all directions together are no more
     values, vectors = np.linalg.eigh(scaled)
     values = np.maximum(values, 1e-9)
     back = vectors / np.sqrt(values)
-    inner = back.T @ (bias * np.outer(scale, scale)) @ back
+    inner = back.T @ within @ back
     share, turn = np.linalg.eigh((inner + inner.T) / 2)
     if share[-1] <= MOST_ATTENUATION:
         return bias
@@ -785,9 +798,10 @@ def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
 
 def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
     """valuesᵀ covariance⁻¹ values, in units of the coefficients' own standard errors."""
-    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    scaled = values / unit
-    return float(scaled @ np.linalg.pinv(covariance / np.outer(unit, unit), rcond=1e-10, hermitian=True) @ scaled)
+    unit = np.sqrt(np.maximum(covariance.diagonal(), 1e-300))
+    size, vectors = np.linalg.eigh(covariance / (unit[:, None] * unit))
+    known = np.abs(size) > 1e-10 * np.abs(size).max(initial=0.0)
+    return float(((values / unit @ vectors)[known] ** 2 / size[known]).sum())
 
 
 def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
