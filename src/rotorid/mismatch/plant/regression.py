@@ -212,8 +212,8 @@ class Regression:
         # Blocks last in memory: what is read of a pair of columns are all of its blocks.
         self.gram = np.ascontiguousarray(self.gram.transpose(1, 2, 0)).transpose(2, 0, 1)
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
-        self._total_gram = self.gram.transpose(1, 2, 0) @ self.training
-        self._total_cross = self.training @ self.cross
+        self._total_gram = self.gram[self.training].sum(axis=0)
+        self._total_cross = self.cross[self.training].sum(axis=0)
         self._share = float(self.training.mean())
         self._place_apart = np.full(len(self._total_cross), -1)
         if self.apart is not None:
@@ -392,13 +392,14 @@ class Regression:
         spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse.T
         # With the ridge, or two columns that are copies of each other would seem to be known.
-        noise = raised(gram, prior + held + RIDGE * normal.diagonal())
+        uncorrected = raised(gram, prior + held)
+        noise = raised(uncorrected, RIDGE * normal.diagonal())
         noise[:, where] = noise[where].T
         plain = inverse @ noise @ inverse.T
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
-        uncorrected = ridge_inverse(raised(gram, prior + held)) @ (cross + held * at)
+        without = ridge_inverse(uncorrected) @ (cross + held * at)
         values = np.isfinite(self.limit[cols])
-        shift = trusted(DOUBT_OF_CORRECTION * (beta - uncorrected), normal, values, precision[cols])
+        shift = trusted(DOUBT_OF_CORRECTION * (beta - without), normal, values, precision[cols])
         covariance = at_least(robust, plain) + np.outer(shift, shift)
         # What the regressors' noise adds to a block is no misfit: left in, a model that shrinks them all would be best.
         _, _, bias, bias_cross = whole
@@ -620,12 +621,13 @@ class Regression:
         """
         others, own = self.columns(keys), self.columns([key])
         gram = self._total_gram
-        inner = ridge_inverse(raised(gram[others[:, None], others], self.precision[others]))
+        normal = raised(gram[others[:, None], others], self.precision[others])
         with np.errstate(divide="ignore"):
             most = MOST_DISTRUST / np.sqrt(self.precision[others])
         pull = gram[others[:, None], own] @ beta
-        taken = -inner @ pull
-        if (np.abs(taken) > most).any():
+        taken, _, _, at = bounded(normal, -pull, most)
+        if (at * (normal @ taken + pull) > 0).any():  # one that is held would not be beyond its limit any more
+            inner = ridge_inverse(normal)
             # |B x + B⁻ᵀ pull|² with Bᵀ B the normal matrix is the same square, completed; in units of each column.
             unit = np.sqrt(np.maximum(np.diag(inner), 0.0))
             unit = np.where(unit > 0, unit, 1.0)
@@ -725,10 +727,11 @@ def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
     inverse = ridge_inverse(normal)
     for _ in range(len(right) + 1):
         solution = inverse @ (right + held * at)
-        out = np.where(held > 0, 0.0, np.abs(solution) / limit)
-        worst = int(np.argmax(out)) if len(out) else 0
-        if not len(out) or out[worst] <= 1.0:
+        out = np.abs(solution) / limit
+        out[held > 0] = 0.0
+        if out.max(initial=0.0) <= 1.0:
             break
+        worst = int(out.argmax())
         held[worst] = HOLD * max(normal[worst, worst], 1e-300)
         at[worst] = np.sign(solution[worst]) * limit[worst]
         # One more number on the diagonal is a change of rank one (Sherman and Morrison).
