@@ -241,7 +241,7 @@ def wrong_values(
             beta, covariance = coefficients(regression, fit, key)
             change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
             check = float(coefficients(reverse or regression, other, key)[0][0])
-            noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
+            noisy = regression.own_part([*always, *named], key, np.ones(1))[1] > MOST_ATTENUATION
             agrees = np.sign(check) == np.sign(change) and abs(check) > 0.3 * abs(change)
             agrees = not rules.VALUE_AGREES(not agrees)
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE

@@ -193,7 +193,6 @@ class Search:
         To judge one costs many times what `most` does: it is done only where no other is sure to be better.
         """
         base = self.regression.fit(self.always + active)
-        waiting: list[tuple[int, float, int, Term | Candidate]]
         waiting = [(turn(t), -self.most(t, active), number, t) for number, t in enumerate(terms)]
         heapify(waiting)
         while waiting:

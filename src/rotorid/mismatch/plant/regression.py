@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
-from scipy.optimize import lsq_linear
 from scipy.special import chdtrc, fdtrc
 
 from rotorid.mismatch.plant.comparison import LEAST_RUNS, Comparison, environments, folds
@@ -34,13 +33,11 @@ MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
 MOST_REMEMBERED = 2000
-MOST_EXPLAINED = 200_000
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
 VALUE_LIMITS = (0.15, 0.4)
 """A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
 mismatch that needs a third of the arm is no wrong ruler."""
-MOST_OF_ACTIVE_SET = 20
 HOLD = 1e6
 RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
@@ -214,7 +211,6 @@ class Regression:
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
         self._total_gram = self.gram[self.training].sum(axis=0)
         self._total_cross = self.cross[self.training].sum(axis=0)
-        self._share = float(self.training.mean())
         self._place_apart = np.full(len(self._total_cross), -1)
         if self.apart is not None:
             self._place_apart[self.apart.columns] = np.arange(len(self.apart.columns))
@@ -313,7 +309,7 @@ class Regression:
             return whole
         where, own = self._apart(cols)
         gram, cross, bias, bias_cross = (part.copy() for part in whole)
-        share, grid = self._share_of(mask), (own[:, None], cols)
+        share, grid = mask.sum() / len(mask), (own[:, None], cols)
         if mask is self.training:
             gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
         else:
@@ -326,13 +322,9 @@ class Regression:
         bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
         return gram, cross, bias, bias_cross
 
-    def _share_of(self, mask: np.ndarray) -> float:
-        """Share of the blocks that are in a mask."""
-        return self._share if mask is self.training else float(mask.mean())
-
     def _normal(self, cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
         """Products of columns with each other (k, k) and with the response (k,) in a mask, and the noise's of both."""
-        share, grid = self._share_of(mask), (cols[:, None], cols)
+        share, grid = mask.sum() / len(mask), (cols[:, None], cols)
         if mask is self.training:
             gram, cross = self._total_gram[grid], self._total_cross[cols]
         else:
@@ -387,8 +379,7 @@ class Regression:
             blocks = every.transpose(2, 0, 1)[mask]
             if len(where):
                 blocks[:, where] = apart[mask]
-            eye = np.eye(len(cols))
-            scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
+            scores = np.linalg.solve(np.eye(len(cols)) - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
         spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse.T
         # With the ridge, or two columns that are copies of each other would seem to be known.
@@ -430,8 +421,6 @@ class Regression:
         """
         keys = tuple(sorted(keys))
         if keys not in self._explained:
-            if len(self._explained) > MOST_EXPLAINED:
-                self._explained.clear()
             self._explained[keys] = self._explains(keys)
         return self._explained[keys]
 
@@ -462,8 +451,6 @@ class Regression:
         """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
-            if len(self._left_out) > MOST_REMEMBERED:
-                self._left_out.clear()
             self._left_out[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
@@ -624,19 +611,7 @@ class Regression:
         normal = raised(gram[others[:, None], others], self.precision[others])
         with np.errstate(divide="ignore"):
             most = MOST_DISTRUST / np.sqrt(self.precision[others])
-        pull = gram[others[:, None], own] @ beta
-        taken, _, _, at = bounded(normal, -pull, most)
-        if (at * (normal @ taken + pull) > 0).any():  # one that is held would not be beyond its limit any more
-            inner = ridge_inverse(normal)
-            # |B x + B⁻ᵀ pull|² with Bᵀ B the normal matrix is the same square, completed; in units of each column.
-            unit = np.sqrt(np.maximum(np.diag(inner), 0.0))
-            unit = np.where(unit > 0, unit, 1.0)
-            values, vectors = np.linalg.eigh(inner / np.outer(unit, unit))
-            values = np.maximum(values, RIDGE)
-            forth, back = (vectors / np.sqrt(values)).T, (vectors * np.sqrt(values)).T
-            # Of few columns the active set is found at once; of many, interior steps are faster.
-            method = "bvls" if len(unit) < MOST_OF_ACTIVE_SET else "trf"
-            taken = lsq_linear(forth, -back @ (unit * pull), bounds=(-most / unit, most / unit), method=method).x * unit
+        taken = bounded(normal, -gram[others[:, None], own] @ beta, most)[0]
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
     def column_noise(self, key: str) -> float:
@@ -645,10 +620,6 @@ class Regression:
         energy = self._total_gram[column, column]
         return float(self.training.mean() * self.bias_gram[column, column] / energy) if energy > 0 else 0.0
 
-    def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
-        """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
-        return self.own_part(keys, key, beta)[1]
-
     def own_part(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[float, float]:
         """Share of a term's energy along `beta` that the others of `keys` could not take over, and the share of that
         which is noise of the regressors."""
@@ -656,16 +627,13 @@ class Regression:
         own, grid = self.columns([key]), (cols[:, None], cols)
         whole = beta @ self._total_gram[own[:, None], own] @ beta
         energy = direction @ self._total_gram[grid] @ direction
-        noise = self._share * (direction @ self.bias_gram[grid] @ direction)
+        noise = self.training.mean() * (direction @ self.bias_gram[grid] @ direction)
         return float(energy / max(whole, 1e-300)), float(noise / max(energy, 1e-300))
 
     def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
         """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
-        where = np.searchsorted(np.sort(fit.columns), cols)
-        where = np.argsort(fit.columns)[where]
-        b = fit.beta[where]
-        cov = fit.covariance[np.ix_(where, where)]
-        return hotelling(quadratic_form(b, cov), len(b), count)
+        where = fit.places(cols)
+        return hotelling(quadratic_form(fit.beta[where], fit.covariance[np.ix_(where, where)]), len(where), count)
 
 
 def hotelling(statistic: float, q: int, count: int) -> float:
