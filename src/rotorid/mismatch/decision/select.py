@@ -213,10 +213,9 @@ class Search:
 
     def best_form(self, key: str, active: list[str]) -> str:
         """The form of the same id that explains most for its parameters, the others in the model kept."""
-        effect = self.terms[key].effect
         if self.terms[key].run:
             return key
-        forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == effect]
+        forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == self.terms[key].effect]
         judged = self.judged(forms, [k for k in active if k != key])
         return next((c.key for c in judged if c.physical), key)
 

@@ -638,7 +638,9 @@ class Regression:
 
 def hotelling(statistic: float, q: int, count: int) -> float:
     """p-value of Hotelling's T² of q coefficients over blocks."""
-    return float(fdtrc(q, count - q, statistic * (count - q) / (q * (count - 1)))) if count - q >= 2 else 1.0
+    if count - q < 2:
+        return 1.0
+    return float(fdtrc(q, count - q, max(statistic, 0.0) * (count - q) / (q * (count - 1))))
 
 
 def projected(
