@@ -73,7 +73,7 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
         "withheld": "; ".join(f"{f.id}: {f.withheld}" for f in analysis.findings if f.withheld),
         "withheld_values": "; ".join(f"{name}: {why}" for name, why in analysis.withheld_values.items()),
         "worse_elsewhere": "; ".join(analysis.worse_elsewhere),
-        "unfit": question_of(analysis.believed, analysis.recordings.runs)(vehicle) if flies else "",
+        "unfit": question_of(analysis.believed, analysis.recordings.runs)[0](vehicle) if flies else "",
         "not_exported": " ".join(refused_by(vehicle)) if flies else "",
         "not_flown_by": " ".join(not_flown_by(vehicle)) if flies else "",
         "warnings": len(verdict.warnings),

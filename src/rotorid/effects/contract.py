@@ -428,6 +428,8 @@ def rotor_thrusts(motion: Motion, vehicle: Vehicle) -> np.ndarray:
 
 def lift_at_hubs(extra_n: np.ndarray, vehicle: Vehicle) -> Contribution:
     """Force and moment of further thrust (n, k), N, along each rotor's axis (body -z)."""
-    forces = np.zeros((*extra_n.shape, 3))
-    forces[:, :, 2] = -extra_n
-    return at_hubs(forces, vehicle.rotor_positions_m())
+    # Column by column: as `at_hubs`, without its products by zero.
+    x, y, _ = vehicle.rotor_positions_m().T
+    force, moment = np.zeros((len(extra_n), 3)), np.zeros((len(extra_n), 3))
+    force[:, 2], moment[:, 0], moment[:, 1] = -sum(extra_n.T), -sum((extra_n * y).T), sum((extra_n * x).T)
+    return Contribution(force=force, moment=moment)

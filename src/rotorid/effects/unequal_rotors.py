@@ -15,7 +15,7 @@ def _thrust(motion, vehicle, weights):
 def _torque(motion, vehicle, weights):
     torque = vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs() * motion.rotor_speed**2
     moment = np.zeros((motion.size, 3))
-    moment[:, 2] = (weights * torque).sum(axis=1)
+    moment[:, 2] = sum((weights * torque).T)
     return moment
 
 

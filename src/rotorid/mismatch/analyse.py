@@ -25,7 +25,7 @@ from rotorid.mismatch.delivery.gate import Gated, Offer, Settled
 from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
 from rotorid.mismatch.delivery.reduce import chain_ids, with_only
 from rotorid.mismatch.delivery.stated import restated
-from rotorid.mismatch.delivery.usable import own_faults, question_of
+from rotorid.mismatch.delivery.usable import question_of
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.model import within_trust
 from rotorid.mismatch.model.absent import absent, chosen_already
@@ -280,7 +280,7 @@ def offered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Recordin
         moved_plain = {**gated.refitted.moved, **gated.refitted.offer.values}
         return account(last, every, settled.fit, settled.moved, gated.refitted.fit, moved_plain)
 
-    question = question_of(vehicle, choice.recordings.runs)
+    question, faults = question_of(vehicle, choice.recordings.runs)
     return Offered(
         words=words,
         model=model,
@@ -295,7 +295,7 @@ def offered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: Recordin
         improved=improved,
         again=again,
         unusable=lambda settled: question(vehicle_of(settled)),
-        remarks=own_faults(vehicle, choice.recordings.runs),
+        remarks=faults,
     )
 
 

@@ -234,7 +234,7 @@ def wrong_values(
         for key in named:
             beta, covariance = coefficients(regression, fit, key)
             change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
-            noisy = regression.noise_share([*always, *named], key, np.ones(1)) > MOST_ATTENUATION
+            noisy = regression.own_part([*always, *named], key, np.ones(1))[1] > MOST_ATTENUATION
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from heapq import heapify, heappop, heappush
 from itertools import combinations
 
 import numpy as np
 
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Reason
-from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, quadratic_form
+from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, hotelling, quadratic_form
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
@@ -134,9 +135,9 @@ class Search:
         cols = self.regression.columns([key])
         where = len(fit.columns) - len(cols) + np.arange(len(cols))
         beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
-        p_value = self.regression.wald(fit, cols, self.blocks)
-        gain = fit.gain - base.gain
         statistic = quadratic_form(beta, covariance)
+        p_value = hotelling(statistic, len(beta), self.blocks)
+        gain = fit.gain - base.gain
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         if physical:
@@ -179,34 +180,44 @@ class Search:
     def without(self, key: str, active: list[str]) -> Fit:
         return self.regression.fit(self.always + [k for k in active if k != key])
 
-    def gains(self, active: list[str]) -> list[tuple[float, Term]]:
-        """Every term whose id is not in the model yet with what it would explain less what its parameters cost."""
-        taken = {self.terms[k].once for k in active}
-        base = self.regression.explained(self.always + active)
-        return [
-            (self.regression.explained([*self.always, *active, t.key]) - base - COST_PER_PARAMETER * t.size, t)
-            for t in self.terms.values()
-            if t.kind == "effect" and t.once not in taken
-        ]
+    def most(self, term: Term, active: list[str]) -> float:
+        """What a further term explains less what its parameters cost: the most that its score can be."""
+        base, whole = (self.regression.explained([*self.always, *active, *more]) for more in ((), (term.key,)))
+        return whole - base - COST_PER_PARAMETER * term.size
 
-    def candidates(self, active: list[str]) -> list[Candidate]:
-        """Terms whose id is not in the model yet and that are worth their parameters, judged, best first."""
+    def judged(
+        self, terms: Iterable[Term], active: list[str], turn: Callable[[Term], int] = lambda _: 0
+    ) -> Iterator[Candidate]:
+        """Terms judged given a model, by their turn, then the best first.
+
+        To judge one costs many times what `most` does: it is done only where no other is sure to be better.
+        """
         base = self.regression.fit(self.always + active)
-        found = [self.judge(t.key, active, base) for gain, t in self.gains(active) if gain > 0]
-        return sorted(found, key=lambda c: -c.score)
+        waiting = [(turn(t), -self.most(t, active), number, t) for number, t in enumerate(terms)]
+        heapify(waiting)
+        while waiting:
+            own, _, number, found = heappop(waiting)
+            if isinstance(found, Candidate):
+                yield found
+            else:
+                candidate = self.judge(found.key, active, base)
+                heappush(waiting, (own, -candidate.score, number, candidate))
+
+    def candidates(
+        self, active: list[str], dropped: Collection[str] = (), turn: Callable[[Term], int] = lambda _: 0
+    ) -> Iterator[Candidate]:
+        """Terms whose id is neither in the model yet nor dropped and that are worth their parameters, judged."""
+        taken = {self.terms[k].once for k in active} | set(dropped)
+        free = (t for t in self.terms.values() if t.kind == "effect" and t.once not in taken)
+        return self.judged((t for t in free if self.most(t, active) > 0), active, turn)
 
     def best_form(self, key: str, active: list[str]) -> str:
         """The form of the same id that explains most for its parameters, the others in the model kept."""
-        effect = self.terms[key].effect
         if self.terms[key].run:
             return key
-        base = self.without(key, active)
-        rest = [k for k in active if k != key]
-        judged = [
-            self.judge(t.key, rest, base) for t in self.terms.values() if t.kind == "effect" and t.effect == effect
-        ]
-        physical = [c for c in judged if c.physical]
-        return max(physical, key=lambda c: c.score).key if physical else key
+        forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == self.terms[key].effect]
+        judged = self.judged(forms, [k for k in active if k != key])
+        return next((c.key for c in judged if c.physical), key)
 
     def simpler(self, active: list[str]) -> list[str] | None:
         """A model with one id less and other forms of those that stay, if it explains nearly as much.
@@ -299,13 +310,12 @@ class Search:
     def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
         """Why a term of the model does not hold given the others (None where it does), and its score."""
         judged = self.judge(key, active, self.without(key, active))
-        size = self.weight(key, judged.beta, active)
         reason = None
         if judged.p_value > KEEP_P:
             reason = Reason("significance", f"p = {judged.p_value:.2g} given the others")
         elif not judged.physical:
             reason = Reason("physical_bounds", "its coefficients are outside physical bounds")
-        elif rules.SIZE(size < SMALLEST_SIZE):
+        elif rules.SIZE((size := self.weight(key, judged.beta, active)) < SMALLEST_SIZE):
             reason = Reason("size", f"its size is {size:.2g} of the noise")
         return reason, judged.score
 
@@ -374,7 +384,7 @@ class Search:
         """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
         if len(active) >= MOST_EFFECTS:
             return None
-        for candidate in sorted(self.candidates(active), key=self._turn):
+        for candidate in self.candidates(active, dropped, self._turn):
             effect = self.terms[candidate.key].once
             if candidate.score <= 0:
                 continue
@@ -386,10 +396,9 @@ class Search:
             dropped.setdefault(effect, Reason("size", f"its size is {size:.2g} of the noise"))
         return None
 
-    def _turn(self, candidate: Candidate) -> int:
-        """When a candidate is looked at: one that could be two effects, or has no name, where nothing else enters."""
-        later = self.terms[candidate.key].form.compound if candidate.named else False
-        return int(rules.COMPOUND_LAST(later)) if candidate.named else 2
+    def _turn(self, term: Term) -> int:
+        """When a term is looked at: one that could be two effects, or has no name, where nothing else enters."""
+        return 2 if term.effect in UNKNOWNS else int(rules.COMPOUND_LAST(term.form.compound))
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
         """A term that other environments or another term speak against, with the reason."""

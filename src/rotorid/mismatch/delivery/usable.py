@@ -34,25 +34,22 @@ Question = Callable[[Vehicle], str]
 """Takes a vehicle of kind `flight`; gives why it is not fit for use, without a full stop, or nothing."""
 
 
-def question_of(believed: Vehicle, runs: Sequence[Run]) -> Question:
-    """What is asked of a vehicle derived from a believed one: a body, that hovers, that flies.
+def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, tuple[str, ...]]:
+    """What is asked of a vehicle derived from a believed one (a body, that hovers, that flies), and what the believed
+    vehicle fails itself, a sentence each.
 
-    What the believed vehicle fails itself is not asked: no part of the model is to blame for it.
+    That is not asked: what is derived from it may fail it, too, and no part of the model is to blame for it.
     """
-    asked = [question for question in questions(believed, runs) if not question(believed)]
-    return lambda vehicle: next((why for question in asked if (why := question(vehicle))), "")
+    answers = {question: question(believed) for question in questions(believed, runs)}
+    asked = [question for question, why in answers.items() if not why]
+    faults = (f"The believed vehicle itself is not fit to be flown: {why}." for why in answers.values() if why)
+    return lambda vehicle: next((why for question in asked if (why := question(vehicle))), ""), tuple(faults)
 
 
 def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, ...]:
     """Everything that is asked, the cheapest first."""
     share = recorded_share(runs, believed)
     return no_body, lambda vehicle: cannot_hover(vehicle, share), cannot_fly
-
-
-def own_faults(believed: Vehicle, runs: Sequence[Run]) -> tuple[str, ...]:
-    """What the believed vehicle fails itself, a sentence each: what is derived from it may fail it, too."""
-    found = [why for question in questions(believed, runs) if (why := question(believed))]
-    return tuple(f"The believed vehicle itself is not fit to be flown: {why}." for why in found)
 
 
 def no_body(vehicle: Vehicle) -> str:

@@ -73,8 +73,8 @@ class ReadingSearch(Search):
                 return False
         return super().physical(term, beta, error)
 
-    def candidates(self, active):
-        return [] if len(active) >= MOST_AT_ONCE else super().candidates(active)
+    def candidates(self, active, *rest):
+        return iter(()) if len(active) >= MOST_AT_ONCE else super().candidates(active, *rest)
 
     def unsteady(self, active):
         """None: an instrument's runs load different axes, and no coefficient could be asked of each."""

@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
-from scipy.optimize import lsq_linear
-from scipy.stats import chi2, f
+from scipy.special import chdtrc, fdtrc
 
 from rotorid.mismatch.plant.comparison import LEAST_RUNS, Comparison, environments, folds
 from rotorid.mismatch.plant.rows import Rows, Term
@@ -34,13 +33,11 @@ MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
 MOST_REMEMBERED = 2000
-MOST_EXPLAINED = 200_000
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
 VALUE_LIMITS = (0.15, 0.4)
 """A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
 mismatch that needs a third of the arm is no wrong ruler."""
-MOST_OF_ACTIVE_SET = 20
 HOLD = 1e6
 RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
@@ -209,6 +206,8 @@ class Regression:
         return np.concatenate(parts) if parts else np.zeros(0, int)
 
     def __post_init__(self):
+        # Blocks last in memory: what is read of a pair of columns are all of its blocks.
+        self.gram = np.ascontiguousarray(self.gram.transpose(1, 2, 0)).transpose(2, 0, 1)
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
         self._total_gram = self.gram[self.training].sum(axis=0)
         self._total_cross = self.cross[self.training].sum(axis=0)
@@ -304,34 +303,32 @@ class Regression:
         place = self._place_apart[cols]
         return np.flatnonzero(place >= 0), place[place >= 0]
 
-    def _equations(self, cols: np.ndarray, mask: np.ndarray):
+    def _equations(self, whole: tuple[np.ndarray, ...], cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
         """What `_normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
-        gram, cross, bias, bias_cross = self._normal(cols, mask)
+        if self.apart is None:
+            return whole
         where, own = self._apart(cols)
-        if len(where):
-            share, grid = mask.sum() / len(mask), np.ix_(own, cols)
-            if mask is self.training:
-                gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
-            else:
-                gram[where] = self.apart.gram[mask][:, own[:, None], cols].sum(axis=0)
-                cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
-            noise = self.apart.bias_gram[grid] * share
-            at = np.arange(len(where))
-            # As `limited_bias`, column by column: these channels' products alone are no symmetric matrix.
-            most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[at, where], 1e-300)
-            bias[where] = noise * np.minimum(1.0, most)[:, None]
-            bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
+        gram, cross, bias, bias_cross = (part.copy() for part in whole)
+        share, grid = mask.sum() / len(mask), (own[:, None], cols)
+        if mask is self.training:
+            gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
+        else:
+            gram[where] = self.apart.gram[mask][:, *grid].sum(axis=0)
+            cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
+        noise = self.apart.bias_gram[grid] * share
+        # As `limited_bias`, column by column: these channels' products alone are no symmetric matrix.
+        most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[np.arange(len(where)), where], 1e-300)
+        bias[where] = noise * np.minimum(1.0, most)[:, None]
+        bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
         return gram, cross, bias, bias_cross
 
-    def _normal(self, cols: np.ndarray, mask: np.ndarray):
-        share = mask.sum() / len(mask)
-        grid = np.ix_(cols, cols)
+    def _normal(self, cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Products of columns with each other (k, k) and with the response (k,) in a mask, and the noise's of both."""
+        share, grid = mask.sum() / len(mask), (cols[:, None], cols)
         if mask is self.training:
             gram, cross = self._total_gram[grid], self._total_cross[cols]
         else:
-            index = np.flatnonzero(mask)
-            gram = self.gram[np.ix_(index, cols, cols)].sum(axis=0)
-            cross = self.cross[np.ix_(index, cols)].sum(axis=0)
+            gram, cross = self.gram.transpose(1, 2, 0)[grid] @ mask, mask @ self.cross[:, cols]
         bias = limited_bias(gram, self.bias_gram[grid] * share)
         return gram, cross, bias, self.bias_cross[cols] * share
 
@@ -358,42 +355,45 @@ class Regression:
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
         cols = self.columns(keys)
-        gram, cross, bias, bias_cross = self._equations(cols, mask)
+        whole = self._normal(cols, mask)
+        gram, cross, bias, bias_cross = self._equations(whole, cols, mask)
         where, own = self._apart(cols)
         precision = self.precision
         if loose:
             precision = precision.copy()
             for key, sd in loose.items():
                 precision[self.columns([key])] = 1.0 / sd**2
-        prior = np.diag(precision[cols])
-        normal = gram - bias + prior
+        prior = precision[cols]
+        normal = raised(gram - bias, prior)
         beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
         self._fit_held_out_scales(cols, beta, mask)
         count = int(mask.sum())
-        every, explained = self.gram[:, cols[:, None], cols], self.cross[:, cols]
-        pull = every @ beta
-        scores, blocks = (explained - pull)[mask], every[mask]
+        every, explained = self.gram.transpose(1, 2, 0)[cols[:, None], cols], self.cross[:, cols]
+        pull = (beta @ every).T
+        scores = (explained - pull)[mask]
         if len(where):
-            blocks[:, where] = self.apart.gram[mask][:, own[:, None], cols]
-            scores[:, where] = self.apart.cross[mask][:, own] - blocks[:, where] @ beta
+            apart = self.apart.gram[:, own[:, None], cols]
+            scores[:, where] = (self.apart.cross[:, own] - apart @ beta)[mask]
         scores -= (bias_cross - bias @ beta) / count
         if jackknife:
-            eye = np.eye(len(cols))
-            scores = np.linalg.solve(eye[None] - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
+            blocks = every.transpose(2, 0, 1)[mask]
+            if len(where):
+                blocks[:, where] = apart[mask]
+            scores = np.linalg.solve(np.eye(len(cols)) - (blocks - bias / count) @ inverse, scores[:, :, None])[:, :, 0]
         spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse.T
         # With the ridge, or two columns that are copies of each other would seem to be known.
-        noise = gram + prior + np.diag(held) + RIDGE * np.diag(np.diag(normal))
+        uncorrected = raised(gram, prior + held)
+        noise = raised(uncorrected, RIDGE * normal.diagonal())
         noise[:, where] = noise[where].T
         plain = inverse @ noise @ inverse.T
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
-        uncorrected = ridge_inverse(gram + prior + np.diag(held)) @ (cross + held * at)
+        without = ridge_inverse(uncorrected) @ (cross + held * at)
         values = np.isfinite(self.limit[cols])
-        shift = trusted(DOUBT_OF_CORRECTION * (beta - uncorrected), normal, values, precision[cols])
+        shift = trusted(DOUBT_OF_CORRECTION * (beta - without), normal, values, precision[cols])
         covariance = at_least(robust, plain) + np.outer(shift, shift)
         # What the regressors' noise adds to a block is no misfit: left in, a model that shrinks them all would be best.
-        if len(where):
-            bias, bias_cross = self._normal(cols, mask)[2:]
+        _, _, bias, bias_cross = whole
         added = float(beta @ bias @ beta - 2 * beta @ bias_cross) / count
         rss = self.square - 2 * explained @ beta + pull @ beta - added
         gain = float((self.square - rss)[mask].sum())
@@ -421,18 +421,15 @@ class Regression:
         """
         keys = tuple(sorted(keys))
         if keys not in self._explained:
-            if len(self._explained) > MOST_EXPLAINED:
-                self._explained.clear()
             self._explained[keys] = self._explains(keys)
         return self._explained[keys]
 
     def _explains(self, keys: tuple[str, ...]) -> float:
         cols = self.columns(keys)
-        gram, cross, bias, bias_cross = self._equations(cols, self.training)
-        normal = gram - bias + np.diag(self.precision[cols])
-        beta = bounded(normal, cross - bias_cross, self.limit[cols])[0]
-        if len(self._apart(cols)[0]):
-            gram, cross, bias, bias_cross = self._normal(cols, self.training)
+        whole = self._normal(cols, self.training)
+        gram, cross, bias, bias_cross = self._equations(whole, cols, self.training)
+        beta = bounded(raised(gram - bias, self.precision[cols]), cross - bias_cross, self.limit[cols])[0]
+        gram, cross, bias, bias_cross = whole
         return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
 
     def folds(self, whole_runs: bool) -> np.ndarray:
@@ -454,8 +451,6 @@ class Regression:
         """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
-            if len(self._left_out) > MOST_REMEMBERED:
-                self._left_out.clear()
             self._left_out[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
@@ -473,8 +468,8 @@ class Regression:
         found, inverses = [], []
         for out in range(fold.max() + 1):
             mask = self.training & (fold != out)
-            gram, cross, bias, bias_cross = self._equations(cols, mask)
-            normal = gram - bias + np.diag(precision[cols])
+            gram, cross, bias, bias_cross = self._equations(self._normal(cols, mask), cols, mask)
+            normal = raised(gram - bias, precision[cols])
             beta, inverse = bounded(normal, cross - bias_cross, self.limit[cols])[:2]
             found.append(beta)
             # Of a column that only this fold excites nothing is known without it.
@@ -552,7 +547,7 @@ class Regression:
         on noisy columns a true one would keep 1 − 2 λ of its promise where a share λ of the energy is noise.
         """
         _, _, bias, bias_cross = self._normal(cols, self.training)
-        gram, cross = self.gram[np.ix_(index, cols, cols)], self.cross[np.ix_(index, cols)]
+        gram, cross = self.gram[:, cols[:, None], cols][index], self.cross[np.ix_(index, cols)]
         return gram - bias / len(index), cross - bias_cross / len(index)
 
     def _doubt(self, index: np.ndarray, cols: np.ndarray, fold: np.ndarray, inverses: np.ndarray) -> np.ndarray:
@@ -603,7 +598,7 @@ class Regression:
         degrees = np.maximum((w > 0).sum(axis=0) - 1, 1)
         scale = w.sum(axis=0) - (w**2).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-300)
         spread = np.maximum(0.0, (q - degrees) / np.maximum(scale, 1e-300))
-        p = float(min(1.0, len(cols) * chi2.sf(q, degrees).min()))
+        p = float(min(1.0, len(cols) * chdtrc(degrees, q).min()))
         return spread / len(b), p
 
     def beyond(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -613,21 +608,10 @@ class Regression:
         """
         others, own = self.columns(keys), self.columns([key])
         gram = self._total_gram
-        inner = ridge_inverse(gram[np.ix_(others, others)] + np.diag(self.precision[others]))
+        normal = raised(gram[others[:, None], others], self.precision[others])
         with np.errstate(divide="ignore"):
             most = MOST_DISTRUST / np.sqrt(self.precision[others])
-        pull = gram[np.ix_(others, own)] @ beta
-        taken = -inner @ pull
-        if (np.abs(taken) > most).any():
-            # |B x + B⁻ᵀ pull|² with Bᵀ B the normal matrix is the same square, completed; in units of each column.
-            unit = np.sqrt(np.maximum(np.diag(inner), 0.0))
-            unit = np.where(unit > 0, unit, 1.0)
-            values, vectors = np.linalg.eigh(inner / np.outer(unit, unit))
-            values = np.maximum(values, RIDGE)
-            forth, back = (vectors / np.sqrt(values)).T, (vectors * np.sqrt(values)).T
-            # Of few columns the active set is found at once; of many, interior steps are faster.
-            method = "bvls" if len(unit) < MOST_OF_ACTIVE_SET else "trf"
-            taken = lsq_linear(forth, -back @ (unit * pull), bounds=(-most / unit, most / unit), method=method).x * unit
+        taken = bounded(normal, -gram[others[:, None], own] @ beta, most)[0]
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
     def column_noise(self, key: str) -> float:
@@ -636,31 +620,27 @@ class Regression:
         energy = self._total_gram[column, column]
         return float(self.training.mean() * self.bias_gram[column, column] / energy) if energy > 0 else 0.0
 
-    def noise_share(self, keys: list[str], key: str, beta: np.ndarray) -> float:
-        """Share of a term's own part (the others projected out, along `beta`) that is noise of its regressors."""
-        return self.own_part(keys, key, beta)[1]
-
     def own_part(self, keys: list[str], key: str, beta: np.ndarray) -> tuple[float, float]:
         """Share of a term's energy along `beta` that the others of `keys` could not take over, and the share of that
         which is noise of the regressors."""
         cols, direction = self.beyond([k for k in keys if k != key], key, beta)
-        gram, bias = self._total_gram, self.bias_gram * self.training.mean()
-        own, grid = self.columns([key]), np.ix_(cols, cols)
-        whole = beta @ gram[np.ix_(own, own)] @ beta
-        energy, noise = direction @ gram[grid] @ direction, direction @ bias[grid] @ direction
+        own, grid = self.columns([key]), (cols[:, None], cols)
+        whole = beta @ self._total_gram[own[:, None], own] @ beta
+        energy = direction @ self._total_gram[grid] @ direction
+        noise = self.training.mean() * (direction @ self.bias_gram[grid] @ direction)
         return float(energy / max(whole, 1e-300)), float(noise / max(energy, 1e-300))
 
     def wald(self, fit: Fit, cols: np.ndarray, count: int) -> float:
         """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
-        where = np.searchsorted(np.sort(fit.columns), cols)
-        where = np.argsort(fit.columns)[where]
-        b = fit.beta[where]
-        cov = fit.covariance[np.ix_(where, where)]
-        statistic = quadratic_form(b, cov)
-        q = len(b)
-        if count - q < 2:
-            return 1.0
-        return float(f.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
+        where = fit.places(cols)
+        return hotelling(quadratic_form(fit.beta[where], fit.covariance[np.ix_(where, where)]), len(where), count)
+
+
+def hotelling(statistic: float, q: int, count: int) -> float:
+    """p-value of Hotelling's T² of q coefficients over blocks."""
+    if count - q < 2:
+        return 1.0
+    return float(fdtrc(q, count - q, max(statistic, 0.0) * (count - q) / (q * (count - 1))))
 
 
 def projected(
@@ -698,8 +678,14 @@ def trusted(shift: np.ndarray, normal: np.ndarray, values: np.ndarray, precision
 
 def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     """1/√ of a Gram matrix's diagonal; zero for a column that is never excited, so that it stays at zero."""
-    dead = diagonal <= NEVER_EXCITED
-    return np.where(dead, 0.0, 1.0 / np.sqrt(np.where(dead, 1.0, diagonal)))
+    return np.where(diagonal <= NEVER_EXCITED, 0.0, 1.0 / np.sqrt(np.maximum(diagonal, NEVER_EXCITED)))
+
+
+def raised(matrix: np.ndarray, by: np.ndarray | float) -> np.ndarray:
+    """A square matrix with more on its diagonal."""
+    out = matrix.copy()
+    out.flat[:: len(out) + 1] += by
+    return out
 
 
 def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
@@ -711,39 +697,42 @@ def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
     inverse = ridge_inverse(normal)
     for _ in range(len(right) + 1):
         solution = inverse @ (right + held * at)
-        out = np.where(held > 0, 0.0, np.abs(solution) / limit)
-        worst = int(np.argmax(out)) if len(out) else 0
-        if not len(out) or out[worst] <= 1.0:
+        out = np.abs(solution) / limit
+        out[held > 0] = 0.0
+        if out.max(initial=0.0) <= 1.0:
             break
+        worst = int(out.argmax())
         held[worst] = HOLD * max(normal[worst, worst], 1e-300)
         at[worst] = np.sign(solution[worst]) * limit[worst]
         # One more number on the diagonal is a change of rank one (Sherman and Morrison).
         column, row = inverse[:, worst], inverse[worst]
-        inverse = inverse - np.outer(column, row) * (held[worst] / (1.0 + held[worst] * column[worst]))
+        inverse = inverse - column[:, None] * row * (held[worst] / (1.0 + held[worst] * column[worst]))
     return solution, inverse, held, at
 
 
 def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric normal matrix, scaled to unit diagonal, with a trace of ridge."""
-    scale = inverse_root(np.diag(matrix))
-    scaled = matrix * np.outer(scale, scale) + RIDGE * np.eye(len(matrix))
-    return np.linalg.inv(scaled) * np.outer(scale, scale)
+    scale = inverse_root(matrix.diagonal())
+    units = scale[:, None] * scale
+    return np.linalg.inv(raised(matrix * units, RIDGE)) * units
 
 
 def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """The noise's Gram matrix, held to MOST_ATTENUATION of the energy in every direction."""
     if not len(gram):
         return bias
-    scale = inverse_root(np.diag(gram))
-    if (np.diag(bias) * scale**2).sum() <= MOST_ATTENUATION * 1e-9:
+    scale = inverse_root(gram.diagonal())
+    units = scale[:, None] * scale
+    within = bias * units
+    if within.trace() <= MOST_ATTENUATION * 1e-9:
         return bias  # less than the limit in any direction that is kept below
-    scaled = gram * np.outer(scale, scale) + 1e-9 * np.eye(len(gram))
-    if np.trace(np.linalg.solve(scaled, bias * np.outer(scale, scale))) <= MOST_ATTENUATION:
+    scaled = raised(gram * units, 1e-9)
+    if np.linalg.solve(scaled, within).trace() <= MOST_ATTENUATION:
         return bias  # the shares of all directions together are no more
     values, vectors = np.linalg.eigh(scaled)
     values = np.maximum(values, 1e-9)
     back = vectors / np.sqrt(values)
-    inner = back.T @ (bias * np.outer(scale, scale)) @ back
+    inner = back.T @ within @ back
     share, turn = np.linalg.eigh((inner + inner.T) / 2)
     if share[-1] <= MOST_ATTENUATION:
         return bias
@@ -782,9 +771,10 @@ def at_least(robust: np.ndarray, plain: np.ndarray) -> np.ndarray:
 
 def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
     """valuesᵀ covariance⁻¹ values, in units of the coefficients' own standard errors."""
-    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    scaled = values / unit
-    return float(scaled @ np.linalg.pinv(covariance / np.outer(unit, unit), rcond=1e-10, hermitian=True) @ scaled)
+    unit = np.sqrt(np.maximum(covariance.diagonal(), 1e-300))
+    size, vectors = np.linalg.eigh(covariance / (unit[:, None] * unit))
+    known = np.abs(size) > 1e-10 * np.abs(size).max(initial=0.0)
+    return float(((values / unit @ vectors)[known] ** 2 / size[known]).sum())
 
 
 def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:

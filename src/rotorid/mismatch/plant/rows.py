@@ -260,10 +260,10 @@ def value_columns(
         # Body rates stay bounded: a lasting predicted acceleration is the mark of something left out.
         # (Neither a mean over a window, which makes a fifth too much of what turns a little faster than it lasts, nor
         # ends that are held: one wild instant would then last.)
-        predicted = predicted - kernels.gaussian(predicted, SUSTAINED_S * segment.rate_hz)
+        predicted = predicted[:, [axis]] - kernels.gaussian(predicted[:, [axis]], SUSTAINED_S * segment.rate_hz)
         part = np.zeros((3, 3))
         part[axis, axis] = inertia[axis, axis]
-        out = {"moment": -(predicted @ part + np.cross(rate, rate @ part))}
+        out = {"moment": -(predicted * part[axis] + np.cross(rate, rate @ part))}
     return {k: v for k, v in out.items() if k in groups}
 
 

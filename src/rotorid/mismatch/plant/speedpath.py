@@ -478,12 +478,12 @@ class SpeedSearch:
                 break
             if not grown:
                 break
-        current = self._pruned(current, dropped)
+        current, bases = self._pruned(current, dropped)
         if current.covariance is None:
             current = self.problem.with_covariance(current)
         p_values, alternatives, sizes, fewer = {}, {}, {}, {}
         for key, _ in current.chain:
-            base = self._without(current, key)
+            base = bases[key]
             fewer[key] = self.problem.with_covariance(base) if base.chain else base
             p_values[key] = self.judge(base, current, key)[0]
             sizes[key] = self.size(current, key)
@@ -573,12 +573,13 @@ class SpeedSearch:
             fit = best
         return fit
 
-    def _pruned(self, fit: SpeedFit, dropped: dict[str, str]) -> SpeedFit:
-        changed = True
+    def _pruned(self, fit: SpeedFit, dropped: dict[str, str]) -> tuple[SpeedFit, dict[str, SpeedFit]]:
+        """The chain less what does not hold, and to each id that stays the chain fitted without it."""
+        changed, bases = True, {}
         while changed and fit.chain:
             changed = False
             for key, _ in fit.chain:
-                base = self._without(fit, key)
+                base = bases[key] = self._without(fit, key)
                 if fit.covariance is None:
                     fit = self.problem.with_covariance(fit)
                 p, score, _ = self.judge(base, fit, key)
@@ -588,7 +589,7 @@ class SpeedSearch:
                     )
                     fit, changed = self.problem.with_covariance(base) if base.chain else base, True
                     break
-        return fit
+        return fit, bases
 
     def _alternatives(self, fit: SpeedFit, base: SpeedFit, key: str) -> tuple[str, ...]:
         """Ids that explain as much in the place of `key`: not worse by more than a coin's doubt."""

@@ -82,13 +82,14 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
         start = Start(position_m=np.array([[0.0, 0.0, vehicle.ground_z_m - START_HEIGHT_M]]))
     runs: list[Run] = []
     believed = vehicle
+    slow, middle, fast, sizes = np.array([[0.9, 0.7, 0.5], [3.1, 3.7, 1.3], [9.1, 11.3, 7.1], [0.25, 0.25, 0.4]])
     for number in range(flights):
         rng = np.random.default_rng([seed, number])
         phase = rng.uniform(0, 2 * np.pi, 3)
 
         def wanted(t: float, phase=phase) -> np.ndarray:
-            swing = np.sin(np.array([0.9, 0.7, 0.5]) * t + phase) + 0.5 * np.sin(np.array([3.1, 3.7, 1.3]) * t)
-            return np.array([0.25, 0.25, 0.4]) * (swing + 0.3 * np.sin(np.array([9.1, 11.3, 7.1]) * t + phase[::-1]))
+            swing = np.sin(slow * t + phase) + 0.5 * np.sin(middle * t)
+            return sizes * (swing + 0.3 * np.sin(fast * t + phase[::-1]))
 
         reference = AttitudeReference("swings", thrust_n, wanted)
         pilot = AttitudePid(vehicle, reference, gains, DERIVATIVE_S, most, steady.moments_n_m)

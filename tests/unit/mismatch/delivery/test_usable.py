@@ -14,7 +14,6 @@ from rotorid.mismatch.delivery.usable import (
     exports_lost,
     full_thrust_n,
     no_body,
-    own_faults,
     question_of,
     recorded_share,
 )
@@ -83,9 +82,10 @@ def test_it_flies_under_the_projects_controller_and_one_that_cannot_is_said():
 
 def test_what_the_believed_vehicle_fails_itself_is_not_asked_of_another():
     weak = vehicle(thrust_coefficient_n_s2=0.72 * 0.652 * 9.81 / (4 * 1600**2))
-    assert question_of(weak, ())(weak) == "" and question_of(vehicle(), ())(weak)
-    (fault,) = own_faults(weak, ())[:1]
-    assert "full thrust is 4.61 N" in fault and own_faults(vehicle(), ()) == ()
+    question, faults = question_of(weak, ())
+    sound, none = question_of(vehicle(), ())
+    assert question(weak) == "" and sound(weak)
+    assert "full thrust is 4.61 N" in faults[0] and none == ()
 
 
 def test_a_vehicle_that_turns_over_late_is_caught(monkeypatch):

@@ -179,12 +179,12 @@ def test_the_share_of_noise_in_a_column_beside_the_others():
     rng = np.random.default_rng(6)
     read, again = noisy_case(rng)
     alone = regression([read], ["x"], noisy=[again])
-    assert alone.noise_share(["x"], "x", np.ones(1)) == pytest.approx(0.2, abs=0.02)
+    assert alone.own_part(["x"], "x", np.ones(1))[1] == pytest.approx(0.2, abs=0.02)
     truth = coloured(8000, 1.0, np.random.default_rng(6), pole=0.9)
     both = [rows_of(read.y[:, 0], truth, read.x[:, 0, 0])]
     more = [rows_of(read.y[:, 0], truth, again.x[:, 0, 0])]
     beside = regression(both, ["truth", "x"], noisy=more)
-    assert beside.noise_share(["truth", "x"], "x", np.ones(1)) > 0.8
+    assert beside.own_part(["truth", "x"], "x", np.ones(1))[1] > 0.8
 
 
 def test_a_true_effect_keeps_its_promise_on_a_noisy_column():
