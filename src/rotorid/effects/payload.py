@@ -183,8 +183,8 @@ EFFECT = Effect(
     excited_by=("specific_force", "angular_velocity", "angular_acceleration"),
     confusers=("com_offset",),
     separating_manoeuvre="weigh the vehicle; stop sharply from forward flight and hover",
-    # The mass aside: a vehicle with a payload aboard is heavier than stated, whichever of the two is said.
     would_change=(
+        "mass_kg",
         "thrust_coefficient_n_s2",  # of these two their ratios to mass and inertia
         "torque_coefficient_n_m_s2",
         *(f"inertia_{axis}_kg_m2" for axis in ("xx", "yy", "zz")),

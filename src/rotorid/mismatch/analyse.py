@@ -20,7 +20,7 @@ from rotorid.mismatch.decision.evidence import weighed
 from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, Trace
 from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.decision.shares import fitted_part
-from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
+from rotorid.mismatch.delivery.final import Offered, as_delivered
 from rotorid.mismatch.delivery.gate import Gated, Offer, Settled
 from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
 from rotorid.mismatch.delivery.reduce import chain_ids, with_only
@@ -242,16 +242,16 @@ def winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
 
 
 def offered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values) -> Offered:
-    """What a choice offers for delivery: what is claimed, fitted without what is only suggested.
+    """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 
-    `words` is the analysis of the whole choice with its statuses; `moved` are the values that it moved within their
-    trust.
+    A value that is only suggested, because a payload that is not excluded would change it, is offered as it is: the
+    vehicle flies with that number, whichever of the two it is. `words` is the analysis of the whole choice with its
+    statuses; `moved` are the values that it moved within their trust.
     """
     found, vehicle = choice.found, choice.found.prepared.vehicle
     ids = {f.id for f in claimed(words.findings)}
-    suggested = suggested_keys(words, choice.stated, PARAMETER_NAMES)
-    values = {k: v for k, v in found.values.items() if k not in suggested}
-    whole = ids >= {f.id for f in words.findings if f.id in words.without} and not suggested
+    values = found.values
+    whole = ids >= {f.id for f in words.findings if f.id in words.without}
     fewer = found if whole else with_only(found, ids, values)
     model = fewer.model
 

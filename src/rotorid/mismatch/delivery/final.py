@@ -51,12 +51,6 @@ class Offered:
     with the believed values free."""
 
 
-def suggested_keys(words: Analysis, stated: Values, names: Mapping[str, str]) -> set[str]:
-    """Keys of the values that are only suggested."""
-    of_name = names_of(stated, names)
-    return {key for name in words.suggested_values for key in of_name.get(name, ())}
-
-
 def as_delivered(offered: Offered) -> Analysis:
     """What an offer amounts to once it has passed the gate; statuses, wrong values and their reasons stay."""
     words, model = offered.words, offered.model

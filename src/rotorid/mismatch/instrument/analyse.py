@@ -21,7 +21,7 @@ from rotorid.mismatch.decision.evidence import weighed
 from rotorid.mismatch.decision.findings import Analysis, Finding, Trace
 from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.decision.select import Selection
-from rotorid.mismatch.delivery.final import Offered, as_delivered, suggested_keys
+from rotorid.mismatch.delivery.final import Offered, as_delivered
 from rotorid.mismatch.delivery.gate import Gated, Offer
 from rotorid.mismatch.delivery.parts import claimed
 from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
@@ -247,15 +247,13 @@ def account(
 
 
 def offered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values) -> Offered:
-    """What a choice offers for delivery: what is claimed, fitted without what is only suggested.
+    """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 
     `words` is the analysis of the whole choice with its statuses; `plain` are the values called wrong where no effect
     is at work, `moved` those that the choice moved within their trust.
     """
     model, chain = choice.model, choice.chain
     ids = {f.id for f in claimed(words.findings)}
-    suggested = suggested_keys(words, choice.stated, VALUE_NAMES)
-    values = {k: v for k, v in choice.values.items() if k not in suggested}
     active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
     fewer = with_terms(model, active)
     gone = [k for k, _ in chain.fit.chain if k not in ids] if chain is not None and choice.measured else []
@@ -273,14 +271,14 @@ def offered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, 
     return Offered(
         words=words,
         model=fewer,
-        offer=Offer(values, tuple(active)),
+        offer=Offer(choice.values, tuple(active)),
         plain=plain,
         believed_left=[np.nan_to_num(r.y) for r in model.rows],
         believed=choice.setup.vehicle,
         stated=choice.stated,
         moved=moved,
         names=VALUE_NAMES,
-        whole=len(active) == len(model.selection.active) and not suggested and not gone,
+        whole=len(active) == len(model.selection.active) and not gone,
         improved=lambda settled: choice.vehicle({**settled.moved, **settled.offer.values}),
         again=again,
         restates=False,
