@@ -115,13 +115,19 @@ def same_ratio(wrong: frozenset[str], known: Mapping[str, float]) -> list[frozen
 def in_place(options: Options, wrong: frozenset[str], least_nats: float) -> dict[str, list[Changes]]:
     """To each value called wrong what explains as much in its place: the changes of others, one or two of them.
 
-    Two only where no other does so alone (an arm is both inertias as well).
+    Two only where no other does so alone (an arm is both inertias as well): they may be less probable by as much again,
+    for each costs something by itself.
     """
-    least = options[wrong].log_posterior - least_nats
     out = {}
     for key in sorted(wrong):
         rest = wrong - {key}
-        found = [w for w, o in options.items() if key not in w and rest < w and o.log_posterior >= least]
+        found = [
+            w
+            for w, o in options.items()
+            if key not in w
+            and rest < w
+            and o.log_posterior >= options[wrong].log_posterior - least_nats * len(w - rest)
+        ]
         fewest = min((len(w) for w in found), default=0)
         if fewest:
             own = sorted((w for w in found if len(w) == fewest), key=lambda w: -options[w].log_posterior)

@@ -1,4 +1,4 @@
-"""Inertias are judged by what is quick where a slow moment of the air, and the controller's answer, bias the rest."""
+"""Gains by two bands and both sides: a slow moment of the air, and the controller's answer, bias what is slow."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import pytest
 
 from rotorid.mismatch.decision.decide import coefficients, relative_change
 from rotorid.mismatch.model.fitted import Fitted, fitted
+from rotorid.mismatch.model.gains import Side, gains_of, merged
 from rotorid.mismatch.model.prepare import prepare
-from rotorid.mismatch.model.value_sides import sides_of_values
 from rotorid.mismatch.model.within_trust import settled
 from rotorid.mismatch.plant.split import parts_of, split_runs
+from rotorid.mismatch.posterior.prior import Prior
 from tests.unit.mismatch.flights import DENSE_HZ, quad, recorded, smooth, with_table
 
 CUTOFF_HZ = 10.0
@@ -41,10 +42,31 @@ def found(size_n_m: float) -> Fitted:
     return fitted(prepare(parts_of(made, split_runs(made))[0], CUTOFF_HZ))
 
 
-@pytest.mark.parametrize(("size_n_m", "every"), [(0.0, True), (0.03, False)])
-def test_all_frequencies_judge_unless_slow_ones_tell_of_another_gain(size_n_m, every):
-    model = found(size_n_m).model
-    assert (sides_of_values(model).judging is model.search.regression) == every
+def test_a_slow_moment_that_the_rotors_make_up_for_widens_the_gain_of_its_axis_alone():
+    quiet, moved = (gains_of(found(size).model, Prior()) for size in (0.0, 0.03))
+    assert moved["inertia_xx"].variance > 2 * quiet["inertia_xx"].variance
+    assert moved["inertia_yy"].variance < 2 * quiet["inertia_yy"].variance
+    for gains in (quiet, moved):
+        gain = gains["inertia_xx"]
+        assert abs(gain.log - np.log(BELIEVED_XX)) < 2.5 * np.sqrt(gain.variance)
+
+
+def side(log: float, variance: float = 1e-4, own: float = 100.0, noise: float = 0.0) -> Side:
+    return Side("inertia_xx", log, variance, own, noise, leftover=0.0)
+
+
+def test_without_a_leftover_the_forward_side_is_true_and_nothing_is_biased():
+    gain = merged([side(0.1), side(0.3)], leftover=0.0, bias=1.0)
+    assert (gain.log, gain.variance) == (pytest.approx(0.1), pytest.approx(1e-4))
+
+
+def test_where_all_is_leftover_the_truth_lies_between_the_sides_and_may_be_off_by_the_bias():
+    gain = merged([side(0.1), side(0.3)], leftover=1.0, bias=1.0)
+    assert gain.log == pytest.approx(0.2)
+    # Half of their distance, and the bias over the column's own part in units of the believed value.
+    assert gain.variance == pytest.approx(1e-4 + 0.01 + 0.01 * np.exp(-0.4))
+    # Noise of a tachometer is answered by no controller.
+    assert merged([side(0.1, noise=1.0)], leftover=1.0, bias=1.0).variance == pytest.approx(1e-4)
 
 
 @pytest.mark.parametrize("size_n_m", [0.0, 0.03])
