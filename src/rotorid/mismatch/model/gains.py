@@ -6,8 +6,8 @@
 - *Sides.* Noise in rotor speeds pulls the estimate one way; with the measured moments as regressors noise in the body
   rates pulls the other way (Frisch bounds).
 
-What bands and sides have in common is not seen in their differences: a bias in proportion to √(leftover / own part).
-It is as large as the share of the residual that is no independent noise says: what a sensor adds is not answered.
+What bands and sides have in common is not seen in their differences: a bias that grows with the residual over the own
+part of the column (`merged`).
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def gains_of(model: WrenchModel, prior: Prior) -> dict[str, Gain]:
         samples = samples_in(model, band)
         bands.append(
             {
-                key: merged([side[key] for side in both], answered[key], bias**2 * samples[key])
+                key: merged([side[key] for side in both], answered[key], bias, samples[key])
                 for key, first in both[0].items()
                 if first.own > 0
             }
@@ -172,15 +172,18 @@ def gain_of(coefficient: float, turned: bool) -> float:
     )
 
 
-def merged(sides: Sequence[Side], leftover: float, bias: float) -> Gain:
+def merged(sides: Sequence[Side], leftover: float, bias: float, samples: float) -> Gain:
     """A gain of one band by both sides, the forward one first; along the thrust both are one.
 
-    `leftover` is that of the forward side at all frequencies, `bias` the variance of what the sides have in common for
-    an own part of one where all is leftover. Without leftover the forward side, corrected for noise, is true.
+    With u² the residual over the column's own part, a controller's answer to a leftover biases both sides by `bias` u
+    (where all is leftover), its answer to the sensors' noise by `bias` u². `leftover` is that of the forward side at
+    all frequencies, `samples` are the whitened squares of the residual. Without leftover the forward side, corrected for
+    noise, is true.
     """
     first, *others = sides if sides[0].key != "mass" else sides[:1]
     # The noise of a measured rotor speed is not answered by a controller.
-    common = bias * leftover * max(0.0, 1.0 - first.noise) / first.own
+    size = samples * max(0.0, 1.0 - first.noise) / first.own
+    common = bias**2 * size * (leftover + size)
     log, variance = (np.array([getattr(s, name) for s in (first, *others)]) for name in ("log", "variance"))
     weights = np.array([1.0, *(leftover for _ in others)]) / (variance + common)
     weights /= weights.sum()

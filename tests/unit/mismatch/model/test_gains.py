@@ -56,17 +56,23 @@ def side(log: float, variance: float = 1e-4, own: float = 100.0, noise: float = 
 
 
 def test_without_a_leftover_the_forward_side_is_true_and_nothing_is_biased():
-    gain = merged([side(0.1), side(0.3)], leftover=0.0, bias=1.0)
-    assert (gain.log, gain.variance) == (pytest.approx(0.1), pytest.approx(1e-4))
+    gain = merged([side(0.1), side(0.3)], leftover=0.0, bias=1.0, samples=0.01)
+    assert (gain.log, gain.variance) == (pytest.approx(0.1), pytest.approx(1e-4, rel=1e-3))
+
+
+def test_a_column_far_below_the_noise_is_biased_without_a_leftover_too():
+    """A controller that answers the gyroscope's noise makes all of the column: u² = 16."""
+    gain = merged([side(1.4)], leftover=0.0, bias=0.1, samples=1600.0)
+    assert gain.variance == pytest.approx(1e-4 + 0.01 * 16**2 * np.exp(-2.8))
 
 
 def test_where_all_is_leftover_the_truth_lies_between_the_sides_and_may_be_off_by_the_bias():
-    gain = merged([side(0.1), side(0.3)], leftover=1.0, bias=1.0)
+    gain = merged([side(0.1), side(0.3)], leftover=1.0, bias=1.0, samples=1.0)
     assert gain.log == pytest.approx(0.2)
-    # Half of their distance, and the bias over the column's own part in units of the believed value.
-    assert gain.variance == pytest.approx(1e-4 + 0.01 + 0.01 * np.exp(-0.4))
+    # Half of their distance, and u² (1 + u²) with u² a hundredth, in units of the believed value.
+    assert gain.variance == pytest.approx(1e-4 + 0.01 + 0.01 * 1.01 * np.exp(-0.4))
     # Noise of a tachometer is answered by no controller.
-    assert merged([side(0.1, noise=1.0)], leftover=1.0, bias=1.0).variance == pytest.approx(1e-4)
+    assert merged([side(0.1, noise=1.0)], leftover=1.0, bias=1.0, samples=1.0).variance == pytest.approx(1e-4)
 
 
 @pytest.mark.parametrize("size_n_m", [0.0, 0.03])
