@@ -177,8 +177,8 @@ def merged(sides: Sequence[Side], leftover: float, bias: float, samples: float) 
 
     With u² the residual over the column's own part, a controller's answer to a leftover biases both sides by `bias` u
     (where all is leftover), its answer to the sensors' noise by `bias` u². `leftover` is that of the forward side at
-    all frequencies, `samples` are the whitened squares of the residual. Without leftover the forward side, corrected for
-    noise, is true.
+    all frequencies, `samples` are the whitened squares of the residual. Without leftover the forward side, which is
+    corrected for noise, is true.
     """
     first, *others = sides if sides[0].key != "mass" else sides[:1]
     # The noise of a measured rotor speed is not answered by a controller.

@@ -32,7 +32,7 @@ class Prior:
     gain_bias: tuple[float, float] = (0.14, 0.10)
     """One-sigma that a gain between force or moment and motion is biased by, over √(residual / own part of its column),
     where all of the residual is leftover: of all frequencies, and of those of `model.gains.VALUE_BAND`. Measured on 44
-    sets: the bias of right values is 0.2 % (rms) where that root is below 0.03, 3 % where it is 0.1 to 0.3, 25 % above."""
+    sets: right values are biased by 0.2 % (rms) where that root is below 0.03, by 3 % up to 0.3, by 25 % above."""
     gain_freedom: float = 30.0
     """Degrees of freedom of a gain's variance."""
     freed_reach: float = 0.6
