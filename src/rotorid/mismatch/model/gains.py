@@ -96,9 +96,13 @@ def trust_of(model: WrenchModel) -> dict[str, float]:
 
 
 def gains_of(model: WrenchModel, prior: Prior) -> dict[str, Gain]:
-    """The gains that a flight shows, by the key of the value in their denominator."""
+    """The gains that a flight shows, by the key of the value in their denominator.
+
+    Where commands alone say how fast rotors turn, a lag that is not quite theirs changes what is quick: no band judges.
+    """
     every, free = model.search.regression, [k for k in GAINS if k in model.regression.keys_of("value")]
-    known = (None, VALUE_BAND) if band_filters(model, VALUE_BAND) else (None,)
+    measured = all(s.measured_speed for s in model.segments)
+    known = (None, VALUE_BAND) if measured and band_filters(model, VALUE_BAND) else (None,)
     bands, answered = [], {}
     for band, bias in zip(known, prior.gain_bias, strict=False):
         forward = every if band is None else regression_of_gains(model, band)
@@ -189,13 +193,17 @@ def merged(sides: Sequence[Side], leftover: float, bias: float, samples: float) 
     weights /= weights.sum()
     mean = float(weights @ log)
     spread = float(variance.min() + weights @ (log - mean) ** 2)
-    return Gain(mean, spread + common * float(np.exp(-2.0 * mean)))  # the column is that of the believed value
+    # The column is that of the believed value: of a smaller gain it is too large.
+    return Gain(mean, spread + common * float(np.exp(-2.0 * min(mean, 0.0))))
 
 
 def mean_of(gains: Sequence[Gain]) -> Gain:
-    """One gain of several independent ones."""
-    weights = np.array([1.0 / g.variance for g in gains])
-    return Gain(float(weights @ [g.log for g in gains] / weights.sum()), float(1.0 / weights.sum()))
+    """One gain of several independent ones, less certain where they differ by more than they should (Birge, The
+    calculation of errors by the method of least squares, Physical Review 40, 1932)."""
+    log, weights = np.array([g.log for g in gains]), np.array([1.0 / g.variance for g in gains])
+    mean = float(weights @ log / weights.sum())
+    excess = float(weights @ (log - mean) ** 2) / max(len(gains) - 1, 1)
+    return Gain(mean, max(1.0, excess) / float(weights.sum()))
 
 
 def uncorrected(regression: Regression) -> Regression:

@@ -9,11 +9,12 @@ import pytest
 
 from rotorid.mismatch.decision.decide import coefficients, relative_change
 from rotorid.mismatch.model.fitted import Fitted, fitted
-from rotorid.mismatch.model.gains import Side, gains_of, merged
+from rotorid.mismatch.model.gains import Side, gains_of, mean_of, merged
 from rotorid.mismatch.model.prepare import prepare
 from rotorid.mismatch.model.within_trust import settled
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.values import Gain
 from tests.unit.mismatch.flights import DENSE_HZ, quad, recorded, smooth, with_table
 
 CUTOFF_HZ = 10.0
@@ -63,14 +64,25 @@ def test_without_a_leftover_the_forward_side_is_true_and_nothing_is_biased():
 def test_a_column_far_below_the_noise_is_biased_without_a_leftover_too():
     """A controller that answers the gyroscope's noise makes all of the column: u² = 16."""
     gain = merged([side(1.4)], leftover=0.0, bias=0.1, samples=1600.0)
-    assert gain.variance == pytest.approx(1e-4 + 0.01 * 16**2 * np.exp(-2.8))
+    assert gain.variance == pytest.approx(1e-4 + 0.01 * 16**2)
+
+
+def test_the_column_of_a_smaller_gain_is_larger_than_that_of_the_believed_one():
+    gain = merged([side(-0.5)], leftover=1.0, bias=0.1, samples=1.0)
+    assert gain.variance == pytest.approx(1e-4 + 0.01 * 0.01 * 1.01 * np.exp(1.0))
+
+
+def test_bands_that_differ_by_more_than_they_should_are_less_certain_together():
+    assert mean_of([Gain(0.1, 0.01), Gain(0.1, 0.01)]).variance == pytest.approx(0.005)
+    apart = mean_of([Gain(0.0, 0.01), Gain(0.6, 0.01)])
+    assert (apart.log, apart.variance) == (pytest.approx(0.3), pytest.approx(0.005 * 18))
 
 
 def test_where_all_is_leftover_the_truth_lies_between_the_sides_and_may_be_off_by_the_bias():
     gain = merged([side(0.1), side(0.3)], leftover=1.0, bias=1.0, samples=1.0)
     assert gain.log == pytest.approx(0.2)
-    # Half of their distance, and u² (1 + u²) with u² a hundredth, in units of the believed value.
-    assert gain.variance == pytest.approx(1e-4 + 0.01 + 0.01 * 1.01 * np.exp(-0.4))
+    # Half of their distance, and u² (1 + u²) with u² a hundredth.
+    assert gain.variance == pytest.approx(1e-4 + 0.01 + 0.01 * 1.01)
     # Noise of a tachometer is answered by no controller.
     assert merged([side(0.1, noise=1.0)], leftover=1.0, bias=1.0, samples=1.0).variance == pytest.approx(1e-4)
 
