@@ -72,7 +72,7 @@ def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> WrongValues: 
 
     refused: list[str] = []
     while wrong := called_wrong(options, least, refused):
-        best = max(same_ratio(wrong, trust), key=explained)
+        best = max((w for w in same_ratio(wrong, trust) if not w.intersection(refused)), key=explained)
         if explained(best) - explained(wrong) > least:
             wrong = best
         changes = options[wrong].changes
@@ -90,7 +90,9 @@ def trust_of(model: WrenchModel) -> dict[str, float]:
     """
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
     load = next(e for e in catalogue().values() if e.like_on_heavier)
-    if {load.id, *load.like_on_heavier} & {model.search.terms[k].effect for k in model.selection.active}:
+    if "mass" in trust and {load.id, *load.like_on_heavier} & {
+        model.search.terms[k].effect for k in model.selection.active
+    }:
         trust["mass"] = max(trust.values())
     return trust
 

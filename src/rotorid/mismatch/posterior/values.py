@@ -65,7 +65,7 @@ def options_of(gains: Mapping[str, Gain], trust: Mapping[str, float], prior: Pri
     """
     keys = [k for k in OF_GAINS if k in trust]
     known = [i for i, k in enumerate(GAINS) if k in gains]
-    turn = np.array([OF_GAINS[k] for k in keys], float)[:, known].T
+    turn = np.array([OF_GAINS[k] for k in keys], float).reshape(len(keys), len(GAINS))[:, known].T
     log = np.array([gains[GAINS[i]].log for i in known])
     variance = np.diag([gains[GAINS[i]].variance for i in known])
     sd = np.clip([prior.value_reach * trust[k] for k in keys], *prior.freed_sd)

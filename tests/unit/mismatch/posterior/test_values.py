@@ -73,6 +73,11 @@ def test_a_refused_value_leaves_room_for_the_other_of_its_ratio():
     assert second and not second & first
 
 
+def test_without_gains_or_values_nothing_is_wrong():
+    assert called_wrong(options_of({}, TRUST, Prior()), LEAST_NATS) == frozenset()
+    assert called_wrong(options_of({"mass": Gain(-0.2, 1e-4)}, {}, Prior()), LEAST_NATS) == frozenset()
+
+
 def test_gains_that_are_not_known_say_nothing():
     only_thrust = options_of({"mass": Gain(-0.2, 1e-4)}, TRUST, Prior())
     assert called_wrong(only_thrust, LEAST_NATS) in ({"mass"}, {"thrust"})
