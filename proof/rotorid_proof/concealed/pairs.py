@@ -14,6 +14,7 @@ import numpy as np
 
 from .continuous import cases as continuous
 from .continuous import craft as crafts
+from .continuous.equations import Strayed
 from .continuous.instruments import Kit
 from .multibody import cases as multibody
 from .multibody import course, logger, vehicle
@@ -47,10 +48,14 @@ def names(seed: str, count: int) -> list[str]:
 
 
 def make(name: str) -> Pair:
-    """The pair of a name."""
+    """The pair of a name; a vehicle that no controller holds is drawn anew."""
     simulator, _, _ = name.split("/")
-    seed = int(hashlib.sha256(f"pair|{name}".encode()).hexdigest()[:12], 16)
-    return MAKERS[simulator](seed)
+    drawn = f"pair|{name}"
+    while True:
+        try:
+            return MAKERS[simulator](int(hashlib.sha256(drawn.encode()).hexdigest()[:12], 16))
+        except Strayed:
+            drawn += "|again"
 
 
 def drawn_families(rng: np.random.Generator, families: tuple[str, ...]) -> list[str]:

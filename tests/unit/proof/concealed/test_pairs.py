@@ -5,6 +5,7 @@ import pytest
 
 from rotorid_proof.concealed import pairs
 from rotorid_proof.concealed.continuous import craft
+from rotorid_proof.concealed.continuous.equations import Strayed
 
 CHANGED, UNCHANGED = "continuous/test/004", "continuous/test/011"
 
@@ -50,3 +51,17 @@ def test_of_an_effect_that_both_sets_have_the_answer_holds_the_difference() -> N
 
     (found,) = pairs.beyond([drag(2.0)], [drag(2.0), drag(5.0)])
     assert found["parameters"][0]["value"] == 3.0
+
+
+def test_a_vehicle_that_no_controller_holds_is_drawn_anew(monkeypatch):
+    tried = []
+
+    def maker(seed: int):
+        tried.append(seed)
+        if len(tried) < 3:
+            raise Strayed("not held")
+        return seed
+
+    monkeypatch.setitem(pairs.MAKERS, "continuous", maker)
+    assert pairs.make("continuous/01234567/000") == tried[-1]
+    assert len(set(tried)) == 3
