@@ -96,7 +96,6 @@ EFFECT = Effect(
     ),
     excited_by=("rotor_speed", "angular_velocity", "angular_acceleration"),
     reading_forms=reading_forms,
-    moves_centre=True,
     confusers=("unequal_rotors", "thrust_tilt"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets",
     separating_columns=("rotor_speed",),

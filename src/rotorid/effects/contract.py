@@ -337,8 +337,6 @@ class Effect:
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     curves_thrust: bool = False
     """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
-    moves_centre: bool = False
-    """Whether its parameters in m place the point about which moments are taken: every other force has another arm."""
     between_flights: Mapping[str, float] = field(default_factory=dict)
     """To a unit the one-sigma of its parameters of that unit between two flights in which nothing changed."""
     differs_between_runs: Literal["", "zero", "drift", "of other axes"] = ""

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
     ChainTerms,
@@ -243,7 +242,6 @@ def rows_of(
     rows = assemble_rows(model.prepared, list(terms), segments, model.effects)
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
     rows = as_seen(against_own(rows, model, segments, vehicle), model, [t.key for t in terms])
-    rows = with_other_arms(rows, terms, known_effects(model, terms))
     if columns is not None:
         away = chain.values - (first or chain).values
         rows = [
@@ -281,27 +279,6 @@ def known_effects(model: WrenchModel, terms: Sequence[Term]) -> np.ndarray:
     active = set(model.regression.columns(model.selection.active))
     found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True) if c in active}
     return np.array([found.get(c, 0.0) for c in columns])
-
-
-def with_other_arms(rows: list[Rows], terms: Sequence[Term], known: np.ndarray) -> list[Rows]:
-    """Rows in which another centre of mass gives all known forces another arm, M = −r × F, and not the thrust alone.
-
-    `known` (K,) are the coefficients of the first set's effects.
-    """
-    starts = np.cumsum([0, *(t.size for t in terms)])
-    moved = [
-        (start + axis, axis)
-        for start, term in zip(starts, terms, strict=False)
-        if term.effect in catalogue() and catalogue()[term.effect].moves_centre
-        for axis in range(term.size)
-    ]
-    out = []
-    for own in rows:
-        force, x = own.x[:, FORCES] @ known, own.x.copy()
-        for column, axis in moved:
-            x[:, MOMENTS, column] -= np.nan_to_num(np.cross(np.eye(3)[axis], force))
-        out.append(replace(own, x=x))
-    return out
 
 
 def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:

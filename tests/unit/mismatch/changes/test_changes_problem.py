@@ -6,10 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.changes.joint import with_other_arms, within_bounds
+from rotorid.mismatch.changes.joint import within_bounds
 from rotorid.mismatch.changes.problem import decide_changes
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
-from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.statements import statements_of, visited_instead
@@ -63,16 +62,6 @@ def test_a_change_stays_within_what_is_physical_given_what_the_first_set_has():
     still = replace(new, gram=new.gram * (np.arange(4) != 1), cross=new.cross * (np.arange(4) != 1))
     unseen = SimpleNamespace(evidence=still, known=np.zeros(4))
     assert np.isinf(next(t for t in within_bounds(new, unseen).terms if t.key == DRAG).linear[0].low)
-
-
-def test_another_centre_of_mass_gives_a_known_drag_another_arm():
-    drag_n, lever = np.array([2.0, 0.0, 0.0]), 5
-    terms = [Term("drag", "effect", "rotor_drag"), Term("centre", "effect", "com_offset", size=2)]
-    x = np.zeros((4, 12, 3))
-    x[:, 0:3, 0] = drag_n
-    (own,) = with_other_arms([Rows("run", np.arange(4.0), np.zeros((4, 12)), x)], terms, np.array([1.0, 0.0, 0.0]))
-    assert np.allclose(own.x[:, lever, 2], 2.0)  # M = −(0, r, 0) × (2, 0, 0) = (0, 0, 2 r)
-    assert np.array_equal(own.x[:, :, :2], x[:, :, :2])
 
 
 def test_of_a_derivative_of_speeds_noise_may_hide_as_much_as_there_is():
