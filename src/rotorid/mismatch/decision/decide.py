@@ -271,14 +271,13 @@ def throttle_or_thrust(finding: Finding) -> Finding:
     return replace(finding, status="ambiguous", alternatives=both)
 
 
-def relative_change(key: str, coefficient: float, sd: float, measured_moment: bool = False) -> tuple[float, float]:
+def relative_change(key: str, coefficient: float, sd: float) -> tuple[float, float]:
     """Relative change of a believed value, and its one-sigma, from its coefficient.
 
     The columns of a mass and an inertia m hold the acceleration F / m of the believed one: their coefficient is
-    1 − m_believed / m. With measured moments as regressors it is those of an arm and a torque that hold the true one.
+    1 − m_believed / m.
     """
-    turned = key in ("arm", "torque") if measured_moment else key.startswith("inertia")
-    if key == "mass" or turned:
+    if key == "mass" or key.startswith("inertia"):
         return coefficient / (1.0 - coefficient), sd / (1.0 - coefficient) ** 2
     return coefficient, sd
 

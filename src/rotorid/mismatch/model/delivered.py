@@ -17,9 +17,7 @@ from rotorid.mismatch.model.prepare import Prepared
 from rotorid.mismatch.plant.contributions import Contributions
 from rotorid.mismatch.plant.regression import Fit, Regression
 from rotorid.mismatch.plant.rows import Rows, residual
-
-Values = dict[str, tuple[float, float]]
-"""Relative change and one-sigma of believed values, by the key of their term."""
+from rotorid.mismatch.posterior.values import Values
 
 
 class FittedModel(Protocol):

@@ -104,13 +104,14 @@ def gains_of(model: WrenchModel, prior: Prior) -> dict[str, Gain]:
     """
     every, free = model.search.regression, [k for k in GAINS if k in model.regression.keys_of("value")]
     measured = all(s.measured_speed for s in model.segments)
-    known = (None, VALUE_BAND) if measured and band_filters(model, VALUE_BAND) else (None,)
+    quick = band_filters(model, VALUE_BAND) if measured else {}
+    known = {None: model_filters(model)} | ({VALUE_BAND: {**model_filters(model), **quick}} if quick else {})
     bands, answered = [], {}
-    for band, bias in zip(known, prior.gain_bias, strict=False):
-        forward = every if band is None else regression_of_gains(model, band)
+    for (band, filters), bias in zip(known.items(), prior.gain_bias, strict=False):
+        forward = every if band is None else regression_of_gains(model, filters)
         both = [
             side_of(forward, model.selection.active, free, False),
-            side_of(regression_of_gains(model, band, measured_moment=True), model.selection.active, free, True),
+            side_of(regression_of_gains(model, filters, measured_moment=True), model.selection.active, free, True),
         ]
         if band is None:
             answered = {key: side.leftover for key, side in both[0].items()}
@@ -247,12 +248,11 @@ def copies_in(model: WrenchModel, band: tuple[float, float]) -> float:
 
 
 def regression_of_gains(
-    model: WrenchModel, band: tuple[float, float] | None, measured_moment: bool = False
+    model: WrenchModel, filters: dict[int, np.ndarray], measured_moment: bool = False
 ) -> Regression:
-    """Regression of the believed values and the selected effects; of the moments only what lies in a band.
+    """Regression of the believed values and the selected effects, each channel filtered by its own of `filters`.
 
-    `band` holds shares of the cutoff, None for all frequencies. With `measured_moment` the measured moments are the
-    regressors in place of the predicted ones.
+    With `measured_moment` the measured moments are the regressors in place of the predicted ones.
     """
     prepared, rate_hz = model.prepared, model.prepared.thinner.rate_hz
     active = [model.search.terms[k] for k in model.selection.active]
@@ -263,7 +263,6 @@ def regression_of_gains(
         own = model.regression.columns([t.key for t in terms])
         made = model.contributions
         rows, noisy = ([replace(r, x=r.x[:, :, own]) for r in part] for part in (made.rows, made.noisy or []))
-    filters = model_filters(model) if band is None else {**model_filters(model), **band_filters(model, band)}
     regression = build(
         rows,
         terms,

@@ -33,8 +33,8 @@ OF_GAINS: Mapping[str, tuple[float, float, float, float]] = {
 """To each value what a larger logarithm of it adds to each gain."""
 
 
-Changes = dict[str, tuple[float, float]]
-"""Value to its relative change and one-sigma."""
+Values = dict[str, tuple[float, float]]
+"""Relative change and one-sigma of believed values, by the key of their term."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Option:
 
     log_posterior: float
     """Nats, less a constant."""
-    changes: Changes
+    changes: Values
     """Of the values called wrong."""
 
 
@@ -112,7 +112,7 @@ def same_ratio(wrong: frozenset[str], known: Mapping[str, float]) -> list[frozen
     return out
 
 
-def in_place(options: Options, wrong: frozenset[str], least_nats: float) -> dict[str, list[Changes]]:
+def in_place(options: Options, wrong: frozenset[str], least_nats: float) -> dict[str, list[Values]]:
     """To each value called wrong what explains as much in its place: the changes of others, one or two of them.
 
     Two only where no other does so alone (an arm is both inertias as well): they may be less probable by as much again,
