@@ -62,6 +62,9 @@ class Motion:
     hung: np.ndarray | None = None
     """How a slung payload hung at some instants, (k, 7): time in s, direction of the cable downward and its rate in
     1/s, both in world axes; None for one that starts at rest."""
+    hung_by: np.ndarray | None = None
+    """What it swung by since, g − a as measured, (n, 3), m/s2, world axes: a wide swing forgets its state if this is
+    predicted. Given together with `hung`."""
     tilt_gravity: np.ndarray | None = None
     """Gravity on a stand, (n, 3), m/s2, sensor axes (kind `stand` only)."""
 

@@ -18,13 +18,15 @@ def slung(motion, vehicle, values):
     the mean of e with weights 1 − ω t/π (to zero), and what that misses fades with the damping. A cable does not push:
     where it would, the force is zero.
     """
-    return _pull(motion, vehicle, values, hanging_acceleration(motion))
+    return _pull(motion, vehicle, values, 0.0)
 
 
-def _pull(motion, vehicle, values, hanging):
-    """Wrench in body axes of what hangs by the accelerations `hanging` (n, 3)."""
+def _pull(motion, vehicle, values, slowed):
+    """Wrench in body axes of what hangs and is slowed by the acceleration `slowed` (n, 3)."""
     mass_kg, hook_kg_m, length_m, damping_ratio = values
-    world = cable_pull(hanging, motion.time_s, length_m, damping_ratio, vehicle.gravity_m_s2, motion.hung)
+    hanging, time_s = hanging_acceleration(motion) - slowed, motion.time_s
+    swung_by = None if motion.hung_by is None else motion.hung_by - slowed
+    world = cable_pull(hanging, time_s, length_m, damping_ratio, vehicle.gravity_m_s2, motion.hung, swung_by)
     pull = np.einsum("nji,nj->ni", motion.rotation, world)
     pull = aboard(motion) * pull
     return Contribution(force=mass_kg * pull, moment=hook_kg_m * np.cross([0.0, 0.0, 1.0], pull))
@@ -40,7 +42,7 @@ def slung_in_air(motion, vehicle, values):
     _, _, length_m, damping_ratio = values
     slowed = 2 * damping_ratio * np.sqrt(vehicle.gravity_m_s2 / length_m)
     through_air = np.einsum("nij,nj->ni", motion.rotation, motion.air_velocity)
-    return _pull(motion, vehicle, values, hanging_acceleration(motion) - slowed * through_air)
+    return _pull(motion, vehicle, values, slowed * through_air)
 
 
 def slung_starts(parts, vehicle):

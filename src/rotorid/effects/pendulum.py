@@ -29,9 +29,13 @@ LEAST_HANG = 0.3
 """Share of gravity that must pull down for the small angles of the scan."""
 
 
-def cable_pull(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=None):
-    """Pull of a payload of one kilogram on its hook, (n, 3), N, world axes; as `swing`. A cable does not push."""
-    direction, rate_square = swing(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung)
+def cable_pull(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=None, swung_by=None):
+    """Pull of a payload of one kilogram on its hook, (n, 3), N, world axes; as `swing`. A cable does not push.
+
+    `swung_by` (n, 3) moves the payload where that is not `hanging`, which pulls at the cable.
+    """
+    swung_by = hanging if swung_by is None else swung_by
+    direction, rate_square = swing(swung_by, time_s, length_m, damping_ratio, gravity_m_s2, hung)
     tension = np.maximum(np.einsum("ni,ni->n", hanging, direction) + length_m * rate_square, 0.0)
     return tension[:, None] * direction
 

@@ -110,8 +110,11 @@ def rigid_payload(d: Draft) -> None:
         [("mass", mass, "kg"), *((f"r_{a}", v, "m") for a, v in zip("xyz", at, strict=True))],
         equivalent=["com_offset", "mass_kg", "inertia_products"],
     )
-    d.fair = ["com_offset", "inertia_products"]
-    d.fair_why = "a mass fixed to the frame is more mass, an offset and products of inertia at once"
+    d.fair = ["com_offset", "inertia_products", "imu_lever_arm", *(f"inertia_{a}{a}_kg_m2" for a in "xyz")]
+    d.fair_why = (
+        "a mass fixed to the frame is more mass, an offset and products of inertia at once, has moments of inertia, "
+        "and moves the centre of mass away from the accelerometer"
+    )
 
 
 def off_centre(d: Draft) -> None:

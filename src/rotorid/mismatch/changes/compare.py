@@ -19,6 +19,7 @@ from rotorid.mismatch.changes.chain import (
     speed_rows,
     squares_of_speeds,
 )
+from rotorid.mismatch.changes.hanging import carrying
 from rotorid.mismatch.changes.joint import Joint, Reference, evidence_at, joined_at, joints_of, reference_of
 from rotorid.mismatch.changes.notes import command_notes, notes_of
 from rotorid.mismatch.changes.of_instruments import (
@@ -40,7 +41,7 @@ from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import Statement, parameters, statements_of
+from rotorid.mismatch.posterior.statements import Statement, parameters, statements_of, widened
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Vehicle
 
@@ -114,7 +115,7 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
         found = joint.decide(joint.base, joint.new, yardstick(joint, reference.runs, prior), prior)
-        stated, notes = statements_of(found, one_for_several=True), ()
+        stated, notes = statements_of(found, of_change=True), ()
     limits = limits_of(found, joint.squares)
     if of_speeds:
         stated = (*stated, *changes_in(of_speeds[0], prior))
@@ -141,10 +142,17 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
 def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[Option]]:
     """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
 
-    A mistake is one change more: corrected for it the two sets must be alike by more than it costs.
+    A mistake is one change more: corrected for it the two sets must be alike by more than it costs. So must they be
+    with a payload that swings in the second set.
     """
     both = [(joint, flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
-    return max(both, key=lambda b: b[1][0].log_posterior - prior.effect_nats * len(b[0].mistakes_of_new))
+    joint, options = max(both, key=lambda b: b[1][0].log_posterior - prior.effect_nats * len(b[0].mistakes_of_new))
+    if (swinging := carrying(reference, joint)) is not None:
+        other, with_it, nats = swinging
+        own = flight_options(other, with_it, prior)
+        if own[0].log_posterior - nats > options[0].log_posterior:
+            return with_it, own
+    return joint, options
 
 
 def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:
@@ -154,7 +162,7 @@ def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Opt
     def products_at(chain: ChainTerms | None) -> tuple[Evidence, Evidence]:
         if chain is first:
             return joint.base, joint.new
-        at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new)
+        at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new, joint.own_effects)
         return at.base, at.new
 
     spread, base_at = yardstick(joint, reference.runs, prior), partial(evidence_at, reference)
@@ -208,7 +216,7 @@ def decided_of_speeds(
 def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]:
     """What is stated of the best option; a part of the chain in whose place another would do is one of a class."""
     out = []
-    for stated in statements_of(options[0].found, one_for_several=True):
+    for stated in statements_of(options[0].found, of_change=True):
         others = others_in_place(options, stated.id, prior)
         if others and stated.status in CLAIMED:
             members = tuple(sorted({stated.id, *stated.alternatives, *others}))
@@ -246,13 +254,13 @@ def residuals_of(rows: Sequence[Rows]) -> dict[str, Residual]:
 
 def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
     """By how much each believed value changed, relative, with its 95 % interval, changed or not."""
-    out = []
-    for key, term in found.problem.terms.items():
-        if term.effect not in KEYS or not found.problem.unit[found.problem.columns_of[key]].all():
+    out, problem = [], widened(found.problem)
+    for key, term in problem.terms.items():
+        if term.effect not in KEYS or not problem.unit[problem.columns_of[key]].all():
             continue
-        at = scored(found.problem, tuple(sorted({*found.model, key})))
+        at = scored(problem, tuple(sorted({*found.model, key})))
         if at.mode is not None:
-            out += in_percent(term.effect, parameters(found, at, key), base, new)
+            out += in_percent(term.effect, parameters(problem, at, key), base, new)
     return tuple(out)
 
 

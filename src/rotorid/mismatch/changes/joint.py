@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.effects.contract import Form
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
     ChainTerms,
@@ -37,6 +38,8 @@ from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings import RecordingSet, Vehicle
 
+Effects = Sequence[tuple[Form, np.ndarray]]
+"""Forms with the values of their parameters."""
 FORCES, MOMENTS = (0, 1, 2), (3, 4, 5)
 """Channels of the forces and of the moments."""
 REACH_OF_KNOWN = 3.0
@@ -64,12 +67,16 @@ class Joint:
     """The second set, corrected for its mistakes."""
     recorded: tuple[Segment, ...]
     """Its stretches of flight as recorded."""
+    segments_of_new: tuple[Segment, ...]
+    """The same with the rotors turning."""
     rows_of_new: tuple[Rows, ...]
     mistakes_of_new: tuple[Finding, ...]
     """Mistakes in the recordings of the second set, corrected."""
     squares: dict[str, np.ndarray]
     """To the key of each effect and believed value what its columns amount to in the second set
     (`absent.squares_of`)."""
+    own_effects: Effects = ()
+    """Forms at work in the second set alone, for the accelerations in its columns."""
     more_usual: np.ndarray | float = 0.0
     """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual.usual_spread`."""
     form_sd: float = FORM_SD
@@ -118,12 +125,10 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     of_chain = chain.terms if found.commanded else []
     known = np.append(known_effects(model, terms), np.zeros(sum(t.size for t in of_chain)))
     block_s = block_seconds(rows, model.prepared.thinner.rate_hz)
-    regression = regression_of(rows, [*terms, *of_chain], model, block_s)
-    evidence = with_known_effects(evidence_from(regression), known)
     usual = np.zeros(len(known))
     if of_chain:
-        evidence = chain.named(evidence, chain)
         usual[-len(chain.values) :] = chain.spread
+    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, known, block_s)
     return Reference(
         recordings=base,
         found=found,
@@ -135,18 +140,42 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
         known=known,
         usual_of_chain=usual,
         evidence=evidence,
-        runs=by_run(evidence, regression),
+        runs=runs,
         recorded=tuple(recorded),
         mistakes=mistakes,
     )
 
 
+def on_terms(reference: Reference, terms: Sequence[Term]) -> Reference:
+    """The first set with the nonlinear parameters of its columns at other values."""
+    found, chain = reference.found, reference.chain
+    _, rows = rows_of(found, terms, chain, reference.recorded)
+    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, reference.known, reference.block_s)
+    return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
+
+
 def evidence_at(reference: Reference, chain: ChainTerms) -> Evidence:
     """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
-    found, terms = reference.found, [*reference.terms, *chain.terms]
-    _, rows = rows_of(found, reference.terms, chain, reference.recorded, reference.chain)
-    regression = regression_of(rows, terms, found.model, reference.block_s)
-    return chain.named(with_known_effects(evidence_from(regression), reference.known), reference.chain)
+    found, first = reference.found, reference.chain
+    _, rows = rows_of(found, reference.terms, chain, reference.recorded, first)
+    return evidence_of_rows(found, reference.terms, chain, first, rows, reference.known, reference.block_s)[0]
+
+
+def evidence_of_rows(
+    found: Fitted,
+    terms: Sequence[Term],
+    chain: ChainTerms | None,
+    first: ChainTerms | None,
+    rows: list[Rows],
+    known: np.ndarray,
+    block_s: float,
+) -> tuple[Evidence, tuple[Evidence, ...]]:
+    """Evidence of the first set's rows, and the same run by run; parameters as of `rows_of` and Reference."""
+    of_chain = chain.terms if found.commanded else []
+    regression = regression_of(rows, [*terms, *of_chain], found.model, block_s)
+    evidence = with_known_effects(evidence_from(regression), known)
+    evidence = chain.named(evidence, first) if of_chain else evidence
+    return evidence, by_run(evidence, regression)
 
 
 def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
@@ -184,10 +213,11 @@ def joined_at(
     recorded: Sequence[Segment],
     chain: ChainTerms | None,
     mistakes: tuple[Finding, ...],
+    own_effects: Effects = (),
 ) -> Joint:
-    """Two sets on the same columns, those of the second taken at a chain of its own."""
+    """Two sets on the same columns, those of the second taken at a chain of its own; `own_effects` as `rows_of`."""
     found, model = reference.found, reference.found.model
-    segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle)
+    segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     of_new = regression_of(rows, terms, model, reference.block_s)
     evidence = within_bounds(with_known_effects(evidence_from(of_new), reference.known), reference)
@@ -204,8 +234,10 @@ def joined_at(
         flown_by_new=how_far(segments, model.prepared),
         recordings=new,
         recorded=tuple(recorded),
+        segments_of_new=tuple(segments),
         rows_of_new=tuple(rows),
         mistakes_of_new=mistakes,
+        own_effects=own_effects,
         squares=squares_of(
             replace(model, rows=rows, regression=of_new), [t for t in terms if t.kind in ("effect", "value")]
         ),
@@ -219,6 +251,7 @@ def rows_of(
     recorded: Sequence[Segment],
     first: ChainTerms | None = None,
     vehicle: Vehicle | None = None,
+    own_effects: Effects = (),
 ) -> tuple[list[Segment], list[Rows]]:
     """Stretches with the rotors turning, and their rows: columns of all terms and, known by commands, of the chain.
 
@@ -235,11 +268,13 @@ def rows_of(
         What the set itself believes, where that is not what the first set believes. The columns stay those of the
         first set's vehicle: columns that differ between the sets could be combined into differences
         that no vehicle has.
+    own_effects
+        Forms at work in this set alone, for the accelerations in columns.
     """
     model = found.model
     turned = found if chain is None else turning(found, chain)
     segments = as_flown(list(recorded), turned)
-    rows = assemble_rows(model.prepared, list(terms), segments, model.effects)
+    rows = assemble_rows(model.prepared, list(terms), segments, [*(model.effects or []), *own_effects])
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
     rows = as_seen(against_own(rows, model, segments, vehicle), model, [t.key for t in terms])
     if columns is not None:

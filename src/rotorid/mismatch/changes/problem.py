@@ -15,7 +15,7 @@ and a controller's answer are wrong by is in b and cancels.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +38,8 @@ LEAST_GAIN = 0.005
 FREE = 10.0
 """Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
 name; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
+NOT_COMMON = 1e-9
+"""The same of what only one set can have."""
 UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
 RIDGE = 1e-4
@@ -104,8 +106,8 @@ def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) 
     """Log posterior of changes and leftover together, nats, less a constant."""
     variance = found.problem.variance
     base, new = (s.weighed(variance) for s in spectra)
-    free = FREE * spectra[1].rows
-    of_common = integrated(base.gram + new.gram, base.cross + new.cross, np.full(len(base.cross), free))
+    free = free_of(found.problem.terms, found.problem.columns_of, spectra[1].rows)
+    of_common = integrated(base.gram + new.gram, base.cross + new.cross, free)
     of_usual = integrated(*difference_products(base, new, free), in_units(spread, spectra[1].unit) ** 2)
     return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in spectra)
 
@@ -157,10 +159,10 @@ def problem_of_changes(
     Every effect may have changed, in any direction, and every value.
     """
     prior = replace(prior, small_nats=HIDDEN_NATS)
-    gram, cross = products_of_changes(spectra, variance, spread)
     unit, size, rows = spectra[1].unit, len(spectra[1].unit), spectra[1].rows
     terms = {t.key: as_change(t) for t in new.terms}
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
+    gram, cross = products_of_changes(spectra, variance, spread, free_of(terms, columns_of, rows))
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
     # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change. What
@@ -204,22 +206,31 @@ def problem_of_changes(
 
 
 def products_of_changes(
-    spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray
+    spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """S̃ (K, K) and s̃ (K,) of the module's equations, scaled."""
+    """S̃ (K, K) and s̃ (K,) of the module's equations, scaled; `free` as `free_of`."""
     base, new = (s.weighed(variance) for s in spectra)
-    gram, cross = difference_products(base, new, FREE * spectra[1].rows)
+    gram, cross = difference_products(base, new, free)
     usual = in_units(spread, spectra[1].unit) ** 2
     gram, cross = np.hsplit(np.linalg.solve(np.eye(len(cross)) + gram * usual, np.column_stack([gram, cross])), [-1])
     return 0.5 * (gram + gram.T), cross[:, 0]
 
 
-def difference_products(base: Weighed, new: Weighed, free: float) -> tuple[np.ndarray, np.ndarray]:
+def free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
+    """Variance (K,) of the coefficients common to both sets, scaled; next to none of what one set has alone."""
+    out = np.full(sum(t.size for t in terms.values()), FREE * rows)
+    for key, term in terms.items():
+        if term.alone:
+            out[columns_of[key]] = NOT_COMMON
+    return out
+
+
+def difference_products(base: Weighed, new: Weighed, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """S (K, K) and s (K,): products of the second set with what is common to both integrated out, scaled.
 
-    `free` is the variance of the common coefficients.
+    `free` (K,) is the variance of the common coefficients.
     """
-    inverse = np.linalg.inv(base.gram + new.gram + np.eye(len(base.cross)) / free)
+    inverse = np.linalg.inv(base.gram + new.gram + np.diag(1.0 / free))
     return new.gram - new.gram @ inverse @ new.gram, new.cross - new.gram @ inverse @ (base.cross + new.cross)
 
 

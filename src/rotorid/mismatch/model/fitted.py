@@ -24,7 +24,17 @@ from rotorid.mismatch.model.gains import wrong_values_of
 from rotorid.mismatch.model.gusts import with_gusts
 from rotorid.mismatch.model.payload_windows import Windows, changes, loads, payload_windows_of, with_payload_on_board
 from rotorid.mismatch.model.prepare import Prepared
-from rotorid.mismatch.model.swinging import hung, like, price, swinging_term, with_likely_length
+from rotorid.mismatch.model.swinging import (
+    as_effect,
+    cable_of,
+    hung,
+    hung_by,
+    like,
+    price,
+    stretches_of,
+    swinging_term,
+    with_likely_length,
+)
 from rotorid.mismatch.model.within_trust import beyond_trust
 from rotorid.mismatch.model.wrench import (
     WrenchModel,
@@ -167,12 +177,13 @@ def converged(before: WrenchModel, after: WrenchModel) -> bool:
     return True
 
 
-def with_own_scales(prepared: Prepared, segments, noisy) -> WrenchModel:
-    """The search over all terms, where thrust differs between runs with a scale for each."""
-    model = wrench_model(prepared, prepared.terms, segments=segments, noisy_segments=noisy)
+def with_own_scales(prepared: Prepared, segments, noisy, effects=None) -> WrenchModel:
+    """The search over all terms, with a scale for each run where thrust differs between them; `effects` as there."""
+    model = wrench_model(prepared, prepared.terms, effects, segments=segments, noisy_segments=noisy)
     if not rules.OWN_SCALES(thrust_differs(model)):
         return model
-    return wrench_model(prepared, with_run_scales(prepared.terms, prepared), segments=segments, noisy_segments=noisy)
+    terms = with_run_scales(prepared.terms, prepared)
+    return wrench_model(prepared, terms, effects, segments=segments, noisy_segments=noisy)
 
 
 def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows]):
@@ -195,12 +206,15 @@ def with_swing(prepared: Prepared, model: WrenchModel):
     same = model.segments, model.noisy_segments, model
     start = swinging_term(model)
     term = None if start is None else with_likely_length(model, start)
-    segments = None if term is None else hung(model, model.segments, model.rows, term)
-    if segments is None:
+    cable = None if term is None else cable_of(model, term)
+    found = None if term is None else hung_by(cable, model.segments, stretches_of(model, model.segments, model.rows))
+    if found is None:
         return same
+    segments, mass_kg = found
     noisy = like(segments, model.noisy_segments)
     terms = [replace(t, values=term.values) if is_like(t, start) else t for t in prepared.terms]
-    with_it = with_own_scales(replace(prepared, terms=terms), segments, noisy)
+    effects = [*chosen(model), as_effect(term, cable, mass_kg)]
+    with_it = with_own_scales(replace(prepared, terms=terms), segments, noisy, effects)
     swings = any(with_it.search.terms[k].form.swings for k in with_it.selection.active)
     filters = model.regression.filters
     if swings and cost_of(with_it, filters) + price(segments) < cost_of(model, filters):

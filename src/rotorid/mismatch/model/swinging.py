@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
 
+from rotorid.effects.contract import Form
 from rotorid.effects.payload import hanging_acceleration
 from rotorid.effects.pendulum import cable_pull, moved, swing_states
 from rotorid.mismatch.decision.select import COST_PER_EFFECT, COST_PER_PARAMETER
@@ -20,15 +21,19 @@ from rotorid.mismatch.model.wrench import WrenchModel
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.rows import UNKNOWNS_OF_A_STATE, Rows, Term
 
-PIECE_S, PERIODS = 5.0, 2.0
-"""A state is read for so long, and for so many swings at least."""
+PIECE_S, PERIODS, SHORTEST_PIECE_S = 5.0, 2.0, 1.2
+"""A state is read for so long, and for so many swings at least; where it fails for less, but not for less than this."""
 RATE_HZ = 10.0
 """Rate at which the sideways force is looked at: a swing has less than 2 Hz."""
 LEAST_SHARE = 0.3
 """Share of the sideways force's squares that a swing must explain: four numbers of five seconds make 0.1 of noise."""
 MOST_STEPS = 40
-LENGTHS_APART, LENGTH_TO = 0.08, 0.002
-"""Logarithm of how far from its start the length is looked for with the states free, and how finely."""
+QUARTER, MOST_LEAN = np.pi / 2, 0.9
+"""Phase of a swing from which its first state is seen, rad, and the largest sideways part of a direction."""
+LOOKED_FOR = (("length_m", 4, 0.02), ("damping_ratio", 1, 1.0), ("length_m", 1, 0.01))
+"""What of a cable is looked for in turn: steps to each side of where it is, and the logarithm of one."""
+HALVED_SHARE = 0.1
+"""Share of a stretch's mean square that the state of a piece may leave; with more the piece is halved."""
 LARGEST = 3
 """Pieces that are looked at first: most flights have nothing that swings."""
 
@@ -107,16 +112,32 @@ def swinging_term(model: WrenchModel) -> Term | None:
 
 def hung(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows], term: Term) -> list[Segment] | None:
     """Stretches that say how a payload with a term's length and damping hung; None where hardly any force does."""
-    cable = cable_of(model, term)
-    stretches = stretches_of(model, segments, rows)
-    masses = np.concatenate([swing_in(s, cable, None).masses_kg for s in stretches])
-    mass_kg = float(np.median(masses)) if len(masses) else 0.0
+    found = hung_by(cable_of(model, term), segments, stretches_of(model, segments, rows))
+    return None if found is None else found[0]
+
+
+def hung_by(
+    cable: Cable, segments: Sequence[Segment], stretches: Sequence[HangingStretch]
+) -> tuple[list[Segment], float] | None:
+    """Stretches that say how a payload on a cable hung, and its mass, kg; None where hardly any sideways force does."""
+    mass_kg = likely_mass_kg(cable, stretches)
     if mass_kg <= 0.0:
         return None
     found = [swing_in(s, cable, mass_kg) for s in stretches]
     if sum(f.left_n2 for f in found) > (1.0 - LEAST_SHARE) * sum(s.squares for s in stretches):
         return None
-    return [replace(s, motion=replace(s.motion, hung=f.states)) for s, f in zip(segments, found, strict=True)]
+    return [hanging(s, f.states) for s, f in zip(segments, found, strict=True)], mass_kg
+
+
+def hanging(segment: Segment, states: np.ndarray) -> Segment:
+    """A stretch with a payload that hung in the `states` of `Motion.hung`."""
+    motion = segment.motion
+    return replace(segment, motion=replace(motion, hung=states, hung_by=hanging_acceleration(motion)))
+
+
+def as_effect(term: Term, cable: Cable, mass_kg: float) -> tuple[Form, np.ndarray]:
+    """A form that swings with its values: the mass at its hook in the centre of mass, on a cable."""
+    return term.form, np.array([mass_kg, *on_cable(term, cable).values[1:]])
 
 
 def cable_of(model: WrenchModel, term: Term) -> Cable:
@@ -125,26 +146,49 @@ def cable_of(model: WrenchModel, term: Term) -> Cable:
 
 
 def with_likely_length(model: WrenchModel, term: Term) -> Term | None:
-    """A term with the length near its own that explains most, the states free; None where nothing seems to swing."""
-    cable = cable_of(model, term)
-    stretches = stretches_of(model, model.segments, model.rows)
-    if not shows(largest_pieces(stretches, cable), cable):
+    """A term on the cable near its own that explains most, the states free; None where nothing seems to swing."""
+    cable = likely_cable(cable_of(model, term), stretches_of(model, model.segments, model.rows))
+    return None if cable is None else on_cable(term, cable)
+
+
+def likely_cable(cable: Cable, stretches: Sequence[HangingStretch]) -> Cable | None:
+    """The cable near another one that explains most, the states free; None where nothing seems to swing."""
+    if share_left(stretches, cable) > 1.0 - LEAST_SHARE:
         return None
+    for name, steps, apart in LOOKED_FOR:
 
-    def left(change: float) -> float:
-        other = replace(cable, length_m=cable.length_m * float(np.exp(change)))
-        return sum(swing_in(s, other, None).left_n2 for s in stretches)
+        def left(change: float, cable=cable, name=name) -> float:
+            return sum(swing_in(s, scaled(cable, name, change), None).left_n2 for s in stretches)
 
-    reach = -LENGTHS_APART, LENGTHS_APART
-    change = minimize_scalar(left, bounds=reach, method="bounded", options={"xatol": LENGTH_TO}).x
+        # What is left jumps where a piece is lost: first the best of some, then about it.
+        start = min(apart * np.arange(-steps, steps + 1), key=left)
+        about = start - apart, start + apart
+        cable = scaled(cable, name, minimize_scalar(left, bounds=about, method="bounded", options={"maxiter": 8}).x)
+    return cable
+
+
+def likely_mass_kg(cable: Cable, stretches: Sequence[HangingStretch]) -> float:
+    """The mass that most pieces suggest, kg; 0 without any."""
+    masses = np.concatenate([np.zeros(0), *(swing_in(s, cable, None).masses_kg for s in stretches)])
+    return float(np.median(masses)) if len(masses) else 0.0
+
+
+def scaled(cable: Cable, name: str, change: float) -> Cable:
+    """A cable with another length or damping, by the `change` of its logarithm."""
+    return replace(cable, **{name: getattr(cable, name) * float(np.exp(change))})
+
+
+def on_cable(term: Term, cable: Cable) -> Term:
+    """A term of what swings, on a cable."""
     values = list(term.values)
-    values[term.form.nonlinear[0]] *= float(np.exp(change))
+    for index, value in zip(term.form.nonlinear, (cable.length_m, cable.damping_ratio), strict=True):
+        values[index] = value
     return replace(term, values=tuple(values))
 
 
 def like(segments: Sequence[Segment], noisy: Sequence[Segment]) -> list[Segment]:
     """Noisy copies of stretches with a payload that hung as it did in these."""
-    return [replace(n, motion=replace(n.motion, hung=s.motion.hung)) for s, n in zip(segments, noisy, strict=False)]
+    return [hanging(n, s.motion.hung) for s, n in zip(segments, noisy, strict=False)]
 
 
 def price(segments: Sequence[Segment]) -> float:
@@ -155,18 +199,28 @@ def price(segments: Sequence[Segment]) -> float:
 def stretches_of(model: WrenchModel, segments: Sequence[Segment], rows: Sequence[Rows]) -> list[HangingStretch]:
     """Every stretch with what effects that do not swing leave of its sideways force; empty where it is not known."""
     terms, fit = model.search.terms, model.selection.fit
-    if any(s.motion.rotation is None for s in segments) or not all(np.isfinite(r.y[:, :3]).all() for r in rows):
-        return []
     others = [k for k in model.selection.active if not terms[k].form.swings and not terms[k].run]
     cols = model.regression.columns(others)
-    beta, out = fit.beta[fit.places(cols)], []
-    per = max(1, round(model.prepared.thinner.rate_hz / RATE_HZ))
-    for s, r in zip(segments, rows, strict=True):
-        index = np.searchsorted(s.motion.time_s, r.time_s).clip(0, s.motion.size - 1)
-        left = r.y[:, :3] - r.x[:, :3][:, :, cols] @ beta
-        world = np.einsum("nij,nj->ni", s.motion.rotation[index], left)[:, :2]
+    left = [r.y[:, :3] - r.x[:, :3][:, :, cols] @ fit.beta[fit.places(cols)] for r in rows]
+    return hanging_stretches(segments, [r.time_s for r in rows], left, model.prepared.thinner.rate_hz)
+
+
+def hanging_stretches(
+    segments: Sequence[Segment], times_s: Sequence[np.ndarray], left: Sequence[np.ndarray], rate_hz: float
+) -> list[HangingStretch]:
+    """Every stretch with the sideways part of its force; empty where it is not known.
+
+    `left` are the forces (m, 3) in body axes at `times_s` (m,), N, `rate_hz` their rate.
+    """
+    if any(s.motion.rotation is None for s in segments) or not all(np.isfinite(own).all() for own in left):
+        return []
+    out = []
+    per = max(1, round(rate_hz / RATE_HZ))
+    for s, time_s, own in zip(segments, times_s, left, strict=True):
+        index = np.searchsorted(s.motion.time_s, time_s).clip(0, s.motion.size - 1)
+        world = np.einsum("nij,nj->ni", s.motion.rotation[index], own)[:, :2]
         count = len(world) // per
-        at_s = r.time_s[: count * per].reshape(count, per).mean(axis=1)
+        at_s = time_s[: count * per].reshape(count, per).mean(axis=1)
         force = world[: count * per].reshape(count, per, 2).mean(axis=1)
         out.append(HangingStretch(hanging_acceleration(s.motion), s.motion.time_s, at_s, force))
     return out
@@ -182,35 +236,56 @@ def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[Ha
     return sorted(pieces, key=lambda p: -p.squares)[:LARGEST]
 
 
-def shows(pieces: Sequence[HangingStretch], cable: Cable) -> bool:
-    """Whether a swing explains enough of the force of pieces, each by itself."""
-    left = sum(swing_in(p, cable, None).left_n2 for p in pieces)
-    return bool(pieces) and left <= (1.0 - LEAST_SHARE) * sum(p.squares for p in pieces)
+def share_left(stretches: Sequence[HangingStretch], cable: Cable) -> float:
+    """Share of the force's squares that a swing leaves in the largest pieces, each by itself; 1 without any."""
+    pieces = largest_pieces(stretches, cable)
+    squares = sum(p.squares for p in pieces)
+    return sum(swing_in(p, cable, None).left_n2 for p in pieces) / squares if squares > 0.0 else 1.0
 
 
 def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> Swing:
     """How a payload hung in a stretch; its mass is free in each piece where it is None.
 
-    Each piece starts from where the one before ends and is moved to what explains most of its force.
+    Each piece starts from where the one before ends and is moved to what explains most of its force. A piece of known
+    mass of which no state explains enough is halved: what swings far soon forgets its state.
     """
     start, stop = stretch.time_s[0], stretch.time_s[-1]
     edges = np.linspace(start, stop + 1e-9, max(1, int((stop - start) / cable.piece_s)) + 1)
+    spans = list(zip(edges[:-1], edges[1:], strict=True))
     state, states, masses, left = at_rest(stretch.hanging[0]), [], [], 0.0
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    while spans:
+        first, last = spans.pop(0)
         piece = stretch.part(first, last)
         if len(piece.at_s) > 2 * UNKNOWNS_OF_A_STATE and len(piece.time_s) > 2:
-            state, mass, rest = fitted_piece(piece, cable, state, mass_kg)
+            own, mass, rest = fitted_piece(piece, cable, state, mass_kg)
+            usual = HALVED_SHARE * stretch.squares * len(piece.at_s) / len(stretch.at_s)
+            if mass_kg is not None and rest > usual and last - first > 2 * SHORTEST_PIECE_S:
+                middle = 0.5 * (first + last)
+                spans = [(first, middle), (middle, last), *spans]
+                continue
             masses.append(mass)
             left += rest
-            states.append([first, *state])
-            state = piece.end(cable, state)
+            states.append([first, *own])
+            state = piece.end(cable, own)
         else:
             states.append([first, *state])
     return Swing(np.array(states), np.array(masses), left)
 
 
 def fitted_piece(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
-    """The state near `state` whose swing explains most of a piece's force; its mass, kg, and the squares left, N2.
+    """The state whose swing explains most of a piece's force; its mass, kg, and the squares left, N2.
+
+    It is looked for near `state` and near what the first quarter of a swing shows.
+    """
+    near = fitted_near(piece, cable, state, mass_kg)
+    if near[1] <= 0.0:
+        return near
+    seen = fitted_near(piece, cable, seen_at_first(piece, cable, near[1]), mass_kg)
+    return min(near, seen, key=lambda found: found[2])
+
+
+def fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
+    """As `fitted_piece`, near a state.
 
     One-sigma of the state is a radian, and a radian in 1/ω: what is not excited stays where it was.
     """
@@ -229,6 +304,17 @@ def fitted_piece(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg
     own = moved(state, found, cable.rate)
     pull = piece.pull(cable, own)
     return own, mass_of(pull), float(((piece.force - mass_of(pull) * pull) ** 2).sum())
+
+
+def seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.ndarray:
+    """The state (6,) in which a piece begins as its first quarter of a swing shows it: force is mass times lean."""
+    first = piece.at_s <= piece.at_s[0] + max(QUARTER / cable.rate, 3.0 / RATE_HZ)
+    since_s = piece.at_s[first] - piece.time_s[0]
+    weight = mass_kg * np.linalg.norm(piece.hanging, axis=1).mean()
+    (rate, lean) = np.polyfit(since_s, piece.force[first] / weight, 1)
+    lean /= max(1.0, float(np.linalg.norm(lean)) / MOST_LEAN)
+    down = np.sqrt(1.0 - lean @ lean)
+    return np.array([*lean, down, *rate, -(lean @ rate) / down])
 
 
 def at_rest(hanging: np.ndarray) -> np.ndarray:

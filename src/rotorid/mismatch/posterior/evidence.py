@@ -59,6 +59,8 @@ class EvidenceTerm:
     """How many times the size that matters elsewhere its contribution must have."""
     of_change: bool = False
     """Whether the bounds in `linear` are those of a change between two sets, and not of the parameters themselves."""
+    alone: bool = False
+    """Whether of two sets only the second can have it."""
     of_reading: tuple[tuple[int, int], ...] = ()
     """Places in `linear` of parameters stated as p/(1 − s), each with the place of its s (`Form.stated`)."""
 

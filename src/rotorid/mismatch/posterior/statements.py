@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
+from rotorid.mismatch.posterior.problem import Problem
 from rotorid.mismatch.posterior.score import Model, Scored, places, scored
 from rotorid.mismatch.posterior.search import Found, ranked, without
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
@@ -22,6 +23,9 @@ WORST_SUBSTITUTE = -8.0
 """Nats, as ranked, from which one is not tried."""
 SURE, LIKELY, POSSIBLE = 0.99, 0.5, 0.05
 """Probabilities from which an id (a class) is established (ambiguous), suggested, or looked at and not established."""
+STATED_REACH = 10.0
+"""Times as wide a prior as models are compared by, for the numbers of a change: they shrink by a percent at most where
+they did by a half."""
 MOST_MEMBERS = 4
 """Ids of a class at most: more say no more than that something is off."""
 
@@ -55,26 +59,45 @@ class Statement:
         return f"its probability is {100 * self.probability:.0f} %"
 
 
-def statements_of(found: Found, one_for_several: bool = False) -> tuple[Statement, ...]:
+def statements_of(found: Found, of_change: bool = False) -> tuple[Statement, ...]:
     """A statement for each named effect of the most probable model, the surest first.
 
-    With `one_for_several` a class may hold an effect that explains alone what several do together: an offset of the
-    centre of mass and a weaker thrust are a payload.
+    Of a change a class may hold an effect that explains alone what several do together: an offset of the centre of
+    mass and a weaker thrust are a payload. Its numbers are stated with a wide prior: the one that models are compared
+    by, of what one row determines, would shrink large changes.
     """
     at = scored(found.problem, found.model)
+    numbers = widened(found.problem) if of_change else found.problem
     named = [key for key in found.model if found.problem.terms[key].effect not in {"", *UNKNOWNS}]
     # Everything is visited before shares are taken over what was visited.
     seen = [(key, substitutes(found, key), odds_of(found, key)) for key in named]
     weights = weights_of(found)
-    if one_for_several:
+    if of_change:
         more = visited_instead(found, weights)
         seen = [(key, (*others, *more), odds) for key, others, odds in seen]
-    stated = [statement(found, at, weights, key, others, odds) for key, others, odds in seen]
+    known = scored(numbers, found.model)
+    stated = [
+        statement(found, at, weights, key, others, odds, parameters(numbers, known, key)) for key, others, odds in seen
+    ]
     return tuple(sorted(stated, key=lambda s: -s.odds))
 
 
+def widened(problem: Problem) -> Problem:
+    """A problem with priors of all effects that are wide enough to state their numbers with."""
+    sd = problem.prior_sd.copy()
+    for key in problem.effects:
+        sd[problem.columns_of[key]] *= STATED_REACH
+    return replace(problem, prior_sd=sd)
+
+
 def statement(
-    found: Found, at: Scored, weights: Mapping[Model, float], key: str, others: Sequence[str], odds: float
+    found: Found,
+    at: Scored,
+    weights: Mapping[Model, float],
+    key: str,
+    others: Sequence[str],
+    odds: float,
+    numbers: tuple[Estimate, ...],
 ) -> Statement:
     """What is said of one effect of the most probable model, given the ids that could stand in its place."""
     effect = found.problem.terms[key].effect
@@ -93,7 +116,7 @@ def statement(
         alternatives=tuple(sorted(members)) if status == "ambiguous" else (),
         probability=joint if status == "ambiguous" else alone,
         odds=odds,
-        parameters=parameters(found, at, key),
+        parameters=numbers,
         window=found.problem.terms[key].window,
     )
 
@@ -183,10 +206,9 @@ def squares_of(found: Found, at: Scored, key: str) -> np.ndarray:
     return np.einsum("i,cij,j->c", beta, found.problem.channel_gram[:, own[:, None], own], beta)
 
 
-def parameters(found: Found, at: Scored, key: str) -> tuple[Estimate, ...]:
+def parameters(problem: Problem, at: Scored, key: str) -> tuple[Estimate, ...]:
     """Linear parameters of a term as its form states them, with 95 % intervals; none of a form without."""
-    problem, term = found.problem, found.problem.terms[key]
-    own = problem.columns_of[key]
+    term, own = problem.terms[key], problem.columns_of[key]
     where, unit = places(at.columns, own), problem.unit[own]
     beta = at.mode.beta[where] * unit
     reach = Z95 * np.sqrt(np.maximum(np.diag(at.mode.covariance)[where], 0.0)) * unit

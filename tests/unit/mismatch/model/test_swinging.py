@@ -5,11 +5,21 @@ import pytest
 
 from rotorid.effects.pendulum import cable_pull, swing
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.model.swinging import Cable, HangingStretch, largest_pieces, moved, shows, swing_in
+from rotorid.mismatch.model.swinging import (
+    Cable,
+    HangingStretch,
+    fitted_piece,
+    largest_pieces,
+    likely_cable,
+    moved,
+    share_left,
+    swing_in,
+)
 from tests.unit.mismatch.flights import recorded
 
 G, LENGTH_M, RATIO, MASS_KG = 9.81, 0.6, 0.01, 0.2
 CABLE = Cable(LENGTH_M, RATIO, G)
+DOWN = np.array([0.0, 0, 1, 0, 0, 0])
 
 
 def shaken(seed: int, seconds: float = 30.0):
@@ -35,7 +45,7 @@ def sideways(hanging, time_s, start, noise_n: float, seed: int):
 
 def test_the_states_of_a_load_that_swings_far_are_read_piece_by_piece():
     hanging, time_s = shaken(1)
-    at_s, force = sideways(hanging, time_s, moved(np.array([0.0, 0, 1, 0, 0, 0]), [0.7, -0.4, 0.5, 0.3], 4.0), 0.05, 2)
+    at_s, force = sideways(hanging, time_s, moved(DOWN, [0.7, -0.4, 0.5, 0.3], 4.0), 0.05, 2)
     stretch = HangingStretch(hanging, time_s, at_s, force)
     assert np.median(swing_in(stretch, CABLE, None).masses_kg) == pytest.approx(MASS_KG, rel=0.03)
     found = swing_in(stretch, CABLE, MASS_KG)
@@ -49,14 +59,31 @@ def test_noise_swings_not():
     hanging, time_s = shaken(3)
     at_s = time_s[10::20]
     force = 0.2 * np.random.default_rng(4).standard_normal((len(at_s), 2))
-    pieces = largest_pieces([HangingStretch(hanging, time_s, at_s, force)], CABLE)
-    assert len(pieces) == 3 and not shows(pieces, CABLE)
-    assert not shows([], CABLE)
+    stretch = HangingStretch(hanging, time_s, at_s, force)
+    assert len(largest_pieces([stretch], CABLE)) == 3
+    assert share_left([stretch], CABLE) > 0.7 and likely_cable(CABLE, [stretch]) is None
+    assert share_left([], CABLE) == 1.0
+
+
+def test_a_piece_that_no_state_explains_is_halved():
+    """The load is pushed in the middle of a piece: two states explain what one cannot."""
+    hanging, time_s = shaken(6, 5.0)
+    half = len(time_s) // 2
+    first, second = (moved(DOWN, np.array(m), 4.0) for m in ([0.2, 0, 0, 0], [-0.9, 0.7, 1, 1]))
+    states = np.array([[0.0, *first], [time_s[half], *second]])
+    pull = MASS_KG * cable_pull(hanging, time_s, LENGTH_M, RATIO, G, states)[:, :2]
+    at_s = time_s[10::20]
+    force = np.stack([np.interp(at_s, time_s, column) for column in pull.T], axis=1)
+    stretch = HangingStretch(hanging, time_s, at_s, force)
+    _, _, left_by_one_n2 = fitted_piece(stretch, CABLE, first, MASS_KG)
+    found = swing_in(stretch, CABLE, MASS_KG)
+    assert left_by_one_n2 > 0.1 * stretch.squares
+    assert len(found.states) > 1 and found.left_n2 < 0.25 * left_by_one_n2
 
 
 def test_a_piece_goes_on_where_the_one_before_ends():
     hanging, time_s = shaken(5, 4.0)
-    start = moved(np.array([0.0, 0, 1, 0, 0, 0]), [0.3, 0.2, 0.1, -0.2], 4.0)
+    start = moved(DOWN, [0.3, 0.2, 0.1, -0.2], 4.0)
     middle = HangingStretch(hanging[:401], time_s[:401], time_s[:0], np.zeros((0, 2))).end(CABLE, start)
     whole, _ = swing(hanging, time_s, LENGTH_M, RATIO, G, np.array([[0.0, *start]]))
     rest, _ = swing(hanging[400:], time_s[400:], LENGTH_M, RATIO, G, np.array([[time_s[400], *middle]]))
