@@ -211,6 +211,23 @@ rule prove_changes:
         "../scripts/prove_changes.py"
 
 
+rule prove_fleet:
+    """Vehicles over ten flights in which it is known what changed since when: slow, on request."""
+    message:
+        "Proof: a fleet's history"
+    output:
+        table="results/proof/fleet.csv",
+    params:
+        so_far="results/changes/fleet.csv",
+        seed=CONFIG.proof.release or "development",
+        concealing=[CODE.of(path) for path in CONCEALING],
+        code=code_of("prove_fleet"),
+    log:
+        "results/logs/prove_fleet.log",
+    script:
+        "../scripts/prove_fleet.py"
+
+
 rule prove_next_session:
     """The same of stands and benches, drawn for the release: on request."""
     message:

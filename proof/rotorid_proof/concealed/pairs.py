@@ -146,19 +146,21 @@ def slower(draft: multibody.Draft) -> None:
     draft.adds("motor_lag", [("tau_up", draft.world.lag - LAG_S, "s"), ("tau_down", draft.world.lag - LAG_S, "s")])
 
 
-def pair_of_multibody(seed: int) -> Pair:
-    """A pair on MuJoCo."""
-    rng = np.random.default_rng([seed, 51])
-    quad = vehicle.drawn(rng)
-    both, changes = str(rng.choice(BOTH_OF_MULTIBODY)), drawn_families(rng, CHANGES_OF_MULTIBODY)
-    grade = logger.drawn(str(rng.choice(["lab", "lab", "tele"])), rng, command="lag" in changes or rng.random() < 0.3)
+@dataclass(frozen=True)
+class Multibody:
+    """A vehicle that MuJoCo flies, with its loggers."""
 
-    def draft_of(families: dict[int, str]) -> tuple[multibody.Draft, dict[str, float]]:
-        draft, factors = multibody.Draft(quad, np.random.default_rng([seed, 52])), {}
-        if "command" in grade.groups:
+    seed: int
+    quad: object
+    grade: object
+
+    def draft_of(self, families: dict[int, str]) -> tuple[multibody.Draft, dict[str, float]]:
+        """The vehicle with some families of changes, by the number that each is drawn with; factors of its values."""
+        draft, factors = multibody.Draft(self.quad, np.random.default_rng([self.seed, 52])), {}
+        if "command" in self.grade.groups:
             draft.world.lag = LAG_S
         for k, family in families.items():
-            draft.rng = np.random.default_rng([seed, 53, k, len(family)])
+            draft.rng = np.random.default_rng([self.seed, 53, k, len(family)])
             if family == "value":
                 draft.quad, name, factor = other_value(draft.quad, draft.rng)
                 factors[name] = factor
@@ -166,23 +168,31 @@ def pair_of_multibody(seed: int) -> Pair:
                 (slower if family == "lag" else multibody.FAMILIES[family])(draft)
         return draft, factors
 
-    base, _ = draft_of({0: both})
-    new, factors = draft_of(dict(enumerate([both, *changes])))
-    file, _ = multibody.believed(base, np.random.default_rng([seed, 2]), grade)
-
-    def flights(draft: multibody.Draft, number: int, count: int = RUNS):
-        own = np.random.default_rng([seed, 54, number])
+    def flights(self, draft: multibody.Draft, file: dict, number: int, count: int = RUNS):
+        """Runs on drawn paths, and what the changes amount to in each channel."""
+        own = np.random.default_rng([self.seed, 54, number])
         runs = [(tuple(own.choice(course.KINDS, 4)), RUN_S) for _ in range(count)]
-        return multibody.recorded(draft, grade, runs, file, seed + number)
+        return multibody.recorded(draft, self.grade, runs, file, self.seed + number)
 
+
+def pair_of_multibody(seed: int) -> Pair:
+    """A pair on MuJoCo."""
+    rng = np.random.default_rng([seed, 51])
+    quad = vehicle.drawn(rng)
+    both, changes = str(rng.choice(BOTH_OF_MULTIBODY)), drawn_families(rng, CHANGES_OF_MULTIBODY)
+    grade = logger.drawn(str(rng.choice(["lab", "lab", "tele"])), rng, command="lag" in changes or rng.random() < 0.3)
+    own = Multibody(seed, quad, grade)
+    base, _ = own.draft_of({0: both})
+    new, factors = own.draft_of(dict(enumerate([both, *changes])))
+    file, _ = multibody.believed(base, np.random.default_rng([seed, 2]), grade)
     hidden = []
     for k, family in enumerate(changes, start=1):
-        alone, own_factors = draft_of({k: family})
-        if small(flights(alone, 1, 1)[2]):
+        alone, own_factors = own.draft_of({k: family})
+        if small(own.flights(alone, file, 1, 1)[2]):
             hidden += [*(e["id"] for e in alone.effects), *own_factors]
     return Pair(
-        base=Recording(file, flights(base, 0)[0], form="parquet"),
-        new=Recording(file, flights(new, 1)[0], form="parquet"),
+        base=Recording(file, own.flights(base, file, 0)[0], form="parquet"),
+        new=Recording(file, own.flights(new, file, 1)[0], form="parquet"),
         truth=truth_of(
             beyond(base.effects, new.effects),
             factors,
@@ -193,6 +203,43 @@ def pair_of_multibody(seed: int) -> Pair:
             grade=grade.name,
         ),
     )
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A vehicle over its flights."""
+
+    flights: tuple[Recording, ...]
+    since: int | None
+    """Number of the first flight with the change, None where nothing changes."""
+    truth: dict
+    """As `Pair.truth`."""
+
+
+EVENTS = ("value", "value", "rigid_payload", "off_centre", "weak_rotor")
+
+
+def flown(name: str, flights: int, good: int) -> Flown:
+    """Some flights of the vehicle `<seed>/<number>`; with an odd number one thing changes after the `good` first ones.
+
+    The vehicle's `vehicle.yaml` stays the same.
+    """
+    seed = int(hashlib.sha256(f"fleet|{name}".encode()).hexdigest()[:12], 16)
+    rng = np.random.default_rng([seed, 55])
+    own = Multibody(seed, vehicle.drawn(rng), logger.drawn(str(rng.choice(["lab", "tele"])), rng, command=False))
+    both = str(rng.choice(BOTH_OF_MULTIBODY))
+    events = [str(rng.choice(EVENTS))] if int(name.rsplit("/")[-1]) % 2 else []
+    since = int(rng.integers(good, flights)) if events else None
+    base, _ = own.draft_of({0: both})
+    new, factors = own.draft_of(dict(enumerate([both, *events])))
+    file, _ = multibody.believed(base, np.random.default_rng([seed, 2]), own.grade)
+
+    def flight(k: int) -> Recording:
+        draft = new if since is not None and k >= since else base
+        return Recording(file, own.flights(draft, file, k, 1)[0], form="parquet")
+
+    truth = truth_of(beyond(base.effects, new.effects), factors, new.fair, [], families=events)
+    return Flown(tuple(flight(k) for k in range(flights)), since, truth)
 
 
 # --- differential equations ------------------------------------------------------------------------------------------

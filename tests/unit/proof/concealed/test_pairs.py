@@ -65,3 +65,10 @@ def test_a_vehicle_that_no_controller_holds_is_drawn_anew(monkeypatch):
     monkeypatch.setitem(pairs.MAKERS, "continuous", maker)
     assert pairs.make("continuous/01234567/000") == tried[-1]
     assert len(set(tried)) == 3
+
+
+def test_a_vehicle_over_its_flights_changes_once_after_the_good_ones_and_its_file_does_not() -> None:
+    own = pairs.flown("test/001", 4, 3)
+    assert own.since == 3 and own.truth["changes"]
+    assert all(flight.vehicle == own.flights[0].vehicle for flight in own.flights)
+    assert pairs.flown("test/000", 1, 1).since is None
