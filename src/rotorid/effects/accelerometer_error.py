@@ -75,7 +75,7 @@ EFFECT = Effect(
     separating_manoeuvre="a static six-face calibration",
     separating_columns=("position",),
     kind="sensor",
-    # Ten kelvin of half a milli-g a kelvin (35 mg over 70 K: InvenSense MPU-6000, product specification, 6.2). How
-    # much it turns on its mount is assumed.
+    # Ten kelvin of half a milli-g a kelvin (35 mg over 70 K: InvenSense MPU-6000, product specification, 6.2); 0.02
+    # to 0.06 between flights of two laboratories (docs/compare.md). How much it turns on its mount is assumed.
     between_flights={"m/s2": 0.05, "rad": 0.003},
 )
