@@ -59,9 +59,10 @@ def make(name: str) -> Pair:
 
 
 def drawn_families(rng: np.random.Generator, families: tuple[str, ...]) -> list[str]:
-    """Nothing in three of ten pairs, two changes in three of twenty, else one."""
+    """Nothing in three of ten pairs, two changes in three of twenty, else one; two weak rotors are one change."""
     count = int(rng.choice(3, p=(0.3, 0.55, 0.15)))
-    return [str(f) for f in rng.choice(families, count, replace=False)]
+    chosen = [str(f) for f in rng.choice(families, count, replace=False)]
+    return chosen if set(chosen) <= {"value"} else list(dict.fromkeys(chosen))
 
 
 def other_value(body, rng: np.random.Generator):
@@ -108,6 +109,16 @@ def truth_of(effects: list[dict], factors: dict[str, float], fair: list[str], hi
     ]
     changes = [{**c, "need_not_be_found": c["id"] in hidden} for c in (*effects, *values)]
     return plain({"changes": changes, "fair": fair, **more})
+
+
+def with_drags_added(draft: multibody.Draft) -> list[dict]:
+    """Effects of a vehicle, each rotor drag with the whole k_d: one by speed and one by thrust act together."""
+    q, world = draft.quad, draft.world
+    whole = world.drag_speed + world.drag_thrust * q.mass * multibody.GRAVITY / 4 / q.hover
+    return [
+        {**e, "parameters": [{**p, "value": whole} for p in e["parameters"]]} if e["id"] == "rotor_drag" else e
+        for e in draft.effects
+    ]
 
 
 def beyond(base: list[dict], new: list[dict]) -> list[dict]:
@@ -194,7 +205,7 @@ def pair_of_multibody(seed: int) -> Pair:
         base=Recording(file, own.flights(base, file, 0)[0], form="parquet"),
         new=Recording(file, own.flights(new, file, 1)[0], form="parquet"),
         truth=truth_of(
-            beyond(base.effects, new.effects),
+            beyond(with_drags_added(base), with_drags_added(new)),
             factors,
             new.fair,
             hidden,
@@ -238,7 +249,7 @@ def flown(name: str, flights: int, good: int) -> Flown:
         draft = new if since is not None and k >= since else base
         return Recording(file, own.flights(draft, file, k, 1)[0], form="parquet")
 
-    truth = truth_of(beyond(base.effects, new.effects), factors, new.fair, [], families=events)
+    truth = truth_of(beyond(with_drags_added(base), with_drags_added(new)), factors, new.fair, [], families=events)
     return Flown(tuple(flight(k) for k in range(flights)), since, truth)
 
 
