@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from itertools import combinations
@@ -11,7 +11,15 @@ import numpy as np
 
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Reason
-from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, hotelling, quadratic_form
+from rotorid.mismatch.plant.regression import (
+    MOST_ATTENUATION,
+    VALUE_LIMITS,
+    Fit,
+    Regression,
+    Solution,
+    hotelling,
+    quadratic_form,
+)
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
@@ -91,6 +99,16 @@ class Questions:
     """The same of effects that are in the model already (between command and rotor speed), (12,)."""
 
 
+def price(term: Term) -> float:
+    """Whitened squares that a term costs by its parameters, by its id and by its want of a name."""
+    return COST_PER_PARAMETER * term.size + COST_PER_EFFECT + COST_OF_UNKNOWN * (term.effect in UNKNOWNS)
+
+
+def keys_of(terms: Iterable[Term]) -> list[str]:
+    """Keys of terms."""
+    return [t.key for t in terms]
+
+
 class Search:
     """Forward search with replacement of forms and backward checks."""
 
@@ -105,6 +123,7 @@ class Search:
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.ask = ask
         self.blocks = int(regression.training.sum())
+        self._place = {key: i for i, key in enumerate(self.terms)}.__getitem__
 
     def within_bounds(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
         """Whether coefficients are inside their bounds, or outside by less than their own uncertainty."""
@@ -128,12 +147,11 @@ class Search:
         limits = [term.form.parameters[i].negligible for i in term.form.linear]
         return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
 
-    def judge(self, key: str, active: list[str], base: Fit, jackknife: bool = False) -> Candidate:
+    def judge(self, key: str, active: list[str], base: Solution, jackknife: bool = False) -> Candidate:
         """A term added to (or, if in `active`, kept in) the model."""
-        keys = self.always + [k for k in active if k != key] + [key]
+        keys = self.always + sorted({*active, key}, key=self._place)
         fit = self.regression.fit(keys, jackknife=jackknife)
-        cols = self.regression.columns([key])
-        where = len(fit.columns) - len(cols) + np.arange(len(cols))
+        where = fit.places(self.regression.columns([key]))
         beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
         statistic = quadratic_form(beta, covariance)
         p_value = hotelling(statistic, len(beta), self.blocks)
@@ -146,7 +164,7 @@ class Search:
         physical = physical and not rules.STRAIN(self.strains(fit, base))
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
-    def strains(self, fit: Fit, base: Fit) -> bool:
+    def strains(self, fit: Fit, base: Solution) -> bool:
         """Whether a term needs a believed value far from its belief that the model without it does not need."""
         for term in self.regression.terms:
             if term.kind != "value":
@@ -165,7 +183,7 @@ class Search:
         largest = self.ask.known_sizes.copy()
         others = [k for k in active if k != key]
         if others:
-            fit = self.regression.fit(self.always + others)
+            fit = self.regression.solution(self.always + others)
             for k in others:
                 cols = self.regression.columns([k])
                 where = fit.places(cols)
@@ -177,13 +195,14 @@ class Search:
         # A burst is easily imitated by what the form of a strong effect leaves over.
         return float(own.max()) / (limits["times_for_burst"] if burst else 1.0)
 
-    def without(self, key: str, active: list[str]) -> Fit:
-        return self.regression.fit(self.always + [k for k in active if k != key])
+    def without(self, key: str, active: list[str]) -> Solution:
+        return self.regression.solution(self.always + [k for k in active if k != key])
 
-    def most(self, term: Term, active: list[str]) -> float:
-        """What a further term explains less what its parameters cost: the most that its score can be."""
-        base, whole = (self.regression.explained([*self.always, *active, *more]) for more in ((), (term.key,)))
-        return whole - base - COST_PER_PARAMETER * term.size
+    def most(self, terms: Sequence[Term], active: list[str]) -> list[float]:
+        """What each of further terms explains less what its parameters cost: the most that its score can be."""
+        present = [*self.always, *active]
+        base, with_each = self.regression.explained(present), self.regression.explained_with(present, keys_of(terms))
+        return [whole - base - COST_PER_PARAMETER * t.size for t, whole in zip(terms, with_each, strict=True)]
 
     def judged(
         self, terms: Iterable[Term], active: list[str], turn: Callable[[Term], int] = lambda _: 0
@@ -192,8 +211,9 @@ class Search:
 
         To judge one costs many times what `most` does: it is done only where no other is sure to be better.
         """
-        base = self.regression.fit(self.always + active)
-        waiting = [(turn(t), -self.most(t, active), number, t) for number, t in enumerate(terms)]
+        base, terms = self.regression.solution(self.always + active), list(terms)
+        most = self.most(terms, active)
+        waiting = [(turn(t), -m, number, t) for number, (t, m) in enumerate(zip(terms, most, strict=True))]
         heapify(waiting)
         while waiting:
             own, _, number, found = heappop(waiting)
@@ -208,8 +228,9 @@ class Search:
     ) -> Iterator[Candidate]:
         """Terms whose id is neither in the model yet nor dropped and that are worth their parameters, judged."""
         taken = {self.terms[k].once for k in active} | set(dropped)
-        free = (t for t in self.terms.values() if t.kind == "effect" and t.once not in taken)
-        return self.judged((t for t in free if self.most(t, active) > 0), active, turn)
+        free = [t for t in self.terms.values() if t.kind == "effect" and t.once not in taken]
+        most = self.most(free, active)
+        return self.judged([t for t, m in zip(free, most, strict=True) if m > 0], active, turn)
 
     def best_form(self, key: str, active: list[str]) -> str:
         """The form of the same id that explains most for its parameters, the others in the model kept."""
@@ -233,22 +254,25 @@ class Search:
             trial = [k for k in active if k != gone]
             value = self.worth(trial)
             for place in 2 * [i for i, k in enumerate(trial) if not self.terms[k].run]:
-                for form in self.terms.values():
-                    if form.kind != "effect" or form.effect != self.terms[trial[place]].effect:
-                        continue
-                    other = [*trial[:place], form.key, *trial[place + 1 :]]
-                    if (worth := self.worth(other)) > value:
-                        trial, value = other, worth
+                effect, rest = self.terms[trial[place]].effect, [*trial[:place], *trial[place + 1 :]]
+                forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == effect]
+                worths = self.worth_with(rest, forms)
+                if max(worths) > value:
+                    value, best_form = max(worths), forms[int(np.argmax(worths))].key
+                    trial = [*trial[:place], best_form, *trial[place + 1 :]]
             if value > best and self._all_physical(trial):
                 best, found = value, trial
         return found
 
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
-        parameters = sum(self.terms[k].size for k in keys)
-        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
-        gain = self.regression.explained(self.always + keys)
-        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
+        return self.regression.explained(self.always + keys) - sum(price(self.terms[k]) for k in keys)
+
+    def worth_with(self, keys: list[str], further: Sequence[Term]) -> list[float]:
+        """The same of a model with each of further terms."""
+        gains = self.regression.explained_with(self.always + keys, keys_of(further))
+        cost = sum(price(self.terms[k]) for k in keys)
+        return [gain - cost - price(term) for gain, term in zip(gains, further, strict=True)]
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it explains clearly more: the first to enter may be wrong.
@@ -258,6 +282,7 @@ class Search:
         if not rules.EXCHANGE.on:
             return None
         taken = {self.terms[k].once for k in active} | set(dropped)
+        others = [t for t in self.terms.values() if t.kind == "effect" and not t.run and t.once not in taken]
         present, whole = self.worth(active), self.regression.explained(self.always + active)
         trials = []
         for gone in active:
@@ -265,11 +290,12 @@ class Search:
                 continue
             own = whole - self.regression.explained(self.always + [k for k in active if k != gone])
             least = present + max(COST_PER_PARAMETER / 2, (2 * VALUE_FLOOR) ** 2 * own)
-            for other in self.terms.values():
-                if other.kind == "effect" and not other.run and other.once not in taken:
-                    trial = [other.key if k == gone else k for k in active]
-                    if (worth := self.worth(trial)) > least:
-                        trials.append((worth, other.key, trial))
+            worths = self.worth_with([k for k in active if k != gone], others)
+            trials += [
+                (worth, other.key, [other.key if k == gone else k for k in active])
+                for other, worth in zip(others, worths, strict=True)
+                if worth > least
+            ]
         trials = sorted(trials, key=lambda t: -t[0])
         return next(
             (
@@ -435,7 +461,7 @@ class Search:
         """
         if len(active) < 2:
             return None
-        fit = self.regression.fit(self.always + active)
+        fit = self.regression.solution(self.always + active)
         named = [k for k in active if self.terms[k].effect not in UNKNOWNS and not self.terms[k].run]
 
         def sizes(keys: list[str]) -> np.ndarray:
@@ -476,7 +502,7 @@ class Search:
 
     def unsteady(self, active: list[str]) -> str | None:
         """A term whose coefficients are not the same from run to run, beyond doubt and by much."""
-        fit = self.regression.fit(self.always + active)
+        fit = self.regression.solution(self.always + active)
         for key in active:
             if self.terms[key].run:
                 continue
@@ -507,12 +533,12 @@ class Search:
                 found.append(term.effect)
         return found
 
-    def _replaces(self, other: str, own: Candidate, rest: list[str], base: Fit) -> bool:
+    def _replaces(self, other: str, own: Candidate, rest: list[str], base: Solution) -> bool:
         """Whether given another term alone one of the model is no longer needed."""
         instead = self.judge(other, rest, base)
         if not instead.physical or instead.p_value > INSTEAD_P or instead.gain < 0.5 * own.gain:
             return False
         if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
             return False
-        beside = self.regression.fit(self.always + rest + [other])
+        beside = self.regression.solution(self.always + rest + [other])
         return self.judge(own.key, [*rest, other], beside).p_value > ALTERNATIVE_P

@@ -12,14 +12,16 @@ Fuller, Measurement Error Models, 1987, ch. 2).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.special import chdtrc, fdtrc
 
 from rotorid.mismatch.plant.comparison import LEAST_RUNS, Comparison, environments, folds
+from rotorid.mismatch.plant.further import Equations
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.recordings.signal.kernels import causal
 
@@ -33,6 +35,9 @@ MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
 MOST_REMEMBERED = 2000
+"""Fits that a regression remembers."""
+MOST_EXPLAINED = 100_000
+"""Models of which a regression remembers what they explain."""
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
 VALUE_LIMITS = (0.15, 0.4)
@@ -79,15 +84,11 @@ def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A fit of some terms: coefficients, covariance and what is left."""
+class Solution:
+    """Coefficients of some terms on the training blocks."""
 
     columns: np.ndarray
     beta: np.ndarray
-    covariance: np.ndarray
-    """Cluster-robust covariance, never below the model's own, shape (k, k)."""
-    residual_square: np.ndarray
-    """Whitened squared residual of every block (training and held out), shape (blocks,)."""
     gain: float
     """Whitened squares explained on the training blocks."""
 
@@ -95,6 +96,16 @@ class Fit:
         """Where columns of the regression stand among those fitted."""
         at = list(self.columns)
         return [at.index(c) for c in columns]
+
+
+@dataclass(frozen=True)
+class Fit(Solution):
+    """A fit of some terms: coefficients, covariance and what is left."""
+
+    covariance: np.ndarray
+    """Cluster-robust covariance, never below the model's own, shape (k, k)."""
+    residual_square: np.ndarray
+    """Whitened squared residual of every block (training and held out), shape (blocks,)."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +230,9 @@ class Regression:
         for term in self.terms:
             if term.kind == "value":
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
-        self._explained: dict[tuple[str, ...], float] = {}
+        self._number = {t.key: 1 << i for i, t in enumerate(self.terms)}
+        self._explained: dict[int, float] = {}
+        self._solutions: dict[int, Solution] = {}
         self._fits: dict[tuple, Fit] = {}
         self._left_out: dict[tuple, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
@@ -348,9 +361,7 @@ class Regression:
             return self._fit(keys, mask, jackknife, loose)
         asked = keys, jackknife, tuple(sorted((loose or {}).items()))
         if asked not in self._fits:
-            if len(self._fits) > MOST_REMEMBERED:
-                self._fits.clear()
-            self._fits[asked] = self._fit(keys, self.training, jackknife, loose)
+            with_room(self._fits, MOST_REMEMBERED)[asked] = self._fit(keys, self.training, jackknife, loose)
         return self._fits[asked]
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
@@ -397,7 +408,7 @@ class Regression:
         added = float(beta @ bias @ beta - 2 * beta @ bias_cross) / count
         rss = self.square - 2 * explained @ beta + pull @ beta - added
         gain = float((self.square - rss)[mask].sum())
-        return Fit(cols, beta, covariance, rss, gain)
+        return Fit(cols, beta, gain, covariance, rss)
 
     def _fit_held_out_scales(self, cols: np.ndarray, beta: np.ndarray, mask: np.ndarray) -> None:
         """Coefficients of a run's own scale where that run is not fitted: found in the run itself, in place."""
@@ -419,18 +430,83 @@ class Regression:
 
         Remembered whatever the order: exchanges and simplifications come back to the same sets again and again.
         """
-        keys = tuple(sorted(keys))
-        if keys not in self._explained:
-            self._explained[keys] = self._explains(keys)
-        return self._explained[keys]
+        asked = self._set_of(keys)
+        if asked not in self._explained:
+            with_room(self._explained, MOST_EXPLAINED)[asked] = self._solved(asked).gain
+        return self._explained[asked]
 
-    def _explains(self, keys: tuple[str, ...]) -> float:
-        cols = self.columns(keys)
+    def explained_with(self, keys: Sequence[str], further: Sequence[str]) -> list[float]:
+        """The same of terms with each of `further` ones, (m,)."""
+        base = self._set_of(keys)
+        sets = [base | self._number[key] for key in further]
+        new = [i for i, asked in enumerate(sets) if asked not in self._explained]
+        known = with_room(self._explained, MOST_EXPLAINED)
+        if len(new) > 1:
+            known.update(self._all_explained(base, [(sets[i], self._where[further[i]]) for i in new]))
+        return [known[s] if s in known else self.explained([*keys, k]) for s, k in zip(sets, further, strict=True)]
+
+    def _all_explained(self, base: int, further: list[tuple[int, np.ndarray]]) -> dict[int, float]:
+        """What sets explain that are `base` and some columns more each, but for those with very noisy regressors."""
+        padded = np.arange(max(len(own) for _, own in further)) + self._equations_of_all.count
+        columns = np.array([np.append(own, padded[len(own) :]) for _, own in further])
+        found, noisy = self._equations_of_all.explained(self._columns_in(base), columns, HOLD, MOST_ATTENUATION)
+        return {asked: float(e) for (asked, _), e, unknown in zip(further, found, noisy, strict=True) if not unknown}
+
+    @cached_property
+    def _equations_of_all(self) -> Equations:
+        """The equations of all columns, as `_solved` has them of some."""
+        count = len(self.precision)
+        every, size = np.arange(count), count + max(t.size for t in self.terms)
+        noise, noise_cross = self.bias_gram * self.training.mean(), self.bias_cross * self.training.mean()
+        whole = self._total_gram, self._total_cross, noise, noise_cross
+        gram, cross, bias, bias_cross = self._equations(whole, every, self.training)
+        normal = raised(gram - bias, self.precision)
+        scale, unit = inverse_root(normal.diagonal()), inverse_root(self._total_gram.diagonal())
+
+        def padded(matrix: np.ndarray, by: np.ndarray, ridge: float = 0.0) -> np.ndarray:
+            out = np.zeros((size,) * matrix.ndim)
+            out[(slice(count),) * matrix.ndim] = matrix * by[:, None] * by if matrix.ndim == 2 else matrix * by
+            # What is never excited stays at nothing, and says nothing of the others.
+            return raised(out, np.append(np.where(by > 0, ridge, 1.0), np.ones(size - count))) if ridge else out
+
+        with np.errstate(divide="ignore"):
+            limit = np.append(self.limit / scale, np.full(size - count, np.inf))
+        return Equations(
+            count=count,
+            normal=padded(normal, scale, RIDGE),
+            right=padded(cross - bias_cross, scale),
+            gram=padded(self._total_gram - noise, scale),
+            cross=padded(self._total_cross - noise_cross, scale),
+            limit=limit,
+            energy=padded(self._total_gram, unit, 1e-9),
+            noise=padded(noise, unit),
+        )
+
+    def solution(self, keys: Iterable[str]) -> Solution:
+        """What `fit` finds on the training blocks without how well it is known; columns ascend."""
+        asked = self._set_of(keys)
+        if asked not in self._solutions:
+            with_room(self._solutions, MOST_REMEMBERED)[asked] = self._solved(asked)
+        return self._solutions[asked]
+
+    def _solved(self, asked: int) -> Solution:
+        cols = self._columns_in(asked)
         whole = self._normal(cols, self.training)
         gram, cross, bias, bias_cross = self._equations(whole, cols, self.training)
         beta = bounded(raised(gram - bias, self.precision[cols]), cross - bias_cross, self.limit[cols])[0]
         gram, cross, bias, bias_cross = whole
-        return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
+        return Solution(cols, beta, float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta))
+
+    def _set_of(self, keys: Iterable[str]) -> int:
+        """Terms as a number with a bit for each, whatever their order."""
+        out = 0
+        for key in keys:
+            out |= self._number[key]
+        return out
+
+    def _columns_in(self, asked: int) -> np.ndarray:
+        """Columns of the terms of a set, ascending."""
+        return self.columns([t.key for t in self.terms if asked & self._number[t.key]])
 
     def folds(self, whole_runs: bool) -> np.ndarray:
         """Fold of every block (blocks,), -1 for one that is not fitted; blocks of a fold are left out together."""
@@ -451,7 +527,7 @@ class Regression:
         """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
-            self._left_out[asked] = self._leave_out(*asked)
+            with_room(self._left_out, MOST_REMEMBERED)[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
     def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -559,7 +635,7 @@ class Regression:
         """Which columns of a term act in any row fitted, (k,)."""
         return np.diag(self._total_gram)[self.columns([key])] > 0
 
-    def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
+    def between_runs(self, fit: Solution, key: str) -> tuple[np.ndarray, float]:
         """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
 
         Per run the term is refitted with all other coefficients held (DerSimonian and Laird's moment estimate).
@@ -634,6 +710,13 @@ class Regression:
         """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
         where = fit.places(cols)
         return hotelling(quadratic_form(fit.beta[where], fit.covariance[np.ix_(where, where)]), len(where), count)
+
+
+def with_room(memory: dict, most: int) -> dict:
+    """A memory for one more, emptied where it holds `most`."""
+    if len(memory) >= most:
+        memory.clear()
+    return memory
 
 
 def hotelling(statistic: float, q: int, count: int) -> float:
