@@ -19,6 +19,7 @@ from rotorid.mismatch.plant.regression import (
     Solution,
     hotelling,
     quadratic_form,
+    with_room,
 )
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
@@ -45,6 +46,8 @@ MOST_EFFECTS = 10
 VALUE_FLOOR = 0.002
 """Relative one-sigma that no estimate here is better than (filters, timing): of two effects that explain the same but
 for twice as much neither explains more."""
+MOST_JUDGED = 20_000
+"""Terms in models of which a search remembers what it said."""
 MOST_TRIALS = 12
 """Exchanges looked at closely, the most promising first."""
 LEAST_TRANSFER = rules.TRANSFER["share"]
@@ -123,6 +126,8 @@ class Search:
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.ask = ask
         self.blocks = int(regression.training.sum())
+        self._judged: dict[tuple, Candidate] = {}
+        self._failing: dict[tuple, tuple[str | None, float]] = {}
         self._place = {key: i for i, key in enumerate(self.terms)}.__getitem__
 
     def within_bounds(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
@@ -147,8 +152,15 @@ class Search:
         limits = [term.form.parameters[i].negligible for i in term.form.linear]
         return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
 
-    def judge(self, key: str, active: list[str], base: Solution, jackknife: bool = False) -> Candidate:
-        """A term added to (or, if in `active`, kept in) the model."""
+    def judge(self, key: str, active: list[str], jackknife: bool = False) -> Candidate:
+        """A term added to (or, if in `active`, kept in) the model; remembered."""
+        asked = key, self.regression.set_of([*active, key]), jackknife
+        if asked not in self._judged:
+            with_room(self._judged, MOST_JUDGED)[asked] = self._judge(key, active, jackknife)
+        return self._judged[asked]
+
+    def _judge(self, key: str, active: list[str], jackknife: bool) -> Candidate:
+        base = self.without(key, active)
         keys = self.always + sorted({*active, key}, key=self._place)
         fit = self.regression.fit(keys, jackknife=jackknife)
         where = fit.places(self.regression.columns([key]))
@@ -211,7 +223,7 @@ class Search:
 
         To judge one costs many times what `most` does: it is done only where no other is sure to be better.
         """
-        base, terms = self.regression.solution(self.always + active), list(terms)
+        terms = list(terms)
         most = self.most(terms, active)
         waiting = [(turn(t), -m, number, t) for number, (t, m) in enumerate(zip(terms, most, strict=True))]
         heapify(waiting)
@@ -220,7 +232,7 @@ class Search:
             if isinstance(found, Candidate):
                 yield found
             else:
-                candidate = self.judge(found.key, active, base)
+                candidate = self.judge(found.key, active)
                 heappush(waiting, (own, -candidate.score, number, candidate))
 
     def candidates(
@@ -253,13 +265,17 @@ class Search:
                 continue
             trial = [k for k in active if k != gone]
             value = self.worth(trial)
-            for place in 2 * [i for i, k in enumerate(trial) if not self.terms[k].run]:
-                effect, rest = self.terms[trial[place]].effect, [*trial[:place], *trial[place + 1 :]]
-                forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == effect]
-                worths = self.worth_with(rest, forms)
-                if max(worths) > value:
-                    value, best_form = max(worths), forms[int(np.argmax(worths))].key
-                    trial = [*trial[:place], best_form, *trial[place + 1 :]]
+            for _ in range(2):
+                before = trial
+                for place in (i for i, k in enumerate(before) if not self.terms[k].run):
+                    effect, rest = self.terms[trial[place]].effect, [*trial[:place], *trial[place + 1 :]]
+                    forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == effect]
+                    worths = self.worth_with(rest, forms)
+                    if max(worths) > value:
+                        value, best_form = max(worths), forms[int(np.argmax(worths))].key
+                        trial = [*trial[:place], best_form, *trial[place + 1 :]]
+                if trial is before:
+                    break
             if value > best and self._all_physical(trial):
                 best, found = value, trial
         return found
@@ -331,11 +347,17 @@ class Search:
         return None if found is None else self.regression.fit([*self.always, *active, found.key])
 
     def _all_physical(self, active: list[str]) -> bool:
-        return all(self.judge(key, active, self.without(key, active)).physical for key in active)
+        return all(self.judge(key, active).physical for key in active)
 
     def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
-        """Why a term of the model does not hold given the others (None where it does), and its score."""
-        judged = self.judge(key, active, self.without(key, active))
+        """Why a term of the model does not hold given the others (None where it does), and its score; remembered."""
+        asked = key, self.regression.set_of(active)
+        if asked not in self._failing:
+            with_room(self._failing, MOST_JUDGED)[asked] = self._fails(key, active)
+        return self._failing[asked]
+
+    def _fails(self, key: str, active: list[str]) -> tuple[str | None, float]:
+        judged = self.judge(key, active)
         reason = None
         if judged.p_value > KEEP_P:
             reason = Reason("significance", f"p = {judged.p_value:.2g} given the others")
@@ -511,7 +533,7 @@ class Search:
             beta = fit.beta[fit.places(cols)]
             runs = len(np.unique(self.regression.run[self.regression.training]))
             # Coefficients of one term have different units: what counts is how much of its contribution changes.
-            gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
+            gram = self.regression.products(cols)
             changes = np.diag(gram) @ spread * runs > rules.STEADY["spread"] ** 2 * (beta @ gram @ beta)
             if p < rules.STEADY["p_value"] and changes:
                 return key
@@ -521,24 +543,22 @@ class Search:
         """Ids that are collinear with a term: with one of them in its place the term is no longer needed."""
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
-        base = self.without(key, active)
-        own = self.judge(key, rest, base)
+        own = self.judge(key, rest)
         found = []
         for term in self.terms.values():
             if term.kind != "effect" or term.effect in taken or term.effect == self.terms[key].effect:
                 continue
             if term.effect in found or term.effect in UNKNOWNS:
                 continue
-            if self._replaces(term.key, own, rest, base):
+            if self._replaces(term.key, own, rest):
                 found.append(term.effect)
         return found
 
-    def _replaces(self, other: str, own: Candidate, rest: list[str], base: Solution) -> bool:
+    def _replaces(self, other: str, own: Candidate, rest: list[str]) -> bool:
         """Whether given another term alone one of the model is no longer needed."""
-        instead = self.judge(other, rest, base)
+        instead = self.judge(other, rest)
         if not instead.physical or instead.p_value > INSTEAD_P or instead.gain < 0.5 * own.gain:
             return False
         if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
             return False
-        beside = self.regression.solution(self.always + rest + [other])
-        return self.judge(own.key, [*rest, other], beside).p_value > ALTERNATIVE_P
+        return self.judge(own.key, [*rest, other]).p_value > ALTERNATIVE_P

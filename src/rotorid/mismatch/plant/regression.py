@@ -220,7 +220,7 @@ class Regression:
         # Blocks last in memory: what is read of a pair of columns are all of its blocks.
         self.gram = np.ascontiguousarray(self.gram.transpose(1, 2, 0)).transpose(2, 0, 1)
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
-        self._total_gram = self.gram[self.training].sum(axis=0)
+        self._total_gram = self.gram.transpose(1, 2, 0) @ self.training.astype(float)
         self._total_cross = self.cross[self.training].sum(axis=0)
         self._place_apart = np.full(len(self._total_cross), -1)
         if self.apart is not None:
@@ -430,14 +430,14 @@ class Regression:
 
         Remembered whatever the order: exchanges and simplifications come back to the same sets again and again.
         """
-        asked = self._set_of(keys)
+        asked = self.set_of(keys)
         if asked not in self._explained:
             with_room(self._explained, MOST_EXPLAINED)[asked] = self._solved(asked).gain
         return self._explained[asked]
 
     def explained_with(self, keys: Sequence[str], further: Sequence[str]) -> list[float]:
         """The same of terms with each of `further` ones, (m,)."""
-        base = self._set_of(keys)
+        base = self.set_of(keys)
         sets = [base | self._number[key] for key in further]
         new = [i for i, asked in enumerate(sets) if asked not in self._explained]
         known = with_room(self._explained, MOST_EXPLAINED)
@@ -484,7 +484,7 @@ class Regression:
 
     def solution(self, keys: Iterable[str]) -> Solution:
         """What `fit` finds on the training blocks without how well it is known; columns ascend."""
-        asked = self._set_of(keys)
+        asked = self.set_of(keys)
         if asked not in self._solutions:
             with_room(self._solutions, MOST_REMEMBERED)[asked] = self._solved(asked)
         return self._solutions[asked]
@@ -497,7 +497,7 @@ class Regression:
         gram, cross, bias, bias_cross = whole
         return Solution(cols, beta, float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta))
 
-    def _set_of(self, keys: Iterable[str]) -> int:
+    def set_of(self, keys: Iterable[str]) -> int:
         """Terms as a number with a bit for each, whatever their order."""
         out = 0
         for key in keys:
@@ -630,6 +630,10 @@ class Regression:
         """Squares that errors of coefficients fitted without a block's fold are expected to make in it, (blocks,)."""
         gram = self.gram[np.ix_(index, cols, cols)]
         return np.einsum("bkl,bkl->b", gram, inverses[fold[index]])
+
+    def products(self, cols: np.ndarray) -> np.ndarray:
+        """Products of columns on the training blocks, (k, k)."""
+        return self._total_gram[np.ix_(cols, cols)]
 
     def shown(self, key: str) -> np.ndarray:
         """Which columns of a term act in any row fitted, (k,)."""
@@ -860,12 +864,14 @@ def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
     return float(((values / unit @ vectors)[known] ** 2 / size[known]).sum())
 
 
-def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened y (n,) and x (n, K) of one channel from sample `start` on (one at a time: all would be large)."""
-    x = np.zeros_like(rows.x[:, channel])
-    used = np.flatnonzero(rows.x[:, channel].any(axis=0))
-    x[:, used] = causal(taps, rows.x[:, channel, used])
-    return causal(taps, rows.y[:, channel])[start:], x[start:]
+def whiten(rows: Rows, channel: int, taps: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened y (n,) and `columns` of x (n, k) of one channel (one at a time: all would be large)."""
+    return causal(taps, rows.y[:, channel]), causal(taps, rows.x[:, channel, columns])
+
+
+def acting(rows: Sequence[Rows], channel: int) -> np.ndarray:
+    """Columns that say something in a channel: many say nothing there (a moment in a force)."""
+    return np.flatnonzero(np.any([r.x[:, channel].any(axis=0) for r in rows], axis=0))
 
 
 def full_fit_residuals(
@@ -881,16 +887,17 @@ def full_fit_residuals(
     size = rows[0].x.shape[2]
     beta = np.zeros(size)
     left = [r.y for r in rows]
+    used = {c: acting(rows, c) for c in channels}
     for _ in range(2):
         gram, cross = np.zeros((size, size)), np.zeros(size)
         for c in channels:
             taps = colours.get(c, np.ones(1))
             weight = 1.0 / (np.concatenate([causal(taps, part[:, c]) for part in left]).std() + 1e-12)
             for r in rows:
-                y, x = whiten(r, c, taps, 0) if c in colours else (r.y[:, c], r.x[:, c])
+                y, x = whiten(r, c, taps, used[c])
                 x = x * weight
-                gram += x.T @ x
-                cross += x.T @ (y * weight)
+                gram[np.ix_(used[c], used[c])] += x.T @ x
+                cross[used[c]] += x.T @ (y * weight)
         gram += np.diag(precision)
         scale = inverse_root(np.diag(gram))
         beta = scale * np.linalg.solve(gram * np.outer(scale, scale) + 1e-7 * np.eye(size), cross * scale)
@@ -926,7 +933,7 @@ def build(
     parts_of, blocks_of_rows, runs, training = blocks_of(rows, names, per_block, longest, in_training)
     count = len(runs)
     fitted = np.array([t is True for t in training])
-    gram, cross, square = np.zeros((count, at, at)), np.zeros((count, at)), np.zeros(count)
+    gram, cross, square = np.zeros((at, at, count)), np.zeros((count, at)), np.zeros(count)
     own_gram, own_cross = np.zeros((count, len(own), at)), np.zeros((count, len(own)))
     bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
     own_bias, own_bias_cross = np.zeros((len(own), at)), np.zeros(len(own))
@@ -935,19 +942,19 @@ def build(
         if not parts:
             continue  # shorter than the whitening reaches: it says nothing
         first = blocks_of_rows[k][0]
+        here = slice(first, first + len(parts))
         for place, (channel, taps) in enumerate(filters.items()):
-            y, x = whiten(r, channel, taps, longest)
-            again = None if noisy is None else whiten(noisy[k], channel, taps, longest)
-            # Many columns say nothing in a channel (a moment in a force): they are left out of the products.
-            used = np.flatnonzero(x.any(axis=0) | (False if again is None else again[1].any(axis=0)))
-            x, grid = x[:, used], np.ix_(used, used)
+            used = acting([r] if noisy is None else [r, noisy[k]], channel)
+            grid = np.ix_(used, used)
+            y, x = (values[longest:] for values in whiten(r, channel, taps, used))
             # Of the columns used those that this channel estimates apart: where they stand among them, and in `own`.
             ours = np.flatnonzero(np.isin(used, own)) if channel in estimated_by else np.zeros(0, int)
             ours_at = np.searchsorted(own, used[ours])
             ours_grid = np.ix_(ours_at, used)
-            if again is not None:
-                shift = again[1][:, used] - x
-                noise, with_y = shift.T @ shift, shift.T @ (again[0] - y)
+            if noisy is not None:
+                y_again, x_again = (values[longest:] for values in whiten(noisy[k], channel, taps, used))
+                shift = x_again - x
+                noise, with_y = shift.T @ shift, shift.T @ (y_again - y)
                 bias_gram[grid] += noise
                 bias_cross[used] += with_y
                 own_bias[ours_grid] += noise[ours]
@@ -955,23 +962,26 @@ def build(
                 if kept is not None:
                     kept.bias_gram[place][grid] += noise
                     kept.bias_cross[place, used] += with_y
-            for b, part in enumerate(parts, first):
-                products, with_y, own_square = x[part].T @ x[part], x[part].T @ y[part], float(y[part] @ y[part])
-                gram[b][grid] += products
-                cross[b, used] += with_y
-                if len(ours):
-                    own_gram[b][ours_grid] += products[ours]
-                    own_cross[b, ours_at] += with_y[ours]
-                square[b] += own_square
-                if kept is not None and (e := kept.environment[b]) >= 0:
-                    kept.gram[place, e][grid] += products
-                    kept.cross[place, e, used] += with_y
-                    kept.square[place, e] += own_square
+            products = np.array([x[part].T @ x[part] for part in parts])
+            with_y = np.array([x[part].T @ y[part] for part in parts])
+            squares = np.array([y[part] @ y[part] for part in parts])
+            gram[(*grid, here)] += products.transpose(1, 2, 0)
+            cross[here, used] += with_y
+            square[here] += squares
+            if len(ours):
+                own_gram[(here, *ours_grid)] += products[:, ours]
+                own_cross[here, ours_at] += with_y[:, ours]
+            if kept is not None:
+                for b, e in enumerate(kept.environment[here]):
+                    if e >= 0:
+                        kept.gram[place, e][grid] += products[b]
+                        kept.cross[place, e, used] += with_y[b]
+                        kept.square[place, e] += squares[b]
     precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     return Regression(
         terms,
         start,
-        gram,
+        gram.transpose(2, 0, 1),
         cross,
         square,
         np.array(runs),
@@ -992,7 +1002,7 @@ def build(
 
 def blocks_of(
     rows: list[Rows], names: dict[str, int], per_block: int, longest: int, in_training
-) -> tuple[list[list[np.ndarray]], list[np.ndarray], list[int], list[bool | None]]:
+) -> tuple[list[list[slice]], list[np.ndarray], list[int], list[bool | None]]:
     """Of every stretch its blocks as places behind the whitening's reach `longest`, and of each of its rows the block;
     of every block the run's number, and whether it is fitted."""
     parts_of, blocks_of_rows = [], []
@@ -1001,13 +1011,16 @@ def blocks_of(
     for r in rows:
         size = len(r.y) - longest
         blocks_of_rows.append(np.full(len(r.y), -1))
-        parts_of.append([] if size < 2 else np.array_split(np.arange(size), max(1, size // per_block)))
+        places = [] if size < 2 else np.array_split(np.arange(size), max(1, size // per_block))
+        parts_of.append([slice(int(own[0]), int(own[-1]) + 1) for own in places])
         for b, part in enumerate(parts_of[-1], len(runs)):
-            blocks_of_rows[-1][longest + part] = b
+            blocks_of_rows[-1][longest + part.start : longest + part.stop] = b
         if parts_of[-1]:
             blocks_of_rows[-1][:longest] = len(runs)
         runs += [names[r.run]] * len(parts_of[-1])
-        middles = [r.time_s[min(len(r.time_s) - 1, longest + int(part.mean()))] for part in parts_of[-1]]
+        middles = [
+            r.time_s[min(len(r.time_s) - 1, longest + (part.start + part.stop - 1) // 2)] for part in parts_of[-1]
+        ]
         training += [in_training(r.run, float(middle)) for middle in middles]
     return parts_of, blocks_of_rows, runs, training
 

@@ -356,7 +356,9 @@ def assemble(
             continue
         own = slice(3 * index, 3 * index + 3)
         y[:, own] = thinner(groups[group])
-        acting = [k for k, block in enumerate(columns) if group in block]
-        if acting:
-            x[:, own, acting] = np.stack([columns[k][group] for k in acting], axis=2)
+        of_group = np.zeros((3, len(columns), len(time_s)))  # time last: a column is written in one go
+        for k, block in enumerate(columns):
+            if group in block:
+                of_group[:, k] = block[group].T
+        x[:, own] = of_group.transpose(2, 0, 1)
     return Rows(segment.run, time_s, y, x)
