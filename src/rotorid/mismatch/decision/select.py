@@ -128,6 +128,7 @@ class Search:
         self.blocks = int(regression.training.sum())
         self._judged: dict[tuple, Candidate] = {}
         self._failing: dict[tuple, tuple[str | None, float]] = {}
+        self._largest: dict[int, np.ndarray] = {}
         self._place = {key: i for i, key in enumerate(self.terms)}.__getitem__
 
     def within_bounds(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
@@ -191,21 +192,23 @@ class Search:
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
-        own = self.ask.sizes_of(key, beta)
-        largest = self.ask.known_sizes.copy()
-        others = [k for k in active if k != key]
-        if others:
-            fit = self.regression.solution(self.always + others)
-            for k in others:
-                cols = self.regression.columns([k])
-                where = fit.places(cols)
-                largest = np.maximum(largest, self.ask.sizes_of(k, fit.beta[where]))
+        own, largest = self.ask.sizes_of(key, beta), self.largest([k for k in active if k != key])
         limits, burst = rules.OVERSHADOWED, self.terms[key].run
         dwarfed = own < (limits["share_of_burst"] if burst else limits["share"]) * largest
         if limits(bool(dwarfed.any())):
             own = np.where(dwarfed, 0.0, own)
         # A burst is easily imitated by what the form of a strong effect leaves over.
         return float(own.max()) / (limits["times_for_burst"] if burst else 1.0)
+
+    def largest(self, active: list[str]) -> np.ndarray:
+        """Largest size of what is in a model per channel, (12,); remembered."""
+        asked = self.regression.set_of(active)
+        if asked not in self._largest:
+            fit, sizes = self.regression.solution(self.always + active), [self.ask.known_sizes]
+            for key in active:
+                sizes.append(self.ask.sizes_of(key, fit.beta[fit.places(self.regression.columns([key]))]))
+            with_room(self._largest, MOST_JUDGED)[asked] = np.max(sizes, axis=0)
+        return self._largest[asked]
 
     def without(self, key: str, active: list[str]) -> Solution:
         return self.regression.solution(self.always + [k for k in active if k != key])

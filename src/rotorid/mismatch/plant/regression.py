@@ -318,9 +318,9 @@ class Regression:
 
     def _equations(self, whole: tuple[np.ndarray, ...], cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
         """What `_normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
-        if self.apart is None:
-            return whole
         where, own = self._apart(cols)
+        if not len(where):
+            return whole
         gram, cross, bias, bias_cross = (part.copy() for part in whole)
         share, grid = mask.sum() / len(mask), (own[:, None], cols)
         if mask is self.training:
