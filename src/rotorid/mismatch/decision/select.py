@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from itertools import combinations
@@ -11,7 +11,16 @@ import numpy as np
 
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Reason
-from rotorid.mismatch.plant.regression import MOST_ATTENUATION, VALUE_LIMITS, Fit, Regression, hotelling, quadratic_form
+from rotorid.mismatch.plant.regression import (
+    MOST_ATTENUATION,
+    VALUE_LIMITS,
+    Fit,
+    Regression,
+    Solution,
+    hotelling,
+    quadratic_form,
+    with_room,
+)
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
@@ -37,6 +46,8 @@ MOST_EFFECTS = 10
 VALUE_FLOOR = 0.002
 """Relative one-sigma that no estimate here is better than (filters, timing): of two effects that explain the same but
 for twice as much neither explains more."""
+MOST_JUDGED = 20_000
+"""Terms in models of which a search remembers what it said."""
 MOST_TRIALS = 12
 """Exchanges looked at closely, the most promising first."""
 LEAST_TRANSFER = rules.TRANSFER["share"]
@@ -91,6 +102,16 @@ class Questions:
     """The same of effects that are in the model already (between command and rotor speed), (12,)."""
 
 
+def price(term: Term) -> float:
+    """Whitened squares that a term costs by its parameters, by its id and by its want of a name."""
+    return COST_PER_PARAMETER * term.size + COST_PER_EFFECT + COST_OF_UNKNOWN * (term.effect in UNKNOWNS)
+
+
+def keys_of(terms: Iterable[Term]) -> list[str]:
+    """Keys of terms."""
+    return [t.key for t in terms]
+
+
 class Search:
     """Forward search with replacement of forms and backward checks."""
 
@@ -105,6 +126,10 @@ class Search:
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.ask = ask
         self.blocks = int(regression.training.sum())
+        self._judged: dict[tuple, Candidate] = {}
+        self._failing: dict[tuple, tuple[str | None, float]] = {}
+        self._largest: dict[int, np.ndarray] = {}
+        self._place = {key: i for i, key in enumerate(self.terms)}.__getitem__
 
     def within_bounds(self, term: Term, beta: np.ndarray, error: np.ndarray) -> bool:
         """Whether coefficients are inside their bounds, or outside by less than their own uncertainty."""
@@ -128,12 +153,18 @@ class Search:
         limits = [term.form.parameters[i].negligible for i in term.form.linear]
         return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
 
-    def judge(self, key: str, active: list[str], base: Fit, jackknife: bool = False) -> Candidate:
-        """A term added to (or, if in `active`, kept in) the model."""
-        keys = self.always + [k for k in active if k != key] + [key]
+    def judge(self, key: str, active: list[str], jackknife: bool = False) -> Candidate:
+        """A term added to (or, if in `active`, kept in) the model; remembered."""
+        asked = key, self.regression.set_of([*active, key]), jackknife
+        if asked not in self._judged:
+            with_room(self._judged, MOST_JUDGED)[asked] = self._judge(key, active, jackknife)
+        return self._judged[asked]
+
+    def _judge(self, key: str, active: list[str], jackknife: bool) -> Candidate:
+        base = self.without(key, active)
+        keys = self.always + sorted({*active, key}, key=self._place)
         fit = self.regression.fit(keys, jackknife=jackknife)
-        cols = self.regression.columns([key])
-        where = len(fit.columns) - len(cols) + np.arange(len(cols))
+        where = fit.places(self.regression.columns([key]))
         beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
         statistic = quadratic_form(beta, covariance)
         p_value = hotelling(statistic, len(beta), self.blocks)
@@ -146,7 +177,7 @@ class Search:
         physical = physical and not rules.STRAIN(self.strains(fit, base))
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
-    def strains(self, fit: Fit, base: Fit) -> bool:
+    def strains(self, fit: Fit, base: Solution) -> bool:
         """Whether a term needs a believed value far from its belief that the model without it does not need."""
         for term in self.regression.terms:
             if term.kind != "value":
@@ -161,15 +192,7 @@ class Search:
 
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
-        own = self.ask.sizes_of(key, beta)
-        largest = self.ask.known_sizes.copy()
-        others = [k for k in active if k != key]
-        if others:
-            fit = self.regression.fit(self.always + others)
-            for k in others:
-                cols = self.regression.columns([k])
-                where = fit.places(cols)
-                largest = np.maximum(largest, self.ask.sizes_of(k, fit.beta[where]))
+        own, largest = self.ask.sizes_of(key, beta), self.largest([k for k in active if k != key])
         limits, burst = rules.OVERSHADOWED, self.terms[key].run
         dwarfed = own < (limits["share_of_burst"] if burst else limits["share"]) * largest
         if limits(bool(dwarfed.any())):
@@ -177,13 +200,24 @@ class Search:
         # A burst is easily imitated by what the form of a strong effect leaves over.
         return float(own.max()) / (limits["times_for_burst"] if burst else 1.0)
 
-    def without(self, key: str, active: list[str]) -> Fit:
-        return self.regression.fit(self.always + [k for k in active if k != key])
+    def largest(self, active: list[str]) -> np.ndarray:
+        """Largest size of what is in a model per channel, (12,); remembered."""
+        asked = self.regression.set_of(active)
+        if asked not in self._largest:
+            fit, sizes = self.regression.solution(self.always + active), [self.ask.known_sizes]
+            for key in active:
+                sizes.append(self.ask.sizes_of(key, fit.beta[fit.places(self.regression.columns([key]))]))
+            with_room(self._largest, MOST_JUDGED)[asked] = np.max(sizes, axis=0)
+        return self._largest[asked]
 
-    def most(self, term: Term, active: list[str]) -> float:
-        """What a further term explains less what its parameters cost: the most that its score can be."""
-        base, whole = (self.regression.explained([*self.always, *active, *more]) for more in ((), (term.key,)))
-        return whole - base - COST_PER_PARAMETER * term.size
+    def without(self, key: str, active: list[str]) -> Solution:
+        return self.regression.solution(self.always + [k for k in active if k != key])
+
+    def most(self, terms: Sequence[Term], active: list[str]) -> list[float]:
+        """What each of further terms explains less what its parameters cost: the most that its score can be."""
+        present = [*self.always, *active]
+        base, with_each = self.regression.explained(present), self.regression.explained_with(present, keys_of(terms))
+        return [whole - base - COST_PER_PARAMETER * t.size for t, whole in zip(terms, with_each, strict=True)]
 
     def judged(
         self, terms: Iterable[Term], active: list[str], turn: Callable[[Term], int] = lambda _: 0
@@ -192,15 +226,16 @@ class Search:
 
         To judge one costs many times what `most` does: it is done only where no other is sure to be better.
         """
-        base = self.regression.fit(self.always + active)
-        waiting = [(turn(t), -self.most(t, active), number, t) for number, t in enumerate(terms)]
+        terms = list(terms)
+        most = self.most(terms, active)
+        waiting = [(turn(t), -m, number, t) for number, (t, m) in enumerate(zip(terms, most, strict=True))]
         heapify(waiting)
         while waiting:
             own, _, number, found = heappop(waiting)
             if isinstance(found, Candidate):
                 yield found
             else:
-                candidate = self.judge(found.key, active, base)
+                candidate = self.judge(found.key, active)
                 heappush(waiting, (own, -candidate.score, number, candidate))
 
     def candidates(
@@ -208,8 +243,9 @@ class Search:
     ) -> Iterator[Candidate]:
         """Terms whose id is neither in the model yet nor dropped and that are worth their parameters, judged."""
         taken = {self.terms[k].once for k in active} | set(dropped)
-        free = (t for t in self.terms.values() if t.kind == "effect" and t.once not in taken)
-        return self.judged((t for t in free if self.most(t, active) > 0), active, turn)
+        free = [t for t in self.terms.values() if t.kind == "effect" and t.once not in taken]
+        most = self.most(free, active)
+        return self.judged([t for t, m in zip(free, most, strict=True) if m > 0], active, turn)
 
     def best_form(self, key: str, active: list[str]) -> str:
         """The form of the same id that explains most for its parameters, the others in the model kept."""
@@ -232,23 +268,30 @@ class Search:
                 continue
             trial = [k for k in active if k != gone]
             value = self.worth(trial)
-            for place in 2 * [i for i, k in enumerate(trial) if not self.terms[k].run]:
-                for form in self.terms.values():
-                    if form.kind != "effect" or form.effect != self.terms[trial[place]].effect:
-                        continue
-                    other = [*trial[:place], form.key, *trial[place + 1 :]]
-                    if (worth := self.worth(other)) > value:
-                        trial, value = other, worth
+            for _ in range(2):
+                before = trial
+                for place in (i for i, k in enumerate(before) if not self.terms[k].run):
+                    effect, rest = self.terms[trial[place]].effect, [*trial[:place], *trial[place + 1 :]]
+                    forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == effect]
+                    worths = self.worth_with(rest, forms)
+                    if max(worths) > value:
+                        value, best_form = max(worths), forms[int(np.argmax(worths))].key
+                        trial = [*trial[:place], best_form, *trial[place + 1 :]]
+                if trial is before:
+                    break
             if value > best and self._all_physical(trial):
                 best, found = value, trial
         return found
 
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
-        parameters = sum(self.terms[k].size for k in keys)
-        unknown = sum(self.terms[k].effect in UNKNOWNS for k in keys)
-        gain = self.regression.explained(self.always + keys)
-        return gain - COST_PER_PARAMETER * parameters - COST_PER_EFFECT * len(keys) - COST_OF_UNKNOWN * unknown
+        return self.regression.explained(self.always + keys) - sum(price(self.terms[k]) for k in keys)
+
+    def worth_with(self, keys: list[str], further: Sequence[Term]) -> list[float]:
+        """The same of a model with each of further terms."""
+        gains = self.regression.explained_with(self.always + keys, keys_of(further))
+        cost = sum(price(self.terms[k]) for k in keys)
+        return [gain - cost - price(term) for gain, term in zip(gains, further, strict=True)]
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it explains clearly more: the first to enter may be wrong.
@@ -258,6 +301,7 @@ class Search:
         if not rules.EXCHANGE.on:
             return None
         taken = {self.terms[k].once for k in active} | set(dropped)
+        others = [t for t in self.terms.values() if t.kind == "effect" and not t.run and t.once not in taken]
         present, whole = self.worth(active), self.regression.explained(self.always + active)
         trials = []
         for gone in active:
@@ -265,11 +309,12 @@ class Search:
                 continue
             own = whole - self.regression.explained(self.always + [k for k in active if k != gone])
             least = present + max(COST_PER_PARAMETER / 2, (2 * VALUE_FLOOR) ** 2 * own)
-            for other in self.terms.values():
-                if other.kind == "effect" and not other.run and other.once not in taken:
-                    trial = [other.key if k == gone else k for k in active]
-                    if (worth := self.worth(trial)) > least:
-                        trials.append((worth, other.key, trial))
+            worths = self.worth_with([k for k in active if k != gone], others)
+            trials += [
+                (worth, other.key, [other.key if k == gone else k for k in active])
+                for other, worth in zip(others, worths, strict=True)
+                if worth > least
+            ]
         trials = sorted(trials, key=lambda t: -t[0])
         return next(
             (
@@ -305,11 +350,17 @@ class Search:
         return None if found is None else self.regression.fit([*self.always, *active, found.key])
 
     def _all_physical(self, active: list[str]) -> bool:
-        return all(self.judge(key, active, self.without(key, active)).physical for key in active)
+        return all(self.judge(key, active).physical for key in active)
 
     def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
-        """Why a term of the model does not hold given the others (None where it does), and its score."""
-        judged = self.judge(key, active, self.without(key, active))
+        """Why a term of the model does not hold given the others (None where it does), and its score; remembered."""
+        asked = key, self.regression.set_of(active)
+        if asked not in self._failing:
+            with_room(self._failing, MOST_JUDGED)[asked] = self._fails(key, active)
+        return self._failing[asked]
+
+    def _fails(self, key: str, active: list[str]) -> tuple[str | None, float]:
+        judged = self.judge(key, active)
         reason = None
         if judged.p_value > KEEP_P:
             reason = Reason("significance", f"p = {judged.p_value:.2g} given the others")
@@ -435,7 +486,7 @@ class Search:
         """
         if len(active) < 2:
             return None
-        fit = self.regression.fit(self.always + active)
+        fit = self.regression.solution(self.always + active)
         named = [k for k in active if self.terms[k].effect not in UNKNOWNS and not self.terms[k].run]
 
         def sizes(keys: list[str]) -> np.ndarray:
@@ -476,7 +527,7 @@ class Search:
 
     def unsteady(self, active: list[str]) -> str | None:
         """A term whose coefficients are not the same from run to run, beyond doubt and by much."""
-        fit = self.regression.fit(self.always + active)
+        fit = self.regression.solution(self.always + active)
         for key in active:
             if self.terms[key].run:
                 continue
@@ -485,7 +536,7 @@ class Search:
             beta = fit.beta[fit.places(cols)]
             runs = len(np.unique(self.regression.run[self.regression.training]))
             # Coefficients of one term have different units: what counts is how much of its contribution changes.
-            gram = self.regression.gram[self.regression.training][:, cols][:, :, cols].sum(axis=0)
+            gram = self.regression.products(cols)
             changes = np.diag(gram) @ spread * runs > rules.STEADY["spread"] ** 2 * (beta @ gram @ beta)
             if p < rules.STEADY["p_value"] and changes:
                 return key
@@ -495,24 +546,22 @@ class Search:
         """Ids that are collinear with a term: with one of them in its place the term is no longer needed."""
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
-        base = self.without(key, active)
-        own = self.judge(key, rest, base)
+        own = self.judge(key, rest)
         found = []
         for term in self.terms.values():
             if term.kind != "effect" or term.effect in taken or term.effect == self.terms[key].effect:
                 continue
             if term.effect in found or term.effect in UNKNOWNS:
                 continue
-            if self._replaces(term.key, own, rest, base):
+            if self._replaces(term.key, own, rest):
                 found.append(term.effect)
         return found
 
-    def _replaces(self, other: str, own: Candidate, rest: list[str], base: Fit) -> bool:
+    def _replaces(self, other: str, own: Candidate, rest: list[str]) -> bool:
         """Whether given another term alone one of the model is no longer needed."""
-        instead = self.judge(other, rest, base)
+        instead = self.judge(other, rest)
         if not instead.physical or instead.p_value > INSTEAD_P or instead.gain < 0.5 * own.gain:
             return False
         if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
             return False
-        beside = self.regression.fit(self.always + rest + [other])
-        return self.judge(own.key, [*rest, other], beside).p_value > ALTERNATIVE_P
+        return self.judge(own.key, [*rest, other]).p_value > ALTERNATIVE_P

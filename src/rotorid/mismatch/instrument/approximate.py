@@ -238,7 +238,7 @@ def selection_of(model: ReadingModel, active: list[str]) -> Selection:
     """A selection of other terms, fitted and tested as the search does in the end."""
     search = model.search
     fit = search.regression.fit(kept_values(search, active) + active, jackknife=True)
-    p_values = {k: search.judge(k, active, search.without(k, active), jackknife=True).p_value for k in active}
+    p_values = {k: search.judge(k, active, jackknife=True).p_value for k in active}
     return replace(model.selection, active=active, fit=fit, p_values=p_values)
 
 

@@ -197,9 +197,26 @@ def _moments(blocks: Blocks, weight, transfer):
     return gram, cross
 
 
+def by_frequency(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
+    """Products of X and Z with each other, (m, K, K), and with Y, (m, K, q), summed over the blocks."""
+    columns = np.concatenate([blocks.x, blocks.z], axis=2).transpose(1, 0, 2)
+    turned = columns.conj().swapaxes(1, 2)
+    return turned @ columns, turned @ blocks.y.transpose(1, 0, 2)
+
+
+def explained_at(products: tuple[np.ndarray, np.ndarray], weight: np.ndarray, transfer: np.ndarray) -> np.ndarray:
+    """Weighted squares that all columns explain together where they pass transfers (l, m, K), (l,)."""
+    inside, with_y = products
+    back = transfer.conj()
+    gram = np.real(back[..., None] * transfer[..., None, :] * inside)
+    gram = (weight @ gram.reshape(*gram.shape[:2], -1)).reshape(len(transfer), len(weight), *inside.shape[1:])
+    cross = np.einsum("qm,lmkq->lqk", weight, np.real(back[..., None] * with_y))
+    return np.sum(_solve(gram, cross) * cross, axis=(1, 2))
+
+
 def _solve(gram: np.ndarray, cross: np.ndarray) -> np.ndarray:
-    scale = 1.0 / np.sqrt(np.einsum("qkk->qk", gram) + 1e-300)
-    scaled_gram = gram * scale[:, :, None] * scale[:, None, :] + 1e-9 * np.eye(gram.shape[1])
+    scale = 1.0 / np.sqrt(np.einsum("...kk->...k", gram) + 1e-300)
+    scaled_gram = gram * scale[..., None] * scale[..., None, :] + 1e-9 * np.eye(gram.shape[-1])
     return scale * np.linalg.solve(scaled_gram, (cross * scale)[..., None])[..., 0]
 
 
@@ -226,20 +243,18 @@ def fit(
         lags_s = np.arange(-LONGEST_LAG_S, LONGEST_LAG_S + step / 2, step)
     trusted = coherence(blocks) + 1e-6
     weight = trusted * noise_weight(blocks, blocks.y)
+    products = by_frequency(blocks)
+
+    def explained_by(lags: np.ndarray) -> np.ndarray:
+        late = np.repeat((base * delay(frequency, lags))[:, :, None], blocks.x.shape[2], axis=2)
+        beside = np.ones((*late.shape[:2], blocks.z.shape[2]))
+        return explained_at(products, weight, np.concatenate([late, beside], axis=2))
+
     for _ in range(2):
-        scores = []
-        for lag in lags_s:
-            gram, cross = (m.sum(axis=0) for m in _moments(blocks, weight, base * delay(frequency, lag)))
-            beta = _solve(gram, cross)
-            scores.append(float(np.sum(beta * cross)))
-        lag = _peak(lags_s, np.array(scores))
+        lag = _peak(lags_s, explained_by(lags_s))
         if len(lags_s) > 1:
             fine = lag + np.linspace(-1, 1, 5) * (lags_s[1] - lags_s[0]) / 4
-            values = []
-            for candidate in fine:
-                gram, cross = (m.sum(axis=0) for m in _moments(blocks, weight, base * delay(frequency, candidate)))
-                values.append(float(np.sum(_solve(gram, cross) * cross)))
-            lag = _peak(fine, np.array(values))
+            lag = _peak(fine, explained_by(fine))
         phase = base * delay(frequency, lag)
         gram_b, cross_b = _moments(blocks, weight, phase)
         gram, cross = gram_b.sum(axis=0), cross_b.sum(axis=0)

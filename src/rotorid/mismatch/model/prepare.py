@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from itertools import chain
 
 import numpy as np
 from scipy.signal import welch
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import Form, not_testable_reason
+from rotorid.effects.contract import Form, Motion, not_testable_reason
 from rotorid.mismatch.decision import rules
+from rotorid.mismatch.model.made import Memory
 from rotorid.mismatch.plant.estimated_velocity import made_from_accelerometer
 from rotorid.mismatch.plant.excess_noise import noise_factors
 from rotorid.mismatch.plant.motion import (
@@ -24,6 +28,7 @@ from rotorid.mismatch.plant.motion import (
 from rotorid.mismatch.plant.rows import (
     OFFSETS,
     PARAMETER_NAMES,
+    Block,
     Rows,
     Term,
     Thinner,
@@ -138,8 +143,10 @@ class Prepared:
     not_testable: dict[str, str] = field(default_factory=dict)
     unseen: tuple[str, ...] = ()
     """Names of the runs held out, of which nothing else is known here."""
+    memory: Memory = field(default_factory=Memory)
+    """Columns of the terms and what they are made of, as they were made last."""
 
-    @property
+    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Channel groups that every segment has."""
         found = [set(residual(s, self.vehicle)) for s in self.segments]
@@ -293,26 +300,35 @@ def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, n
     return total
 
 
-def with_predictions(
-    segment: Segment, vehicle: Vehicle, model: dict[str, np.ndarray], reading: dict[str, np.ndarray] | None = None
-) -> Segment:
-    """The segment with the accelerations that the model predicts, for use in regressors.
+def with_predictions(segment: Segment, prepared: Prepared, effects: list[tuple[Form, np.ndarray]]) -> Segment:
+    """The segment with the accelerations that the baseline plus `effects` predicts, for use in regressors.
 
-    `reading` is what the accelerometer's own errors multiply (the model where None): without a second source a
-    scale error of readings that an effect makes would be that effect's exact copy.
+    What the accelerometer's own errors multiply is the baseline's alone where the accelerometer is the only source:
+    a scale error of readings that an effect makes would be that effect's exact copy.
 
     The measured ones are the response itself: a column s·a with a response m·a fits anything perfectly, and
     the noise of a differentiated body rate would bias every coefficient that multiplies it.
     """
-    motion, changed = segment.motion, {}
-    if motion.specific_force is not None:
-        changed["specific_force"] = model["force"] / vehicle.mass_kg
-        if motion.accelerometer is not None:
-            changed["accelerometer"] = (model if reading is None else reading)["force"] / vehicle.mass_kg
-    if motion.angular_acceleration is not None:
-        inertia, rate = vehicle.inertia_kg_m2.matrix(), motion.angular_velocity
-        changed["angular_acceleration"] = (model["moment"] - np.cross(rate, rate @ inertia)) @ np.linalg.inv(inertia)
-    return replace(segment, motion=replace(motion, **changed))
+    vehicle, groups = prepared.vehicle, prepared.groups
+
+    def predicted(motion: Motion) -> dict[str, np.ndarray]:
+        changed = {}
+        at = replace(segment, motion=motion)
+        model = model_wrench(at, vehicle, [])
+        known = model_wrench(at, vehicle, effects) if effects else model
+        if motion.specific_force is not None:
+            changed["specific_force"] = known["force"] / vehicle.mass_kg
+            if motion.accelerometer is not None:
+                changed["accelerometer"] = (known if "accelerometer" in groups else model)["force"] / vehicle.mass_kg
+        if motion.angular_acceleration is not None:
+            inertia, rate = vehicle.inertia_kg_m2.matrix(), motion.angular_velocity
+            turning = known["moment"] - np.cross(rate, rate @ inertia)
+            changed["angular_acceleration"] = turning @ np.linalg.inv(inertia)
+        return changed
+
+    given = (vehicle, groups, *((form, *values) for form, values in effects))
+    changed = prepared.memory.made(("predicted",), given, segment.motion, predicted)
+    return replace(segment, motion=replace(segment.motion, **changed))
 
 
 def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[dict[str, np.ndarray]]:
@@ -349,38 +365,62 @@ def assemble_rows(
 ) -> list[Rows]:
     """Rows of every segment for the given terms; `effects` only shape the accelerations in regressors.
 
-    The columns of believed values are built on the baseline alone: with effects in them, a thrust and a mass that
-    grow together would leave a copy of the effects for themselves, and loose trust in values would swallow physics.
     `measured_moment` puts the measured moments into the value columns in place of the predicted ones.
     """
-    vehicle, groups = prepared.vehicle, prepared.groups
 
-    def source(segment):
-        model, reverse = {}, None
-        if measured_moment and "moment" in groups:
-            reverse = moment_of(segment, vehicle)
-        if segment.motion.rotor_speed is not None:
-            model = model_wrench(segment, vehicle, [])
-            known = model_wrench(segment, vehicle, effects) if effects else model
-            segment = with_predictions(segment, vehicle, known, None if "accelerometer" in groups else model)
-        for term in terms:
-            if term.run and term.run != segment.run:
-                yield from [{}] * term.size
-            elif term.kind == "wind":
-                columns = wind_columns(segment, vehicle, groups, effects or [])
-                yield from at_knots(columns, np.array(term.values), segment.motion.time_s) if term.run else columns
-            elif term.kind == "slope":
-                yield slope_column(term, segment, vehicle, groups)
-            elif term.kind == "state":
-                yield state_column(term, segment, vehicle, groups)
-            elif term.kind == "effect":
-                yield from form_columns(term.form, term.values, segment, vehicle, groups)
-            elif term.kind == "value":
-                yield value_columns(term.key, segment, vehicle, groups, model, reverse)
-            else:
-                yield offset_columns(term.key, segment, vehicle, groups)
+    def rows_of(segment: Segment) -> Rows:
+        blocks = chain.from_iterable(columns_of(segment, prepared, terms, effects or [], measured_moment))
+        return assemble(segment, prepared.vehicle, prepared.thinner, list(blocks))
 
-    return [assemble(s, vehicle, prepared.thinner, [source]) for s in segments or prepared.segments]
+    return [rows_of(s) for s in segments or prepared.segments]
+
+
+def columns_of(
+    segment: Segment,
+    prepared: Prepared,
+    terms: list[Term],
+    effects: list[tuple[Form, np.ndarray]],
+    measured_moment: bool,
+) -> Iterator[list[Block]]:
+    """Columns of every term in a segment, thinned.
+
+    The columns of believed values are built on the baseline alone: with effects in them, a thrust and a mass that
+    grow together would leave a copy of the effects for themselves, and loose trust in values would swallow physics.
+    """
+    vehicle, groups, made = prepared.vehicle, prepared.groups, prepared.memory.made
+    flown, beside = segment, (vehicle, groups, segment.independent_velocity)
+    if segment.motion.rotor_speed is not None:
+        segment = with_predictions(flown, prepared, effects)
+
+    def thinned(blocks: Iterable[Block]) -> list[Block]:
+        return [{g: prepared.thinner(np.ascontiguousarray(part)) for g, part in block.items()} for block in blocks]
+
+    def of_effect(term: Term, motion: Motion) -> list[Block]:
+        return thinned(form_columns(term.form, term.values, replace(segment, motion=motion), vehicle, groups))
+
+    def of_value(term: Term, motion: Motion) -> list[Block]:
+        at = replace(flown, motion=motion)
+        model = model_wrench(at, vehicle, [])
+        reverse = moment_of(at, vehicle) if measured_moment and "moment" in groups else None
+        return thinned([value_columns(term.key, at, vehicle, groups, model, reverse)])
+
+    for term in terms:
+        if term.run and term.run != segment.run:
+            yield [{}] * term.size
+        elif term.kind == "wind":
+            columns = wind_columns(segment, vehicle, groups, effects)
+            yield thinned(at_knots(columns, np.array(term.values), segment.motion.time_s) if term.run else columns)
+        elif term.kind == "slope":
+            yield thinned([slope_column(term, segment, vehicle, groups)])
+        elif term.kind == "state":
+            yield thinned([state_column(term, segment, vehicle, groups)])
+        elif term.kind == "effect":
+            given = (*beside, term.form, term.values)
+            yield made((term.key,), given, segment.motion, partial(of_effect, term))
+        elif term.kind == "value":
+            yield made((term.key,), (*beside, measured_moment), flown.motion, partial(of_value, term))
+        else:
+            yield thinned([offset_columns(term.key, segment, vehicle, groups)])
 
 
 __all__ = ["Prepared", "assemble_rows", "prepare", "project", "split_runs"]

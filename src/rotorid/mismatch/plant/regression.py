@@ -12,14 +12,16 @@ Fuller, Measurement Error Models, 1987, ch. 2).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.special import chdtrc, fdtrc
 
 from rotorid.mismatch.plant.comparison import LEAST_RUNS, Comparison, environments, folds
+from rotorid.mismatch.plant.further import Equations
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.recordings.signal.kernels import causal
 
@@ -33,6 +35,9 @@ MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
 MOST_REMEMBERED = 2000
+"""Fits that a regression remembers."""
+MOST_EXPLAINED = 100_000
+"""Models of which a regression remembers what they explain."""
 MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
 VALUE_LIMITS = (0.15, 0.4)
@@ -79,15 +84,11 @@ def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Fit:
-    """A fit of some terms: coefficients, covariance and what is left."""
+class Solution:
+    """Coefficients of some terms on the training blocks."""
 
     columns: np.ndarray
     beta: np.ndarray
-    covariance: np.ndarray
-    """Cluster-robust covariance, never below the model's own, shape (k, k)."""
-    residual_square: np.ndarray
-    """Whitened squared residual of every block (training and held out), shape (blocks,)."""
     gain: float
     """Whitened squares explained on the training blocks."""
 
@@ -95,6 +96,16 @@ class Fit:
         """Where columns of the regression stand among those fitted."""
         at = list(self.columns)
         return [at.index(c) for c in columns]
+
+
+@dataclass(frozen=True)
+class Fit(Solution):
+    """A fit of some terms: coefficients, covariance and what is left."""
+
+    covariance: np.ndarray
+    """Cluster-robust covariance, never below the model's own, shape (k, k)."""
+    residual_square: np.ndarray
+    """Whitened squared residual of every block (training and held out), shape (blocks,)."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +220,7 @@ class Regression:
         # Blocks last in memory: what is read of a pair of columns are all of its blocks.
         self.gram = np.ascontiguousarray(self.gram.transpose(1, 2, 0)).transpose(2, 0, 1)
         self._where = {t.key: self.start[t.key] + np.arange(t.size) for t in self.terms}
-        self._total_gram = self.gram[self.training].sum(axis=0)
+        self._total_gram = self.gram.transpose(1, 2, 0) @ self.training.astype(float)
         self._total_cross = self.cross[self.training].sum(axis=0)
         self._place_apart = np.full(len(self._total_cross), -1)
         if self.apart is not None:
@@ -219,7 +230,9 @@ class Regression:
         for term in self.terms:
             if term.kind == "value":
                 self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
-        self._explained: dict[tuple[str, ...], float] = {}
+        self._number = {t.key: 1 << i for i, t in enumerate(self.terms)}
+        self._explained: dict[int, float] = {}
+        self._solutions: dict[int, Solution] = {}
         self._fits: dict[tuple, Fit] = {}
         self._left_out: dict[tuple, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
@@ -305,9 +318,9 @@ class Regression:
 
     def _equations(self, whole: tuple[np.ndarray, ...], cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
         """What `_normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
-        if self.apart is None:
-            return whole
         where, own = self._apart(cols)
+        if not len(where):
+            return whole
         gram, cross, bias, bias_cross = (part.copy() for part in whole)
         share, grid = mask.sum() / len(mask), (own[:, None], cols)
         if mask is self.training:
@@ -348,9 +361,7 @@ class Regression:
             return self._fit(keys, mask, jackknife, loose)
         asked = keys, jackknife, tuple(sorted((loose or {}).items()))
         if asked not in self._fits:
-            if len(self._fits) > MOST_REMEMBERED:
-                self._fits.clear()
-            self._fits[asked] = self._fit(keys, self.training, jackknife, loose)
+            with_room(self._fits, MOST_REMEMBERED)[asked] = self._fit(keys, self.training, jackknife, loose)
         return self._fits[asked]
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
@@ -397,7 +408,7 @@ class Regression:
         added = float(beta @ bias @ beta - 2 * beta @ bias_cross) / count
         rss = self.square - 2 * explained @ beta + pull @ beta - added
         gain = float((self.square - rss)[mask].sum())
-        return Fit(cols, beta, covariance, rss, gain)
+        return Fit(cols, beta, gain, covariance, rss)
 
     def _fit_held_out_scales(self, cols: np.ndarray, beta: np.ndarray, mask: np.ndarray) -> None:
         """Coefficients of a run's own scale where that run is not fitted: found in the run itself, in place."""
@@ -419,18 +430,83 @@ class Regression:
 
         Remembered whatever the order: exchanges and simplifications come back to the same sets again and again.
         """
-        keys = tuple(sorted(keys))
-        if keys not in self._explained:
-            self._explained[keys] = self._explains(keys)
-        return self._explained[keys]
+        asked = self.set_of(keys)
+        if asked not in self._explained:
+            with_room(self._explained, MOST_EXPLAINED)[asked] = self._solved(asked).gain
+        return self._explained[asked]
 
-    def _explains(self, keys: tuple[str, ...]) -> float:
-        cols = self.columns(keys)
+    def explained_with(self, keys: Sequence[str], further: Sequence[str]) -> list[float]:
+        """The same of terms with each of `further` ones, (m,)."""
+        base = self.set_of(keys)
+        sets = [base | self._number[key] for key in further]
+        new = [i for i, asked in enumerate(sets) if asked not in self._explained]
+        known = with_room(self._explained, MOST_EXPLAINED)
+        if len(new) > 1:
+            known.update(self._all_explained(base, [(sets[i], self._where[further[i]]) for i in new]))
+        return [known[s] if s in known else self.explained([*keys, k]) for s, k in zip(sets, further, strict=True)]
+
+    def _all_explained(self, base: int, further: list[tuple[int, np.ndarray]]) -> dict[int, float]:
+        """What sets explain that are `base` and some columns more each, but for those with very noisy regressors."""
+        padded = np.arange(max(len(own) for _, own in further)) + self._equations_of_all.count
+        columns = np.array([np.append(own, padded[len(own) :]) for _, own in further])
+        found, noisy = self._equations_of_all.explained(self._columns_in(base), columns, HOLD, MOST_ATTENUATION)
+        return {asked: float(e) for (asked, _), e, unknown in zip(further, found, noisy, strict=True) if not unknown}
+
+    @cached_property
+    def _equations_of_all(self) -> Equations:
+        """The equations of all columns, as `_solved` has them of some."""
+        count = len(self.precision)
+        every, size = np.arange(count), count + max(t.size for t in self.terms)
+        noise, noise_cross = self.bias_gram * self.training.mean(), self.bias_cross * self.training.mean()
+        whole = self._total_gram, self._total_cross, noise, noise_cross
+        gram, cross, bias, bias_cross = self._equations(whole, every, self.training)
+        normal = raised(gram - bias, self.precision)
+        scale, unit = inverse_root(normal.diagonal()), inverse_root(self._total_gram.diagonal())
+
+        def padded(matrix: np.ndarray, by: np.ndarray, ridge: float = 0.0) -> np.ndarray:
+            out = np.zeros((size,) * matrix.ndim)
+            out[(slice(count),) * matrix.ndim] = matrix * by[:, None] * by if matrix.ndim == 2 else matrix * by
+            # What is never excited stays at nothing, and says nothing of the others.
+            return raised(out, np.append(np.where(by > 0, ridge, 1.0), np.ones(size - count))) if ridge else out
+
+        with np.errstate(divide="ignore"):
+            limit = np.append(self.limit / scale, np.full(size - count, np.inf))
+        return Equations(
+            count=count,
+            normal=padded(normal, scale, RIDGE),
+            right=padded(cross - bias_cross, scale),
+            gram=padded(self._total_gram - noise, scale),
+            cross=padded(self._total_cross - noise_cross, scale),
+            limit=limit,
+            energy=padded(self._total_gram, unit, 1e-9),
+            noise=padded(noise, unit),
+        )
+
+    def solution(self, keys: Iterable[str]) -> Solution:
+        """What `fit` finds on the training blocks without how well it is known; columns ascend."""
+        asked = self.set_of(keys)
+        if asked not in self._solutions:
+            with_room(self._solutions, MOST_REMEMBERED)[asked] = self._solved(asked)
+        return self._solutions[asked]
+
+    def _solved(self, asked: int) -> Solution:
+        cols = self._columns_in(asked)
         whole = self._normal(cols, self.training)
         gram, cross, bias, bias_cross = self._equations(whole, cols, self.training)
         beta = bounded(raised(gram - bias, self.precision[cols]), cross - bias_cross, self.limit[cols])[0]
         gram, cross, bias, bias_cross = whole
-        return float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta)
+        return Solution(cols, beta, float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta))
+
+    def set_of(self, keys: Iterable[str]) -> int:
+        """Terms as a number with a bit for each, whatever their order."""
+        out = 0
+        for key in keys:
+            out |= self._number[key]
+        return out
+
+    def _columns_in(self, asked: int) -> np.ndarray:
+        """Columns of the terms of a set, ascending."""
+        return self.columns([t.key for t in self.terms if asked & self._number[t.key]])
 
     def folds(self, whole_runs: bool) -> np.ndarray:
         """Fold of every block (blocks,), -1 for one that is not fitted; blocks of a fold are left out together."""
@@ -451,7 +527,7 @@ class Regression:
         """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
-            self._left_out[asked] = self._leave_out(*asked)
+            with_room(self._left_out, MOST_REMEMBERED)[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
     def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -555,11 +631,15 @@ class Regression:
         gram = self.gram[np.ix_(index, cols, cols)]
         return np.einsum("bkl,bkl->b", gram, inverses[fold[index]])
 
+    def products(self, cols: np.ndarray) -> np.ndarray:
+        """Products of columns on the training blocks, (k, k)."""
+        return self._total_gram[np.ix_(cols, cols)]
+
     def shown(self, key: str) -> np.ndarray:
         """Which columns of a term act in any row fitted, (k,)."""
         return np.diag(self._total_gram)[self.columns([key])] > 0
 
-    def between_runs(self, fit: Fit, key: str) -> tuple[np.ndarray, float]:
+    def between_runs(self, fit: Solution, key: str) -> tuple[np.ndarray, float]:
         """Variance between runs of a term's coefficients (0 where runs agree), and the p-value that they agree.
 
         Per run the term is refitted with all other coefficients held (DerSimonian and Laird's moment estimate).
@@ -634,6 +714,13 @@ class Regression:
         """p-value that the coefficients of `cols` are zero, Hotelling's T² over blocks."""
         where = fit.places(cols)
         return hotelling(quadratic_form(fit.beta[where], fit.covariance[np.ix_(where, where)]), len(where), count)
+
+
+def with_room(memory: dict, most: int) -> dict:
+    """A memory for one more, emptied where it holds `most`."""
+    if len(memory) >= most:
+        memory.clear()
+    return memory
 
 
 def hotelling(statistic: float, q: int, count: int) -> float:
@@ -777,12 +864,14 @@ def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
     return float(((values / unit @ vectors)[known] ** 2 / size[known]).sum())
 
 
-def whiten(rows: Rows, channel: int, taps: np.ndarray, start: int) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened y (n,) and x (n, K) of one channel from sample `start` on (one at a time: all would be large)."""
-    x = np.zeros_like(rows.x[:, channel])
-    used = np.flatnonzero(rows.x[:, channel].any(axis=0))
-    x[:, used] = causal(taps, rows.x[:, channel, used])
-    return causal(taps, rows.y[:, channel])[start:], x[start:]
+def whiten(rows: Rows, channel: int, taps: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened y (n,) and `columns` of x (n, k) of one channel (one at a time: all would be large)."""
+    return causal(taps, rows.y[:, channel]), causal(taps, rows.x[:, channel, columns])
+
+
+def acting(rows: Sequence[Rows], channel: int) -> np.ndarray:
+    """Columns that say something in a channel: many say nothing there (a moment in a force)."""
+    return np.flatnonzero(np.any([r.x[:, channel].any(axis=0) for r in rows], axis=0))
 
 
 def full_fit_residuals(
@@ -798,16 +887,17 @@ def full_fit_residuals(
     size = rows[0].x.shape[2]
     beta = np.zeros(size)
     left = [r.y for r in rows]
+    used = {c: acting(rows, c) for c in channels}
     for _ in range(2):
         gram, cross = np.zeros((size, size)), np.zeros(size)
         for c in channels:
             taps = colours.get(c, np.ones(1))
             weight = 1.0 / (np.concatenate([causal(taps, part[:, c]) for part in left]).std() + 1e-12)
             for r in rows:
-                y, x = whiten(r, c, taps, 0) if c in colours else (r.y[:, c], r.x[:, c])
+                y, x = whiten(r, c, taps, used[c])
                 x = x * weight
-                gram += x.T @ x
-                cross += x.T @ (y * weight)
+                gram[np.ix_(used[c], used[c])] += x.T @ x
+                cross[used[c]] += x.T @ (y * weight)
         gram += np.diag(precision)
         scale = inverse_root(np.diag(gram))
         beta = scale * np.linalg.solve(gram * np.outer(scale, scale) + 1e-7 * np.eye(size), cross * scale)
@@ -843,7 +933,7 @@ def build(
     parts_of, blocks_of_rows, runs, training = blocks_of(rows, names, per_block, longest, in_training)
     count = len(runs)
     fitted = np.array([t is True for t in training])
-    gram, cross, square = np.zeros((count, at, at)), np.zeros((count, at)), np.zeros(count)
+    gram, cross, square = np.zeros((at, at, count)), np.zeros((count, at)), np.zeros(count)
     own_gram, own_cross = np.zeros((count, len(own), at)), np.zeros((count, len(own)))
     bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
     own_bias, own_bias_cross = np.zeros((len(own), at)), np.zeros(len(own))
@@ -852,19 +942,19 @@ def build(
         if not parts:
             continue  # shorter than the whitening reaches: it says nothing
         first = blocks_of_rows[k][0]
+        here = slice(first, first + len(parts))
         for place, (channel, taps) in enumerate(filters.items()):
-            y, x = whiten(r, channel, taps, longest)
-            again = None if noisy is None else whiten(noisy[k], channel, taps, longest)
-            # Many columns say nothing in a channel (a moment in a force): they are left out of the products.
-            used = np.flatnonzero(x.any(axis=0) | (False if again is None else again[1].any(axis=0)))
-            x, grid = x[:, used], np.ix_(used, used)
+            used = acting([r] if noisy is None else [r, noisy[k]], channel)
+            grid = np.ix_(used, used)
+            y, x = (values[longest:] for values in whiten(r, channel, taps, used))
             # Of the columns used those that this channel estimates apart: where they stand among them, and in `own`.
             ours = np.flatnonzero(np.isin(used, own)) if channel in estimated_by else np.zeros(0, int)
             ours_at = np.searchsorted(own, used[ours])
             ours_grid = np.ix_(ours_at, used)
-            if again is not None:
-                shift = again[1][:, used] - x
-                noise, with_y = shift.T @ shift, shift.T @ (again[0] - y)
+            if noisy is not None:
+                y_again, x_again = (values[longest:] for values in whiten(noisy[k], channel, taps, used))
+                shift = x_again - x
+                noise, with_y = shift.T @ shift, shift.T @ (y_again - y)
                 bias_gram[grid] += noise
                 bias_cross[used] += with_y
                 own_bias[ours_grid] += noise[ours]
@@ -872,23 +962,26 @@ def build(
                 if kept is not None:
                     kept.bias_gram[place][grid] += noise
                     kept.bias_cross[place, used] += with_y
-            for b, part in enumerate(parts, first):
-                products, with_y, own_square = x[part].T @ x[part], x[part].T @ y[part], float(y[part] @ y[part])
-                gram[b][grid] += products
-                cross[b, used] += with_y
-                if len(ours):
-                    own_gram[b][ours_grid] += products[ours]
-                    own_cross[b, ours_at] += with_y[ours]
-                square[b] += own_square
-                if kept is not None and (e := kept.environment[b]) >= 0:
-                    kept.gram[place, e][grid] += products
-                    kept.cross[place, e, used] += with_y
-                    kept.square[place, e] += own_square
+            products = np.array([x[part].T @ x[part] for part in parts])
+            with_y = np.array([x[part].T @ y[part] for part in parts])
+            squares = np.array([y[part] @ y[part] for part in parts])
+            gram[(*grid, here)] += products.transpose(1, 2, 0)
+            cross[here, used] += with_y
+            square[here] += squares
+            if len(ours):
+                own_gram[(here, *ours_grid)] += products[:, ours]
+                own_cross[here, ours_at] += with_y[:, ours]
+            if kept is not None:
+                for b, e in enumerate(kept.environment[here]):
+                    if e >= 0:
+                        kept.gram[place, e][grid] += products[b]
+                        kept.cross[place, e, used] += with_y[b]
+                        kept.square[place, e] += squares[b]
     precision = np.concatenate([1.0 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     return Regression(
         terms,
         start,
-        gram,
+        gram.transpose(2, 0, 1),
         cross,
         square,
         np.array(runs),
@@ -909,7 +1002,7 @@ def build(
 
 def blocks_of(
     rows: list[Rows], names: dict[str, int], per_block: int, longest: int, in_training
-) -> tuple[list[list[np.ndarray]], list[np.ndarray], list[int], list[bool | None]]:
+) -> tuple[list[list[slice]], list[np.ndarray], list[int], list[bool | None]]:
     """Of every stretch its blocks as places behind the whitening's reach `longest`, and of each of its rows the block;
     of every block the run's number, and whether it is fitted."""
     parts_of, blocks_of_rows = [], []
@@ -918,13 +1011,16 @@ def blocks_of(
     for r in rows:
         size = len(r.y) - longest
         blocks_of_rows.append(np.full(len(r.y), -1))
-        parts_of.append([] if size < 2 else np.array_split(np.arange(size), max(1, size // per_block)))
+        places = [] if size < 2 else np.array_split(np.arange(size), max(1, size // per_block))
+        parts_of.append([slice(int(own[0]), int(own[-1]) + 1) for own in places])
         for b, part in enumerate(parts_of[-1], len(runs)):
-            blocks_of_rows[-1][longest + part] = b
+            blocks_of_rows[-1][longest + part.start : longest + part.stop] = b
         if parts_of[-1]:
             blocks_of_rows[-1][:longest] = len(runs)
         runs += [names[r.run]] * len(parts_of[-1])
-        middles = [r.time_s[min(len(r.time_s) - 1, longest + int(part.mean()))] for part in parts_of[-1]]
+        middles = [
+            r.time_s[min(len(r.time_s) - 1, longest + (part.start + part.stop - 1) // 2)] for part in parts_of[-1]
+        ]
         training += [in_training(r.run, float(middle)) for middle in middles]
     return parts_of, blocks_of_rows, runs, training
 

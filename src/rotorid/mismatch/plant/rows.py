@@ -7,7 +7,7 @@ Both sides pass the same low-pass and are then thinned, so that the equation sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,8 @@ from rotorid.mismatch.plant.motion import Segment
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal import kernels
 
+Block = dict[str, np.ndarray]
+"""What a column adds to each channel group, (n, 3)."""
 GROUPS = ("force", "moment", "accelerometer", "gyroscope")
 CHANNELS = tuple(f"{g}_{a}" for g in GROUPS for a in "xyz")
 PARAMETER_NAMES = {
@@ -336,34 +338,27 @@ class Thinner:
         return time_s[index]
 
 
-ColumnSource = Callable[[Segment], Iterable[dict[str, np.ndarray]]]
-
-
 def assemble(
     segment: Segment,
     vehicle: Vehicle,
     thinner: Thinner,
-    sources: list[ColumnSource],
-    known: dict[str, np.ndarray] | None = None,
+    columns: Sequence[Block],
+    known: Block | None = None,
 ) -> Rows:
-    """Rows of one segment; `known` (channel group to (n, 3)) is already in the model and is subtracted."""
+    """Rows of one segment with thinned columns; `known` (native rate) is in the model already and is subtracted."""
     groups = residual(segment, vehicle)
     for name, part in (known or {}).items():
         groups[name] = groups[name] - part
     time_s = thinner.times(segment.motion.time_s)
-    y = np.full((len(time_s), 12), np.nan)
+    y, x = np.full((len(time_s), 12), np.nan), np.zeros((len(time_s), 12, len(columns)))
     for index, group in enumerate(GROUPS):
-        if group in groups:
-            y[:, 3 * index : 3 * index + 3] = thinner(groups[group])
-    # A column is thinned as soon as it is made: all of them at the native rate would not fit for long recordings.
-    thinned = [
-        {group: thinner(np.ascontiguousarray(block[group])) for group in GROUPS if group in block and group in groups}
-        for source in sources
-        for block in source(segment)
-    ]
-    x = np.zeros((len(time_s), 12, len(thinned)))
-    for k, block in enumerate(thinned):
-        for group, values in block.items():
-            index = 3 * GROUPS.index(group)
-            x[:, index : index + 3, k] = values
+        if group not in groups:
+            continue
+        own = slice(3 * index, 3 * index + 3)
+        y[:, own] = thinner(groups[group])
+        of_group = np.zeros((3, len(columns), len(time_s)))  # time last: a column is written in one go
+        for k, block in enumerate(columns):
+            if group in block:
+                of_group[:, k] = block[group].T
+        x[:, own] = of_group.transpose(2, 0, 1)
     return Rows(segment.run, time_s, y, x)

@@ -13,12 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
+from rotorid.mismatch.posterior.leftover import TINY
 from rotorid.mismatch.posterior.score import places, scored
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import POSSIBLE, by_id
 
 PROBABILITY = 0.95
 DRAWS = 400
+LEAST_KNOWN = 1e-9
+"""Least variance of scaled coefficients in any direction."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,11 @@ def limit_of(found: Found, key: str, squares: np.ndarray) -> UpperLimit | None:
 def drawn(mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Draws of coefficients (DRAWS, k) from a normal distribution, moved to their bounds where they lie beyond.
 
-    The same numbers at every call: a verdict does not change from one run to the next.
+    The same numbers at every call: a verdict does not change from one run to the next, nor by rounding, as it would by
+    the signs of eigenvectors.
     """
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    unit = np.sqrt(np.maximum(np.diag(covariance), TINY))
+    values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
+    root = unit[:, None] * np.linalg.cholesky((vectors * np.maximum(values, LEAST_KNOWN)) @ vectors.T)
     normal = np.random.default_rng(0).standard_normal((DRAWS, len(mean)))
     return np.clip(mean + normal @ root.T, low, high)

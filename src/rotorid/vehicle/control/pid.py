@@ -113,11 +113,10 @@ class AttitudePid:
         """The controller laid out for instants (m,), s, so that it flies compiled; None once it has been called."""
         if self._memory is not None:
             return None
-        angles = np.array([np.asarray(self.reference.euler_rad(t), float) for t in time_s])
         return AttitudeLoop(
             *(np.asarray(g) for g in (self.gains.proportional, self.gains.integral, self.gains.derivative)),
             allocation=self._allocation.T,
-            reference=np.column_stack([angles, np.full(len(time_s), self.reference.thrust_n)]),
+            reference=np.column_stack([self.reference.at(time_s), np.full(len(time_s), self.reference.thrust_n)]),
             derivative_time_s=self.derivative_time_s,
             limit_n_m=self.limit_n_m,
             more=np.tile(self._trim, (len(time_s), 1)) if self._trim.any() else None,

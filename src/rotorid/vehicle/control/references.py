@@ -15,6 +15,12 @@ class AttitudeReference:
     name: str
     thrust_n: float
     euler_rad: Callable[[float], np.ndarray]
+    at_once: bool = False
+    """Whether the function takes many times (m,), too, and gives (m, 3)."""
+
+    def at(self, time_s: np.ndarray) -> np.ndarray:
+        """Roll, pitch and yaw at many times, (m, 3), rad."""
+        return self.euler_rad(time_s) if self.at_once else np.array([self.euler_rad(t) for t in time_s], float)
 
 
 def training_reference(thrust_n: float = 5.0) -> AttitudeReference:

@@ -87,11 +87,12 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
         rng = np.random.default_rng([seed, number])
         phase = rng.uniform(0, 2 * np.pi, 3)
 
-        def wanted(t: float, phase=phase) -> np.ndarray:
+        def wanted(t: float | np.ndarray, phase=phase) -> np.ndarray:
+            t = np.asarray(t)[..., None]
             swing = np.sin(slow * t + phase) + 0.5 * np.sin(middle * t)
             return sizes * (swing + 0.3 * np.sin(fast * t + phase[::-1]))
 
-        reference = AttitudeReference("swings", thrust_n, wanted)
+        reference = AttitudeReference("swings", thrust_n, wanted, at_once=True)
         pilot = AttitudePid(vehicle, reference, gains, DERIVATIVE_S, most, steady.moments_n_m)
         trace = simulate_as_stated(vehicle, pilot, seconds, 0.002, start=start)
         made = record_as_stated(trace, vehicle, f"flight_{number + 1}", noise, rng, every=every)

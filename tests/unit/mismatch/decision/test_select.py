@@ -144,6 +144,7 @@ def test_what_displaces_another_must_hold_by_itself():
     y = [n + 0.8 * columns[1] for n, columns in zip(noise, x, strict=True)]
     search = search_of([term("there"), term("copy")], y, x)
     assert search.swapped(["there/form"], {}) == ["copy/form"]
+    search = search_of([term("there"), term("copy")], y, x)
     sizes = search.ask.sizes_of
     small = lambda key, beta: sizes(key, beta) * (0.01 if key == "copy/form" else 1.0)  # noqa: E731
     search.ask = replace(search.ask, sizes_of=small)

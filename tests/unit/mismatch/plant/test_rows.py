@@ -208,13 +208,10 @@ def test_rows_filter_both_sides_alike():
     added = form.contribution(motion, thesis_vehicle(), np.array([2.0])).force
     flown = one(replace(motion, specific_force=motion.specific_force + added / MASS))
     groups = ("force", "moment")
-    rows = assemble(
-        flown,
-        thesis_vehicle(),
-        Thinner(100.0, 10.0),
-        [lambda s: form_columns(form, np.zeros(1), s, thesis_vehicle(), groups)],
-    )
+    thin = Thinner(100.0, 10.0)
+    (column,) = form_columns(form, np.zeros(1), flown, thesis_vehicle(), groups)
+    rows = assemble(flown, thesis_vehicle(), thin, [{group: thin(part) for group, part in column.items()}])
     assert rows.x.shape == (len(rows.time_s), 12, 1) and np.isnan(rows.y[:, 6:]).all()
     np.testing.assert_allclose(rows.y[:, :3], 2.0 * rows.x[:, :3, 0], atol=1e-12)
-    known = assemble(flown, thesis_vehicle(), Thinner(100.0, 10.0), [], known={"force": added})
+    known = assemble(flown, thesis_vehicle(), thin, [], known={"force": added})
     np.testing.assert_allclose(known.y[:, :3], 0.0, atol=1e-12)
