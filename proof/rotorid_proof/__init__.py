@@ -3,6 +3,7 @@
 OPEN = (
     "ablation",
     "campaign",
+    "changes.fleet",
     "changes.pairs",
     "changes.score",
     "concealed.build",
