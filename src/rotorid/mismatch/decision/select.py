@@ -75,7 +75,6 @@ class Selection:
     active: list[str]
     fit: Fit
     p_values: dict[str, float] = field(default_factory=dict)
-    trail: list[str] = field(default_factory=list)
     not_established: dict[str, str] = field(default_factory=dict)
 
 
@@ -87,8 +86,6 @@ class Questions:
     """Size of a term (key, coefficients) per channel in units of its noise, (12,), less what values would absorb."""
     joint_sizes: Callable[[np.ndarray, np.ndarray], np.ndarray]
     """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
-    known_sizes: np.ndarray = field(default_factory=lambda: np.zeros(12))
-    """The same of effects that are in the model already (between command and rotor speed), (12,)."""
 
 
 class Search:
@@ -96,8 +93,6 @@ class Search:
 
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
-    widened = False
-    """Whether believed values have more room than their trust gives."""
 
     def __init__(self, regression: Regression, ask: Questions):
         self.regression = regression
@@ -162,7 +157,7 @@ class Search:
     def weight(self, key: str, beta: np.ndarray, active: list[str]) -> float:
         """Largest size of a term over the channels, counting only those where it is not dwarfed by another."""
         own = self.ask.sizes_of(key, beta)
-        largest = self.ask.known_sizes.copy()
+        largest = np.zeros(len(own))
         others = [k for k in active if k != key]
         if others:
             fit = self.regression.fit(self.always + others)
@@ -328,46 +323,40 @@ class Search:
     def run(self, active: list[str] | None = None) -> Selection:
         """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
         active = list(active or [])
-        trail: list[str] = []
         refuted: dict[str, str] = dict(self.refused)
         for _ in range(MOST_EFFECTS):
             dropped = dict(refuted)
-            active = self._grown(active, dropped, trail)
+            active = self._grown(active, dropped)
             found = self._refuted(active)
             if found is None:
                 break
             key, reason = found
             active = [k for k in active if k != key]
             refuted[self.terms[key].once] = reason
-            trail.append(f"- {key}: {reason}")
         # No single block of the recording decides.
         fit = self.regression.fit(self.always + active, jackknife=True)
         final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
         kept = {self.terms[k].effect for k in active}
         # What acts in one window of one run was dropped under its key.
         reasons = {self.terms[name].effect if name in self.terms else name: r for name, r in dropped.items()}
-        return Selection(active, fit, final, trail, {e: r for e, r in reasons.items() if e not in kept})
+        return Selection(active, fit, final, {e: r for e, r in reasons.items() if e not in kept})
 
-    def _grown(self, active: list[str], dropped: dict[str, str], trail: list[str]) -> list[str]:
-        """The model grown, its forms replaced and its weak terms taken out; `dropped` and `trail` are filled."""
+    def _grown(self, active: list[str], dropped: dict[str, str]) -> list[str]:
+        """The model grown, its forms replaced and its weak terms taken out; `dropped` is filled."""
         for _ in range(4 * MOST_EFFECTS):
             added = self._next(active, dropped) or []
             active = active + added
-            trail += [f"+ {key}" for key in added]
             for key in list(active):
                 better = self.best_form(key, active)
                 if better != key:
                     active[active.index(key)] = better
-                    trail.append(f"  {key} → {better}")
             if (simpler := self.simpler(active)) is not None and rules.SIMPLER(True):
-                trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
                 for key in active:
                     if self.terms[key].once not in {self.terms[k].once for k in simpler}:
                         dropped[self.terms[key].once] = Reason("simpler", "the others explain as much in other forms")
                 active = simpler
             exchanged = None if added else self.swapped(active, dropped)
             if exchanged is not None and rules.EXCHANGE(True):
-                trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
                 for gone in set(active) - set(exchanged):
                     dropped[self.terms[gone].once] = Reason("exchange", "another explains more in its place")
                 active = exchanged
@@ -375,7 +364,6 @@ class Search:
                 key, reason = weak
                 active = [k for k in active if k != key]
                 dropped[self.terms[key].once] = reason
-                trail.append(f"- {key}: {reason}")
             if not added and exchanged is None:
                 break
         return active

@@ -203,16 +203,11 @@ def account(
     traces, before, after = make_traces(seen, refitted, fit)
     p_before, p_after, depends = dependence(seen, before, after)
     approximate = approximate_forms(model, choice.leftovers)
-    share, channels, description = leftover(seen, before, after, p_after, depends, approximate)
+    channels, description = leftover(seen, after, p_after, depends, approximate)
     if chain is not None and choice.measured:
         traces += speed_traces(seen.setup, chain)
-        lost = speed_left(seen.setup, chain, traces)
-        if lost > LOST_SHARE:
-            # The reading and the speeds weigh alike.
-            share, channels = (
-                (share + lost) / 2,
-                (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count))),
-            )
+        if speed_left(seen.setup, chain, traces) > LOST_SHARE:
+            channels = (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)))
             depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
             description = "; ".join([*([description] if description else []), SPEED_LEFT])
     claimed_ids = {f.id for f in findings if f.status in CLAIMED}
@@ -230,7 +225,6 @@ def account(
         noise_floor=noise_floors(setup, model, chain),
         p_values={c: (p_before[c], p_after[c]) for c in p_before},
         regimes=regimes(seen),
-        unexplained_share=share,
         unexplained_channels=channels,
         unexplained_depends_on=tuple(depends),
         unexplained_description=description,

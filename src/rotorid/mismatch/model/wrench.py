@@ -176,7 +176,6 @@ def wrench_model(
     start: list[str] | None = None,
     segments: list[Segment] | None = None,
     noisy_segments: list[Segment] | None = None,
-    known_sizes: np.ndarray | None = None,
 ) -> WrenchModel:
     """Assemble, whiten, reduce and search."""
     segments = prepared.segments if segments is None else segments
@@ -188,7 +187,7 @@ def wrench_model(
         colours = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, beta = full_fit_residuals(rows, precision, colours)
-    model = searched(prepared, terms, rows, noisy, left, start, segments, known_sizes)
+    model = searched(prepared, terms, rows, noisy, left, start, segments)
     model = replace(model, floor=np.fmin(model.noise, whole_floor(model, beta, segments)))
     # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
     # thrust and a deaf gyroscope): such a channel would weigh as if it were exact, and pull at all values.
@@ -198,7 +197,7 @@ def wrench_model(
     if inflated.any():
         left = [np.where(inflated, own, full) for own, full in zip(remains, left, strict=True)]
         active = model.selection.active
-        again = searched(prepared, terms, rows, noisy, left, active, segments, known_sizes)
+        again = searched(prepared, terms, rows, noisy, left, active, segments)
         model = replace(again, floor=model.floor)
     return replace(model, segments=segments, noisy_segments=noisy_segments, effects=effects)
 
@@ -225,7 +224,6 @@ def searched(
     left: list[np.ndarray],
     start: list[str] | None,
     segments: list[Segment],
-    known_sizes: np.ndarray | None,
 ) -> WrenchModel:
     """The search with residuals `left` (n, 12) of every stretch taken for the noise."""
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
@@ -260,12 +258,9 @@ def searched(
         return seconds.sizes(cols, coefficients, 1.0 if short else 0.9)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
-    known = np.zeros(12) if known_sizes is None else known_sizes
-    ask = Questions(sizes_of, seconds.sizes, known)
+    ask = Questions(sizes_of, seconds.sizes)
     search = Search(regression.without_winds(), ask)
     selection = search.run(start)
-    if search.widened:
-        regression = regression.with_room(VALUE_LIMITS[1])
     if (wide := search.values_alone(selection)) is not None:
         regression = regression.with_room(VALUE_LIMITS[1])
         search = Search(wide, ask)
