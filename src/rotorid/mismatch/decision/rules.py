@@ -148,7 +148,6 @@ VALUES_FIRST = rule(
     "values_first", "Believed values alone are taken where with wider priors they explain as much as effects."
 )
 FREE_VALUES = rule("free_values", "An effect is significant given believed values that are free.")
-COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters only where no simpler one is left to.")
 
 # Classes
 
@@ -157,7 +156,6 @@ THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a
 
 # Believed values
 
-VALUE_TRANSFER = rule("value_transfer", "The gain that a wrong value predicts is realised where it was not fitted.")
 VALUE_IN_QUESTION = rule(
     "value_in_question", "A value that a member of an open class would change is not called wrong."
 )

@@ -88,6 +88,11 @@ class Questions:
     """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
 
 
+def named_first(term: Term) -> int:
+    """When a term is looked at: one without a name where nothing else enters."""
+    return int(term.effect in UNKNOWNS)
+
+
 class Search:
     """Forward search with replacement of forms and backward checks."""
 
@@ -372,7 +377,7 @@ class Search:
         """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
         if len(active) >= MOST_EFFECTS:
             return None
-        for candidate in self.candidates(active, dropped, self._turn):
+        for candidate in self.candidates(active, dropped, named_first):
             effect = self.terms[candidate.key].once
             if candidate.score <= 0:
                 continue
@@ -383,10 +388,6 @@ class Search:
                 return [candidate.key]
             dropped.setdefault(effect, Reason("size", f"its size is {size:.2g} of the noise"))
         return None
-
-    def _turn(self, term: Term) -> int:
-        """When a term is looked at: one that could be two effects, or has no name, where nothing else enters."""
-        return 2 if term.effect in UNKNOWNS else int(rules.COMPOUND_LAST(term.form.compound))
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
         """A term that other environments or another term speak against, with the reason."""
