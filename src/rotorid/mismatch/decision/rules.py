@@ -169,13 +169,6 @@ MERE_SCALE = rule(
     "mere_scale",
     "Without measured rotor speeds a throttle curve is a thrust coefficient if only its slope is significant.",
 )
-CLOSED_LOOP_BIAS = rule(
-    "closed_loop_bias",
-    "A delay is not stated if a controller that answers the gyroscope's noise would make commands look as late.",
-)
-COLOURED_NOISE = rule(
-    "coloured_noise", "Noise of speeds and gyroscope in the band analysed may be more than its white part."
-)
 
 # Stands and benches
 
