@@ -142,11 +142,7 @@ CANCELS = rule(
 
 # Moves of the search
 
-SIMPLER = rule("simpler", "A model with one id less and other forms of the rest is taken where it explains as much.")
 EXCHANGE = rule("exchange", "An id is replaced by another that explains more in its place.")
-VALUES_FIRST = rule(
-    "values_first", "Believed values alone are taken where with wider priors they explain as much as effects."
-)
 FREE_VALUES = rule("free_values", "An effect is significant given believed values that are free.")
 
 # Classes

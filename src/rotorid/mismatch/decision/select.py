@@ -219,30 +219,6 @@ class Search:
         judged = self.judged(forms, [k for k in active if k != key])
         return next((c.key for c in judged if c.physical), key)
 
-    def simpler(self, active: list[str]) -> list[str] | None:
-        """A model with one id less and other forms of those that stay, if it explains nearly as much.
-
-        Drag and inflow at the hubs, for example, are the same as at the centre of mass with a damping in addition.
-        """
-        if len(active) < 2 or not rules.SIMPLER.on:
-            return None
-        best, found = self.worth(active), None
-        for gone in active:
-            if self.terms[gone].run:
-                continue
-            trial = [k for k in active if k != gone]
-            value = self.worth(trial)
-            for place in 2 * [i for i, k in enumerate(trial) if not self.terms[k].run]:
-                for form in self.terms.values():
-                    if form.kind != "effect" or form.effect != self.terms[trial[place]].effect:
-                        continue
-                    other = [*trial[:place], form.key, *trial[place + 1 :]]
-                    if (worth := self.worth(other)) > value:
-                        trial, value = other, worth
-            if value > best and self._all_physical(trial):
-                best, found = value, trial
-        return found
-
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
         parameters = sum(self.terms[k].size for k in keys)
@@ -279,21 +255,6 @@ class Search:
             ),
             None,
         )
-
-    def values_alone(self, selection: Selection) -> Regression | None:
-        """The regression with more room for believed values, where those alone explain as much as a selection does.
-
-        A value that is off by many times its trust is held back in the search, and something else absorbs the rest.
-        """
-        reg, fit = self.regression, selection.fit
-        limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
-        moved = [abs(float(fit.beta[fit.columns == reg.start[t.key]][0])) for t in reg.terms if t.kind == "value"]
-        held = sum(m > NEAR_LIMIT * most for m, most in zip(moved, limits, strict=True))
-        if not held or not selection.active:
-            return None
-        wide = reg.with_room(VALUE_LIMITS[1])
-        enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
-        return wide if rules.VALUES_FIRST(enough) else None
 
     def beside(self, active: list[str]) -> Fit | None:
         """The model with the strongest further effect that explains more than it costs and is still not stated.
@@ -355,11 +316,6 @@ class Search:
                 better = self.best_form(key, active)
                 if better != key:
                     active[active.index(key)] = better
-            if (simpler := self.simpler(active)) is not None and rules.SIMPLER(True):
-                for key in active:
-                    if self.terms[key].once not in {self.terms[k].once for k in simpler}:
-                        dropped[self.terms[key].once] = Reason("simpler", "the others explain as much in other forms")
-                active = simpler
             exchanged = None if added else self.swapped(active, dropped)
             if exchanged is not None and rules.EXCHANGE(True):
                 for gone in set(active) - set(exchanged):

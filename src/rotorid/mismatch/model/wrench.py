@@ -20,7 +20,6 @@ from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.noise_band import NOISE_BAND, band_power
 from rotorid.mismatch.plant.regression import (
     AGREEMENT,
-    VALUE_LIMITS,
     Fit,
     Regression,
     autoregression,
@@ -259,10 +258,6 @@ def searched(
     ask = Questions(sizes_of, seconds.sizes)
     search = Search(regression.without_winds(), ask)
     selection = search.run(start)
-    if (wide := search.values_alone(selection)) is not None:
-        regression = regression.with_room(VALUE_LIMITS[1])
-        search = Search(wide, ask)
-        selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 
 
