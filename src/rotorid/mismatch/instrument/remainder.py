@@ -161,12 +161,11 @@ def explained_in_runs(model: ReadingModel, after: list[np.ndarray], channel: int
     return out
 
 
-def leftover(model: ReadingModel, after, p_after, depends, approximate=()):
+def leftover(model: ReadingModel, after, p_after, depends):
     """Channels of which something stays unexplained, and a plain description.
 
     A ridge regression on all inputs and their products stands for "whatever could be explained"; it is fitted on the
     training runs and judged on the held-out ones. What differs from run to run is fitted and judged within each.
-    `approximate` names effects whose form is known to leave something.
     """
     _, inputs = _inputs(model)
     split = model.setup.split
@@ -190,10 +189,7 @@ def leftover(model: ReadingModel, after, p_after, depends, approximate=()):
     if not channels:
         return (), ""
     named = " and ".join(d.replace("_", " ") for d in depends) or "the load"
-    cause = "the cause is not in the catalogue"
-    if approximate:
-        cause = f"the form of {' and of '.join(approximate)} is only approximate"
-    text = f"{', '.join(channels)} still depend on {named}; {cause}"
+    text = f"{', '.join(channels)} still depend on {named}; the cause is not in the catalogue"
     return tuple(channels), text
 
 

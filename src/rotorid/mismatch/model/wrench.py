@@ -356,11 +356,12 @@ def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full
 def speed_path(
     prepared: Prepared,
     known: list[tuple[Form, np.ndarray]] | None = None,
-    refused: Sequence[str] = (),
     trusted: bool = False,
 ) -> CommandChain | None:
-    """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
-    nothing can show it. Where only commands are recorded believed values are free with it unless `trusted`."""
+    """Search between command and rotor speed; None where no command is recorded, or nothing can show it.
+
+    Where only commands are recorded believed values are free with it unless `trusted`.
+    """
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
     if not segments or any(s.command is None for s in segments):
         return None
@@ -408,7 +409,7 @@ def speed_path(
         force_z = 2 if "force" in groups else None
         rate_hz = prepared.thinner.rate_hz
         problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z)
-    forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
+    forms = candidate_forms(segments, full_voltage is not None)
     return CommandChain(SpeedSearch(problem, forms).run(), full_speed, full_voltage)
 
 
