@@ -164,8 +164,6 @@ class Form:
     minimum_rotors: int = 1
     must_show: tuple[int, ...] = ()
     """Parameters without which the form is another effect: each must differ from zero by two standard errors."""
-    compound: bool = False
-    """Whether it is a force and a moment that could be of two effects: it enters where nothing plainer is left to."""
     memory: bool = False
     """Whether it needs the past (a pendulum of its own): one instant does not give its wrench."""
     excited_by: tuple[str, ...] = ()

@@ -54,7 +54,7 @@ from rotorid.mismatch.model.values import (
 )
 from rotorid.mismatch.model.within_trust import beyond_trust, settled
 from rotorid.mismatch.model.wrench import WrenchModel, linear_drag, nonlinear_intervals
-from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, full_speed, stretches
+from rotorid.mismatch.plant.motion import full_speed, stretches
 from rotorid.mismatch.plant.regime import regime_variables
 from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
@@ -75,20 +75,20 @@ TIMING_FLOOR = 0.05
 recorded."""
 
 
-def analyse(recordings: RecordingSet, cutoff_hz: float = HIGHEST_CUTOFF_HZ, watch: Watch = unwatched) -> Analysis:
+def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
     """The whole analysis of a set of kind `flight`.
 
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
     `watch` is called with what was chosen, just before.
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
-    analysis = analysed(recordings, mistakes, remarks, cutoff_hz, watch)
+    analysis = analysed(recordings, mistakes, remarks, watch)
     left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
     if analysis is None and left:
         # What is held out lost a sensor throughout: something else must show what the model is worth.
         names = ", ".join(r.name for r in recordings.runs if r not in left)
         remarks = (*remarks, f"Nothing of {names} could be compared; other recordings were held out instead.")
-        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, cutoff_hz, watch)
+        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, watch)
     if analysis is None:
         raise InputError(
             f"set {recordings.name}: no run can be held out with every column that the others are fitted by"
@@ -96,11 +96,11 @@ def analyse(recordings: RecordingSet, cutoff_hz: float = HIGHEST_CUTOFF_HZ, watc
     return analysis
 
 
-def analysed(recordings: RecordingSet, mistakes, remarks, cutoff_hz: float, watch: Watch) -> Analysis | None:
+def analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analysis | None:
     """The analysis of a set whose mistakes are undone; None where nothing of the runs held out can be compared."""
     split = split_runs(recordings)
     known, unseen = parts_of(recordings, split)
-    prepared = prepare(known, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
+    prepared = prepare(known, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     model, values = found.model, found.values
 
@@ -212,11 +212,10 @@ def account(
         traces=traces,
         between_sensors=between,
         without=without_each(found, seen, values, fit, findings, (*traces, *between)),
-        noise_floor=noise_floors(prepared, found),
+        noise_floor=noise_floors(found),
         p_values={c: (before[c], after[c]) for c in before},
         regimes=regimes_by_run(seen.segments, seen.prepared),
         winds=winds_of(seen),
-        unexplained_share=left.share,
         unexplained_channels=left.channels,
         unexplained_depends_on=left.depends_on,
         unexplained_description=left.description,
@@ -504,7 +503,7 @@ def sensor_traces(model: WrenchModel, refitted: list[np.ndarray], delivered: lis
     )
 
 
-def noise_floors(prepared: Prepared, found: Fitted) -> dict[str, float]:
+def noise_floors(found: Fitted) -> dict[str, float]:
     """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain.
 
     Never less than the sensors' own noise makes of the channel: the whole catalogue may fit that, too.

@@ -14,8 +14,6 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.decision.select import (
-    LEAST_PROMISE,
-    LEAST_TRANSFER,
     SMALLEST_SIZE,
     VALUE_FLOOR,
     Search,
@@ -181,14 +179,6 @@ def wrench_findings(
     return findings_of(search, selection, report_of)
 
 
-def fails_elsewhere(
-    regression: Regression, always: list[str], named: list[str], key: str, loose: dict[str, float]
-) -> bool:
-    """Whether a changed value does not keep what it promises on environments it was not fitted on."""
-    seen = regression.compare(always + named, always + [k for k in named if k != key], loose)
-    return seen.promised.sum() > LEAST_PROMISE and seen.transfer < LEAST_TRANSFER
-
-
 def wrong_values(
     regression: Regression,
     selection: Selection,
@@ -200,9 +190,9 @@ def wrong_values(
 
     Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
     counts, but only up to MOST_DISTRUST per value: a number may be far off, and a wrong mass must not be
-    sold as a wrong thrust and three wrong inertias. A value is named only where it survives on the held-out part, and
-    where it matters: SMALLEST_CHANGE, and a size in units of the noise (`size_of(key, relative change)`). `moving` is
-    False on a stand, where a mass only weighs; `refused` values are not called wrong.
+    sold as a wrong thrust and three wrong inertias. A value is named only where it matters: SMALLEST_CHANGE, and a size
+    in units of the noise (`size_of(key, relative change)`). `moving` is False on a stand, where a mass only weighs;
+    `refused` values are not called wrong.
     """
     regression = regression.with_room(LEAST_ROOM)
     nuisance = regression.keys_of("nuisance", "wind")
@@ -238,8 +228,7 @@ def wrong_values(
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
-            fails = rules.VALUE_TRANSFER(fails_elsewhere(regression, always, named, key, loose))
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or fails or not matters:
+            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:
             # Two values that run away together say nothing against either of them alone.

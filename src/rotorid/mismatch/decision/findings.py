@@ -153,8 +153,6 @@ class Analysis:
     """To the id of a stated effect the part of the error that goes on the runs held out which goes without it."""
     effect_sizes: Mapping[str, Size] = field(default_factory=dict)
     """To the id of a stated effect what it does where it does most, on the runs held out."""
-    unexplained_share: float = 0.0
-    """Share of the residual's energy above the noise floor that the findings leave (0 where nothing was off)."""
     unexplained_channels: tuple[str, ...] = ()
     unexplained_depends_on: tuple[str, ...] = ()
     unexplained_description: str = ""

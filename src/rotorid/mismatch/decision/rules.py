@@ -142,13 +142,8 @@ CANCELS = rule(
 
 # Moves of the search
 
-SIMPLER = rule("simpler", "A model with one id less and other forms of the rest is taken where it explains as much.")
 EXCHANGE = rule("exchange", "An id is replaced by another that explains more in its place.")
-VALUES_FIRST = rule(
-    "values_first", "Believed values alone are taken where with wider priors they explain as much as effects."
-)
 FREE_VALUES = rule("free_values", "An effect is significant given believed values that are free.")
-COMPOUND_LAST = rule("compound_last", "A form that could be two effects enters only where no simpler one is left to.")
 
 # Classes
 
@@ -157,7 +152,6 @@ THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a
 
 # Believed values
 
-VALUE_TRANSFER = rule("value_transfer", "The gain that a wrong value predicts is realised where it was not fitted.")
 VALUE_IN_QUESTION = rule(
     "value_in_question", "A value that a member of an open class would change is not called wrong."
 )
@@ -167,21 +161,9 @@ SETTLED = rule("settled", "Values not called wrong move within their trust where
 
 OWN_SCALES = rule("own_scales", "Where thrust differs between runs each run has its own scale.")
 PAYLOAD_WINDOWS = rule("payload_windows", "A load with two plateaus is a payload that is on board for a part of a run.")
-MERE_SCALE = rule(
-    "mere_scale",
-    "Without measured rotor speeds a throttle curve is a thrust coefficient if only its slope is significant.",
-)
-CLOSED_LOOP_BIAS = rule(
-    "closed_loop_bias",
-    "A delay is not stated if a controller that answers the gyroscope's noise would make commands look as late.",
-)
-COLOURED_NOISE = rule(
-    "coloured_noise", "Noise of speeds and gyroscope in the band analysed may be more than its white part."
-)
 
 # Stands and benches
 
-APPROXIMATE = rule("approximate", "An effect is still significant where a stronger one's gain may vary smoothly.")
 NEEDLESS_VALUE = rule(
     "needless_value", "A wrong value is still significant where an effect's form is free or has more parameters."
 )
@@ -203,7 +185,6 @@ SLIGHT = rule(
     "slight",
     "An effect with next to no share of the explained error and no large gain in any channel is not established.",
 )
-MAY_BE_NOTHING = rule("may_be_nothing", "An effect without a significant parameter is not established.")
 
 
 def markdown() -> str:

@@ -86,7 +86,6 @@ class Selection:
     active: list[str]
     fit: Fit
     p_values: dict[str, float] = field(default_factory=dict)
-    trail: list[str] = field(default_factory=list)
     not_established: dict[str, str] = field(default_factory=dict)
 
 
@@ -98,8 +97,11 @@ class Questions:
     """Size of a term (key, coefficients) per channel in units of its noise, (12,), less what values would absorb."""
     joint_sizes: Callable[[np.ndarray, np.ndarray], np.ndarray]
     """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
-    known_sizes: np.ndarray = field(default_factory=lambda: np.zeros(12))
-    """The same of effects that are in the model already (between command and rotor speed), (12,)."""
+
+
+def named_first(term: Term) -> int:
+    """When a term is looked at: one without a name where nothing else enters."""
+    return int(term.effect in UNKNOWNS)
 
 
 def price(term: Term) -> float:
@@ -117,8 +119,6 @@ class Search:
 
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
-    widened = False
-    """Whether believed values have more room than their trust gives."""
 
     def __init__(self, regression: Regression, ask: Questions):
         self.regression = regression
@@ -255,34 +255,6 @@ class Search:
         judged = self.judged(forms, [k for k in active if k != key])
         return next((c.key for c in judged if c.physical), key)
 
-    def simpler(self, active: list[str]) -> list[str] | None:
-        """A model with one id less and other forms of those that stay, if it explains nearly as much.
-
-        Drag and inflow at the hubs, for example, are the same as at the centre of mass with a damping in addition.
-        """
-        if len(active) < 2 or not rules.SIMPLER.on:
-            return None
-        best, found = self.worth(active), None
-        for gone in active:
-            if self.terms[gone].run:
-                continue
-            trial = [k for k in active if k != gone]
-            value = self.worth(trial)
-            for _ in range(2):
-                before = trial
-                for place in (i for i, k in enumerate(before) if not self.terms[k].run):
-                    effect, rest = self.terms[trial[place]].effect, [*trial[:place], *trial[place + 1 :]]
-                    forms = [t for t in self.terms.values() if t.kind == "effect" and t.effect == effect]
-                    worths = self.worth_with(rest, forms)
-                    if max(worths) > value:
-                        value, best_form = max(worths), forms[int(np.argmax(worths))].key
-                        trial = [*trial[:place], best_form, *trial[place + 1 :]]
-                if trial is before:
-                    break
-            if value > best and self._all_physical(trial):
-                best, found = value, trial
-        return found
-
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
         return self.regression.explained(self.always + keys) - sum(price(self.terms[k]) for k in keys)
@@ -325,21 +297,6 @@ class Search:
             None,
         )
 
-    def values_alone(self, selection: Selection) -> Regression | None:
-        """The regression with more room for believed values, where those alone explain as much as a selection does.
-
-        A value that is off by many times its trust is held back in the search, and something else absorbs the rest.
-        """
-        reg, fit = self.regression, selection.fit
-        limits = [float(reg.limit[reg.start[t.key]]) for t in reg.terms if t.kind == "value"]
-        moved = [abs(float(fit.beta[fit.columns == reg.start[t.key]][0])) for t in reg.terms if t.kind == "value"]
-        held = sum(m > NEAR_LIMIT * most for m, most in zip(moved, limits, strict=True))
-        if not held or not selection.active:
-            return None
-        wide = reg.with_room(VALUE_LIMITS[1])
-        enough = wide.explained(self.always) - COST_PER_EFFECT * held > self.worth(selection.active)
-        return wide if rules.VALUES_FIRST(enough) else None
-
     def beside(self, active: list[str]) -> Fit | None:
         """The model with the strongest further effect that explains more than it costs and is still not stated.
 
@@ -379,46 +336,35 @@ class Search:
     def run(self, active: list[str] | None = None) -> Selection:
         """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
         active = list(active or [])
-        trail: list[str] = []
         refuted: dict[str, str] = dict(self.refused)
         for _ in range(MOST_EFFECTS):
             dropped = dict(refuted)
-            active = self._grown(active, dropped, trail)
+            active = self._grown(active, dropped)
             found = self._refuted(active)
             if found is None:
                 break
             key, reason = found
             active = [k for k in active if k != key]
             refuted[self.terms[key].once] = reason
-            trail.append(f"- {key}: {reason}")
         # No single block of the recording decides.
         fit = self.regression.fit(self.always + active, jackknife=True)
         final = {k: self.regression.wald(fit, self.regression.columns([k]), self.blocks) for k in active}
         kept = {self.terms[k].effect for k in active}
         # What acts in one window of one run was dropped under its key.
         reasons = {self.terms[name].effect if name in self.terms else name: r for name, r in dropped.items()}
-        return Selection(active, fit, final, trail, {e: r for e, r in reasons.items() if e not in kept})
+        return Selection(active, fit, final, {e: r for e, r in reasons.items() if e not in kept})
 
-    def _grown(self, active: list[str], dropped: dict[str, str], trail: list[str]) -> list[str]:
-        """The model grown, its forms replaced and its weak terms taken out; `dropped` and `trail` are filled."""
+    def _grown(self, active: list[str], dropped: dict[str, str]) -> list[str]:
+        """The model grown, its forms replaced and its weak terms taken out; `dropped` is filled."""
         for _ in range(4 * MOST_EFFECTS):
             added = self._next(active, dropped) or []
             active = active + added
-            trail += [f"+ {key}" for key in added]
             for key in list(active):
                 better = self.best_form(key, active)
                 if better != key:
                     active[active.index(key)] = better
-                    trail.append(f"  {key} → {better}")
-            if (simpler := self.simpler(active)) is not None and rules.SIMPLER(True):
-                trail.append(f"  {' and '.join(active)} → {' and '.join(simpler)}")
-                for key in active:
-                    if self.terms[key].once not in {self.terms[k].once for k in simpler}:
-                        dropped[self.terms[key].once] = Reason("simpler", "the others explain as much in other forms")
-                active = simpler
             exchanged = None if added else self.swapped(active, dropped)
             if exchanged is not None and rules.EXCHANGE(True):
-                trail.append(f"  {' and '.join(active)} ⇄ {' and '.join(exchanged)}")
                 for gone in set(active) - set(exchanged):
                     dropped[self.terms[gone].once] = Reason("exchange", "another explains more in its place")
                 active = exchanged
@@ -426,7 +372,6 @@ class Search:
                 key, reason = weak
                 active = [k for k in active if k != key]
                 dropped[self.terms[key].once] = reason
-                trail.append(f"- {key}: {reason}")
             if not added and exchanged is None:
                 break
         return active
@@ -435,7 +380,7 @@ class Search:
         """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
         if len(active) >= MOST_EFFECTS:
             return None
-        for candidate in self.candidates(active, dropped, self._turn):
+        for candidate in self.candidates(active, dropped, named_first):
             effect = self.terms[candidate.key].once
             if candidate.score <= 0:
                 continue
@@ -446,10 +391,6 @@ class Search:
                 return [candidate.key]
             dropped.setdefault(effect, Reason("size", f"its size is {size:.2g} of the noise"))
         return None
-
-    def _turn(self, term: Term) -> int:
-        """When a term is looked at: one that could be two effects, or has no name, where nothing else enters."""
-        return 2 if term.effect in UNKNOWNS else int(rules.COMPOUND_LAST(term.form.compound))
 
     def _refuted(self, active: list[str]) -> tuple[str, str] | None:
         """A term that other environments or another term speak against, with the reason."""

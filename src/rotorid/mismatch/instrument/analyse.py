@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage
+from rotorid.effects.catalogue import before_the_rotors, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
 from rotorid.mismatch.decision import rules
@@ -24,7 +24,7 @@ from rotorid.mismatch.decision.select import Selection
 from rotorid.mismatch.delivery.final import Offered, as_delivered
 from rotorid.mismatch.delivery.gate import Gated, Offer
 from rotorid.mismatch.delivery.parts import claimed
-from rotorid.mismatch.instrument.approximate import needless_values, without_leftovers_of_forms
+from rotorid.mismatch.instrument.approximate import needless_values
 from rotorid.mismatch.instrument.chain import (
     ChainResult,
     find_chain,
@@ -123,7 +123,6 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         return fitted_model(setup, terms, active, loadings, model.search.refused)
 
     model = with_plainer_forms(model, among)
-    model, leftovers = without_leftovers_of_forms(model)
     values_of = partial(values_in, model)
     if chain is None:
         reasons.update(
@@ -138,7 +137,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
-    found = [one_load(f, setup) for f in reading_findings(model, leftovers)]
+    found = [one_load(f, setup) for f in reading_findings(model)]
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:
@@ -151,9 +150,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     findings = with_probabilities(findings, chosen_already(model))
     fit, moved_values = settled(model, values, model.selection.active)
     to_state = values if measured else stated_of_commands(findings, values)
-    choice = Choice(
-        setup, model, chain, measured, values, to_state, tuple(findings), leftovers, reasons, tuple(remarks)
-    )
+    choice = Choice(setup, model, chain, measured, values, to_state, tuple(findings), reasons, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(model, chain, unseen)
@@ -174,7 +171,6 @@ class Choice:
     stated: Values
     """Wrong values as they are stated."""
     findings: tuple[Finding, ...]
-    leftovers: Sequence
     reasons: Mapping[str, str]
     remarks: tuple[str, ...]
 
@@ -202,17 +198,11 @@ def account(
     step = next_flight(sorted(findings, key=lambda f: f.p_value), recordings)
     traces, before, after = make_traces(seen, refitted, fit)
     p_before, p_after, depends = dependence(seen, before, after)
-    approximate = approximate_forms(model, choice.leftovers)
-    share, channels, description = leftover(seen, before, after, p_after, depends, approximate)
+    channels, description = leftover(seen, after, p_after, depends)
     if chain is not None and choice.measured:
         traces += speed_traces(seen.setup, chain)
-        lost = speed_left(seen.setup, chain, traces)
-        if lost > LOST_SHARE:
-            # The reading and the speeds weigh alike.
-            share, channels = (
-                (share + lost) / 2,
-                (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count))),
-            )
+        if speed_left(seen.setup, chain, traces) > LOST_SHARE:
+            channels = (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)))
             depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
             description = "; ".join([*([description] if description else []), SPEED_LEFT])
     claimed_ids = {f.id for f in findings if f.status in CLAIMED}
@@ -230,7 +220,6 @@ def account(
         noise_floor=noise_floors(setup, model, chain),
         p_values={c: (p_before[c], p_after[c]) for c in p_before},
         regimes=regimes(seen),
-        unexplained_share=share,
         unexplained_channels=channels,
         unexplained_depends_on=tuple(depends),
         unexplained_description=description,
@@ -311,12 +300,6 @@ def without_each(
         left = {(t.run, t.channel, first_s(t.time_s)): t.after for t in own}
         out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
     return out
-
-
-def approximate_forms(model: ReadingModel, leftovers) -> list[str]:
-    """Names of effects at work whose form leaves something that others only made up for."""
-    keys = dict.fromkeys(c.stronger for c in leftovers if c.stronger in model.selection.active)
-    return [catalogue()[model.search.terms[k].effect].name for k in keys]
 
 
 def speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> float:

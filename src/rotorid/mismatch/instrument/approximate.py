@@ -1,18 +1,16 @@
-"""Effects that only explain what the form of a stronger one leaves.
+"""Believed values that only make up for the form of an effect, which is approximate.
 
 A law of nature has one form, an effect of the catalogue has many: another laboratory's thrust curve, cable or room is
 never quite that of any equation written down before. What a strong effect's form leaves follows the same inputs, is far
-above the noise, and something else in the catalogue will fit it. So whatever was found given a stronger effect must
-also be needed where that one is free to have any smooth form: its contribution times hat functions of the load's size,
-of its own size and of the tilt, each rotor's share of it apart, fading within a run, and a little late. What is not
-needed then is no effect of its own but the stronger one's form being only approximate. Effects whose equation is
-geometry or a definition (`Effect.exact`) have that form and no other.
+above the noise, and a believed value will fit it. So a value that seems wrong must also be needed where the effect is
+free to have any smooth form: its contribution times hat functions of the load's size, of its own size and of the tilt,
+each rotor's share of it apart, fading within a run, and a little late. Effects whose equation is geometry or a
+definition (`Effect.exact`) have that form and no other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,8 +18,8 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import WIDEST_TRUST, coefficients
-from rotorid.mismatch.decision.select import KEEP_P, SHARE_OF_LARGEST, Selection
-from rotorid.mismatch.instrument.model import ReadingModel, block_length, everything, kept_values, restrain
+from rotorid.mismatch.decision.select import KEEP_P, SHARE_OF_LARGEST
+from rotorid.mismatch.instrument.model import ReadingModel, block_length, everything, restrain
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.plant.regression import Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
@@ -30,25 +28,13 @@ from rotorid.mismatch.plant.unknowns import UNKNOWNS
 KNOTS = (0.0, 1 / 3, 2 / 3, 1.0)
 """Where the hat functions stand, as shares of the largest."""
 WEAKER = 0.5
-"""An effect is the weaker one of two where it adds less than this share of what the other explains by itself."""
+"""A value is weaker than an effect where it adds less than this share of what the effect explains by itself."""
 OF_ITS_OWN = 0.5
-"""Share of what an effect explains that must remain given the stronger one's free form."""
+"""Share of what a value explains that must remain given the effect's free form."""
 LATE_ROWS = (1, 2, 4, 8)
 """Rows by which a free form may also be late."""
 FREE = "free form"
 GAIN = "gain"
-
-
-@dataclass(frozen=True)
-class LeftOfForm:
-    """An effect that was taken out, and the stronger one whose form it made up for."""
-
-    key: str
-    effect: str
-    stronger: str
-    """Key of the stronger one's term."""
-    either: bool
-    """Whether the stronger one is in turn not needed given a free form of this: then it may be the true one."""
 
 
 def own_inputs(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
@@ -148,44 +134,41 @@ def sizes(model: ReadingModel, active: list[str]) -> dict[str, np.ndarray]:
     return {k: model.search.ask.sizes_of(k, coefficients(regression, fit, k)[0]) for k in active}
 
 
-def left_of(model: ReadingModel, weak: str, strong: str, active: list[str], channels: list[int]) -> float:
-    """Share of what `weak` explains that remains given a free form of `strong`; 0 where it is not significant.
+def left_of(model: ReadingModel, value: str, strong: str, active: list[str], channels: list[int]) -> float:
+    """Share of what a believed value explains that remains given a free form of `strong`; 0 if it is not significant.
 
-    `weak` is a term at work or a believed value, which then is as free as one that is called wrong.
+    The value is as free as one that is called wrong.
     """
-    always, fit = model.search.always, model.regression.fit(model.search.always + active)
+    fit, loose = model.regression.fit([*model.search.always, *active]), {value: WIDEST_TRUST}
     small = beside(model, active, freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
-    every = [*always, *active]
-    rest, loose = [k for k in every if k != weak], {weak: WIDEST_TRUST} if weak in always else {}
+    every = [*model.search.always, *active]
+    rest = [k for k in every if k != value]
     with_it = small.fit([FREE, *every], loose=loose)
-    if small.wald(with_it, small.columns([weak]), int(small.training.sum())) > KEEP_P:
+    if small.wald(with_it, small.columns([value]), int(small.training.sum())) > KEEP_P:
         return 0.0
     before = small.fit(every, loose=loose).gain - small.fit(rest).gain
     return float((with_it.gain - small.fit([FREE, *rest]).gain) / max(before, 1e-9))
 
 
-def stronger_ones(model: ReadingModel, key: str, active: list[str]) -> list[tuple[str, list[int]]]:
-    """Terms at work that by themselves explain far more than `key` adds to them, with the channels they share.
+def stronger_ones(model: ReadingModel, value: str, active: list[str]) -> list[tuple[str, list[int]]]:
+    """Terms at work that by themselves explain far more than a believed value adds to them, with the channels they
+    share.
 
     Not by the sizes in the fit: two that make up for each other's form are both large.
     """
-    search, regression = model.search, model.regression
-    size = sizes(model, active)
-    own = size.get(key)
-    if own is None:
-        fit = regression.fit([*search.always, *active], loose={key: WIDEST_TRUST})
-        own = search.ask.sizes_of(key, coefficients(regression, fit, key)[0])
+    search, regression, loose = model.search, model.regression, {value: WIDEST_TRUST}
+    size, fit = sizes(model, active), regression.fit([*search.always, *active], loose=loose)
+    own = search.ask.sizes_of(value, coefficients(regression, fit, value)[0])
     out = []
     for other in active:
         effect = search.terms[other].effect
-        if other == key or effect in UNKNOWNS or catalogue()[effect].exact:
+        if effect in UNKNOWNS or catalogue()[effect].exact:
             continue
-        rest = [k for k in (*search.always, *active) if k not in (key, other)]
-        loose = {key: WIDEST_TRUST} if key in search.always else {}
+        rest = [k for k in (*search.always, *active) if k not in (value, other)]
         none, alone = regression.fit(rest).gain, regression.fit([*rest, other]).gain
         weak, both = (
-            regression.fit([*rest, key], loose=loose).gain,
-            regression.fit([*rest, other, key], loose=loose).gain,
+            regression.fit([*rest, value], loose=loose).gain,
+            regression.fit([*rest, other, value], loose=loose).gain,
         )
         if alone < weak or both - alone > WEAKER * (alone - none):
             continue
@@ -208,53 +191,3 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
         if any(left_of(model, key, s, active, c) < OF_ITS_OWN for s, c in stronger_ones(model, key, active)):
             out.add(key)
     return out if rules.NEEDLESS_VALUE(bool(out)) else set()
-
-
-def without_leftovers_of_forms(model: ReadingModel) -> tuple[ReadingModel, tuple[LeftOfForm, ...]]:
-    """The model without effects that only make up for the form of a stronger one, and what they were."""
-    found: list[LeftOfForm] = []
-    while True:
-        active = model.selection.active
-        worst = None
-        for key in active:
-            for strong, channels in stronger_ones(model, key, active):
-                share = left_of(model, key, strong, active, channels)
-                if share < OF_ITS_OWN and (worst is None or share < worst[0]):
-                    worst = (share, key, strong)
-        if not rules.APPROXIMATE(worst is not None):
-            return model, tuple(found)
-        _, key, strong = worst
-        effect = model.search.terms[key].effect
-        selection = selection_of(model, [k for k in active if k != key])
-        name = catalogue()[model.search.terms[strong].effect].name
-        reason = f"it only explains what is left by {name}, whose form is approximate"
-        selection = replace(selection, not_established=selection.not_established | {effect: reason})
-        either = exchangeable(model, key, strong)
-        model = replace(model, selection=selection)
-        found.append(LeftOfForm(key, effect, strong, either))
-
-
-def selection_of(model: ReadingModel, active: list[str]) -> Selection:
-    """A selection of other terms, fitted and tested as the search does in the end."""
-    search = model.search
-    fit = search.regression.fit(kept_values(search, active) + active, jackknife=True)
-    p_values = {k: search.judge(k, active, jackknife=True).p_value for k in active}
-    return replace(model.selection, active=active, fit=fit, p_values=p_values)
-
-
-def exchangeable(model: ReadingModel, key: str, strong: str) -> bool:
-    """Whether a free form of `key` in the place of `strong` explains all but what any form is wrong by."""
-    search, regression = model.search, model.regression
-    rest = [k for k in model.selection.active if k not in (key, strong)]
-    alone = regression.fit([*search.always, *rest, key])
-    channels = list(model.setup.instrument.channels)
-    free = freed(model, key, coefficients(regression, alone, key)[0], channels)
-    small = beside(model, [*rest, key, strong], free)
-    own = small.explained([*search.always, *rest, strong]) - small.explained([*search.always, *rest])
-    beyond = small.explained([*search.always, FREE, *rest, key, strong]) - small.explained(
-        [*search.always, FREE, *rest, key]
-    )
-    return beyond < SHARE_OF_LARGEST**2 * own
-
-
-__all__ = ["LeftOfForm", "needless_values", "without_leftovers_of_forms"]

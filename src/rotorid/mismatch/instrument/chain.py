@@ -246,9 +246,9 @@ class Problem:
             self.taps.append(np.array([1.0 / sigma]) if self.plain or not coloured else autoregression(own))
         self.noise = np.array([np.sqrt(np.mean(np.concatenate([p[:, c] for p in parts]) ** 2)) for c in range(width)])
 
-    def white(self, chain: Chain, theta, loadings=None) -> np.ndarray:
+    def white(self, chain: Chain, theta) -> np.ndarray:
         """Whitened residuals of all stretches in a row."""
-        parts = self.free(self.raw(chain, theta, loadings))
+        parts = self.free(self.raw(chain, theta))
         return np.concatenate(
             [np.stack([causal(t, p[:, c]) for c, t in enumerate(self.taps)], axis=1).ravel() for p in parts]
         )

@@ -11,7 +11,6 @@ from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import TermReport, estimates, findings_of
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.instrument.approximate import LeftOfForm
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     active_values,
@@ -37,18 +36,12 @@ def main_channels(model: ReadingModel, key: str) -> list[int]:
     return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]
 
 
-def reading_findings(model: ReadingModel, leftovers: tuple[LeftOfForm, ...] = ()) -> list[Finding]:
-    """Findings of the terms of a reading.
-
-    `leftovers` are effects that only made up for the form of a term: one that in any form does as well as it is an
-    alternative to it.
-    """
+def reading_findings(model: ReadingModel) -> list[Finding]:
+    """Findings of the terms of a reading."""
 
     def report_of(key: str) -> TermReport:
         channels = tuple(CHANNELS[c] for c in main_channels(model, key))
-        either = [c.effect for c in leftovers if c.stronger == key and c.either]
-        alternatives = [*alternatives_of(model, key), *either]
-        return TermReport(active_values(model, key), parameters_of(model, key), channels, alternatives)
+        return TermReport(active_values(model, key), parameters_of(model, key), channels, alternatives_of(model, key))
 
     return findings_of(model.search, model.selection, report_of)
 

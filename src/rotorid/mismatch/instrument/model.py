@@ -236,7 +236,7 @@ def reading_model(
     restrain(regression, setup)
     joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1, resolution(setup))
     sizes = size_function(regression, joint_sizes)
-    search = ReadingSearch(regression, Questions(sizes, joint_sizes, np.zeros(6)), refused)
+    search = ReadingSearch(regression, Questions(sizes, joint_sizes), refused)
     selection = search.run(active)
     always = kept_values(search, selection.active)
     if always != search.always:

@@ -161,12 +161,11 @@ def explained_in_runs(model: ReadingModel, after: list[np.ndarray], channel: int
     return out
 
 
-def leftover(model: ReadingModel, before, after, p_after, depends, approximate=()):
-    """Share of the mismatch that stays unexplained, its channels, and a plain description.
+def leftover(model: ReadingModel, after, p_after, depends):
+    """Channels of which something stays unexplained, and a plain description.
 
     A ridge regression on all inputs and their products stands for "whatever could be explained"; it is fitted on the
     training runs and judged on the held-out ones. What differs from run to run is fitted and judged within each.
-    `approximate` names effects whose form is known to leave something.
     """
     _, inputs = _inputs(model)
     split = model.setup.split
@@ -174,7 +173,7 @@ def leftover(model: ReadingModel, before, after, p_after, depends, approximate=(
     if split.training == split.held_out:
         training = [True] * len(training)
     judged = [i for i, t in enumerate(training) if not t] or list(range(len(training)))
-    channels, left_over, total = [], 0.0, 0.0
+    channels = []
     for c in model.setup.instrument.channels:
         features = [_features(z) for z in inputs]
         gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
@@ -184,20 +183,14 @@ def leftover(model: ReadingModel, before, after, p_after, depends, approximate=(
         energy = sum(float(after[i][:, c] @ after[i][:, c]) for i in judged)
         flexible = min(sum(float(np.sum((after[i][:, c] - features[i] @ beta) ** 2)) for i in judged), energy)
         flexible = min(flexible, energy - float(explained_in_runs(model, after, c)[judged].sum()))
-        start = sum(float(before[i][:, c] @ before[i][:, c]) for i in judged)
         gained = np.sqrt(max(energy - flexible, 0.0) / count)
         if p_after[CHANNELS[c]] < ALARM_P and gained > SMALLEST_SHARE_OF_NOISE * np.sqrt(flexible / count):
             channels.append(CHANNELS[c])
-            left_over += (energy - flexible) / max(flexible, 1e-300)
-        total += max(start - flexible, 0.0) / max(flexible, 1e-300)
-    if not channels or total <= 0:
-        return 0.0, (), ""
+    if not channels:
+        return (), ""
     named = " and ".join(d.replace("_", " ") for d in depends) or "the load"
-    cause = "the cause is not in the catalogue"
-    if approximate:
-        cause = f"the form of {' and of '.join(approximate)} is only approximate"
-    text = f"{', '.join(channels)} still depend on {named}; {cause}"
-    return float(min(1.0, left_over / total)), tuple(channels), text
+    text = f"{', '.join(channels)} still depend on {named}; the cause is not in the catalogue"
+    return tuple(channels), text
 
 
 def _features(z: np.ndarray) -> np.ndarray:

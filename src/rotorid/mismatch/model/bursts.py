@@ -20,7 +20,7 @@ KNOT_S = 0.6
 MOST_WINDOWS = 3
 
 
-def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray, spread: float | None = None):
+def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray):
     """Windows (start_s, stop_s, strength) of one stretch, strongest first.
 
     `residual_body` (n, 3) N; `rotation` (n, 3, 3). The scale is the median absolute deviation of the smoothed
@@ -29,8 +29,7 @@ def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray,
     world = np.einsum("nij,nj->ni", rotation, residual_body)[:, :2]
     dt = float(np.median(np.diff(time_s)))
     smooth = uniform_filter1d(world - np.median(world, axis=0), max(3, int(SMOOTHING_S / dt)), axis=0)
-    scale = 1.4826 * np.median(np.abs(smooth - np.median(smooth, axis=0)), axis=0).max()
-    scale = max(scale, spread or 0.0, 1e-12)
+    scale = max(1.4826 * np.median(np.abs(smooth - np.median(smooth, axis=0)), axis=0).max(), 1e-12)
     strength = np.linalg.norm(smooth, axis=1) / scale
     found = []
     left = strength.copy()

@@ -1,4 +1,4 @@
-"""What no named effect explains: how much, in which channels, what it depends on, and a plain description."""
+"""What no named effect explains: in which channels, what it depends on, and a plain description."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from rotorid.mismatch.plant.between_runs import DifferingMeans, apart
 from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.mismatch.plant.unknowns import DEPENDS_ON, UNKNOWNS
 
-MOST_BY_VALUES = 0.8
-"""Share up to which mismatch that some believed value would explain counts as left over: its kind is known."""
 UNCLAIMED = 3.0
 """Energy relative to the noise's from which what only free values explain counts by itself, without any claim."""
 LEAST_NOISE = 0.1
@@ -30,8 +28,6 @@ class ChannelLeftover:
     count: int
     noise: float
     """What is left when everything that could be explained is taken away."""
-    explainable: float
-    """What the believed vehicle leaves beyond that."""
     empirical: float
     """Of the empirical terms that won against the catalogue."""
     diffuse: float
@@ -64,9 +60,8 @@ class ChannelLeftover:
 
 @dataclass(frozen=True)
 class Leftover:
-    """What stays unexplained: a share of the mismatch, 0 to 1, channels, inputs and a description."""
+    """What stays unexplained: channels, inputs and a description."""
 
-    share: float = 0.0
     channels: tuple[str, ...] = ()
     depends_on: tuple[str, ...] = ()
     description: str = ""
@@ -88,19 +83,14 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     channels = channels_of(
         prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else UNCLAIMED
     )
-    total = sum(c.explainable / c.noise for c in channels)
     left = [c for c in channels if c.counts]
-    if not left or total <= 0:
+    if not left:
         return Leftover()
     unknown = [UNKNOWNS[e] for e in (model.search.terms[k].effect for k in model.selection.active) if e in UNKNOWNS]
     on = [v for e in unknown for v in DEPENDS_ON[e.id]] + ([] if unknown else list(depends))
     on += ["time_s"] if slow else []
     on += ["run"] if any(c.between for c in left) else []
-    share = sum(c.unexplained / c.noise for c in left) / total
-    by_values = sum(c.by_values / c.noise for c in left) / total
-    share = max(share, min(share + by_values, MOST_BY_VALUES))
     return Leftover(
-        float(min(1.0, share)),
         tuple(c.name for c in left),
         tuple(dict.fromkeys(on)),
         description(left, [e.sentence for e in unknown], slow, list(depends)),
@@ -135,7 +125,6 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
         beta = np.linalg.solve(weights, cross)
         count = sum(len(left[i]) for i in judged)
         energy = _energy(left[i] for i in judged)
-        start = _energy(model.rows[i].y[:, c] for i in judged)
         outside = _energy(empirical[i] for i in judged)
         flexible = min(_energy(left[i] - features[i] @ beta for i in judged), energy)
         # A simulator without noise leaves nothing, and any share of nothing is large.
@@ -146,14 +135,13 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
         shifted = 0.0 if between is None else count * between.mean_square(runs, [len(x) for x in left])
         moving = count * slow[name][0] ** 2 if name in slow else 0.0
         delivered_energy = energy if delivered is None else _energy(delivered[i][:, c] for i in judged)
-        # What moves slowly, or between runs, is no noise: shares are of what the named effects could have explained.
+        # What moves slowly, or between runs, is no noise.
         noise = max(flexible - moving - shifted, LEAST_NOISE * flexible, 1e-300)
         out.append(
             ChannelLeftover(
                 name,
                 count,
                 noise,
-                explainable=max(start - noise, shifted),
                 empirical=outside if outside > SMALLEST_SHARE_OF_NOISE**2 * flexible else 0.0,
                 diffuse=energy - flexible if diffuse else 0.0,
                 slow=moving,

@@ -12,17 +12,14 @@ from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.effects.contract import Form
 from rotorid.effects.scale import rotor_radius_m
 from rotorid.effects.steady_wind import through_drag
-from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import coefficient_of, coefficients, relative_change
 from rotorid.mismatch.decision.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.model.prepare import Prepared, assemble_rows, form_terms
-from rotorid.mismatch.plant.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.plant.contributions import Contributions
-from rotorid.mismatch.plant.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.noise_band import NOISE_BAND, band_power
 from rotorid.mismatch.plant.regression import (
     AGREEMENT,
-    VALUE_LIMITS,
     Fit,
     Regression,
     autoregression,
@@ -176,7 +173,6 @@ def wrench_model(
     start: list[str] | None = None,
     segments: list[Segment] | None = None,
     noisy_segments: list[Segment] | None = None,
-    known_sizes: np.ndarray | None = None,
 ) -> WrenchModel:
     """Assemble, whiten, reduce and search."""
     segments = prepared.segments if segments is None else segments
@@ -188,7 +184,7 @@ def wrench_model(
         colours = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, beta = full_fit_residuals(rows, precision, colours)
-    model = searched(prepared, terms, rows, noisy, left, start, segments, known_sizes)
+    model = searched(prepared, terms, rows, noisy, left, start, segments)
     model = replace(model, floor=np.fmin(model.noise, whole_floor(model, beta, segments)))
     # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
     # thrust and a deaf gyroscope): such a channel would weigh as if it were exact, and pull at all values.
@@ -198,7 +194,7 @@ def wrench_model(
     if inflated.any():
         left = [np.where(inflated, own, full) for own, full in zip(remains, left, strict=True)]
         active = model.selection.active
-        again = searched(prepared, terms, rows, noisy, left, active, segments, known_sizes)
+        again = searched(prepared, terms, rows, noisy, left, active, segments)
         model = replace(again, floor=model.floor)
     return replace(model, segments=segments, noisy_segments=noisy_segments, effects=effects)
 
@@ -225,7 +221,6 @@ def searched(
     left: list[np.ndarray],
     start: list[str] | None,
     segments: list[Segment],
-    known_sizes: np.ndarray | None,
 ) -> WrenchModel:
     """The search with residuals `left` (n, 12) of every stretch taken for the noise."""
     present = np.flatnonzero(np.isfinite(rows[0].y).all(axis=0))
@@ -260,16 +255,9 @@ def searched(
         return seconds.sizes(cols, coefficients, 1.0 if short else 0.9)
 
     # Winds of single runs are always in the model: fits of the search leave their many columns out.
-    known = np.zeros(12) if known_sizes is None else known_sizes
-    ask = Questions(sizes_of, seconds.sizes, known)
+    ask = Questions(sizes_of, seconds.sizes)
     search = Search(regression.without_winds(), ask)
     selection = search.run(start)
-    if search.widened:
-        regression = regression.with_room(VALUE_LIMITS[1])
-    if (wide := search.values_alone(selection)) is not None:
-        regression = regression.with_room(VALUE_LIMITS[1])
-        search = Search(wide, ask)
-        selection = Selection([], search.regression.fit(search.always, jackknife=True))
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
 
 
@@ -368,11 +356,12 @@ def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full
 def speed_path(
     prepared: Prepared,
     known: list[tuple[Form, np.ndarray]] | None = None,
-    refused: Sequence[str] = (),
     trusted: bool = False,
 ) -> CommandChain | None:
-    """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
-    nothing can show it. Where only commands are recorded believed values are free with it unless `trusted`."""
+    """Search between command and rotor speed; None where no command is recorded, or nothing can show it.
+
+    Where only commands are recorded believed values are free with it unless `trusted`.
+    """
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
     if not segments or any(s.command is None for s in segments):
         return None
@@ -419,15 +408,8 @@ def speed_path(
 
         force_z = 2 if "force" in groups else None
         rate_hz = prepared.thinner.rate_hz
-        noisy = [s for s in prepared.noisy_segments if s.run in prepared.split.training]
-        late_s = (
-            closed_loop_bias_s(segments, noisy, vehicle, prepared.thinner.cutoff_hz)
-            if noisy and "moment" in groups
-            else 0.0
-        )
-        late_s = late_s if rules.CLOSED_LOOP_BIAS(late_s > 0.0) else 0.0
-        problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
-    forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
+        problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z)
+    forms = candidate_forms(segments, full_voltage is not None)
     return CommandChain(SpeedSearch(problem, forms).run(), full_speed, full_voltage)
 
 

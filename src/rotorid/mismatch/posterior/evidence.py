@@ -53,8 +53,6 @@ class EvidenceTerm:
     """Symbols of the parameters that the columns depend on nonlinearly."""
     must_show: tuple[int, ...] = ()
     """Places in `linear` of parameters without which the form is another effect."""
-    compound: bool = False
-    """Whether the form could be two effects."""
     resolution: float = 1.0
     """How many times the size that matters elsewhere its contribution must have."""
     of_change: bool = False
@@ -124,7 +122,6 @@ def term_of(term: Term) -> EvidenceTerm:
         ),
         nonlinear=tuple(parameters[i].symbol for i in term.form.nonlinear),
         must_show=tuple(linear.index(i) for i in term.form.must_show if i in linear),
-        compound=term.form.compound,
         resolution=float(term.form.resolution),
         of_reading=tuple((linear.index(p), linear.index(s)) for p, s in term.form.of_reading),
     )

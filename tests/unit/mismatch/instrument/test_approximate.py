@@ -11,9 +11,9 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import forms_of, rotation_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.approximate import hats, later, without_leftovers_of_forms
+from rotorid.mismatch.instrument.approximate import hats, later
 from rotorid.mismatch.instrument.columns import OFFSET, make_terms
-from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model, reading_model
+from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model
 from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
 from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.voltmeter import is_noise
@@ -203,7 +203,7 @@ def test_what_is_left_of_a_form_is_not_sold_as_another_effect() -> None:
 
 
 def test_an_effect_of_its_own_stays_beside_a_strong_one() -> None:
-    """A tare and a leaning thrust beside a thrust curve: all are needed whatever the form of the curve."""
+    """A tare and a leaning thrust beside a thrust curve: all are needed."""
 
     def change(speed, wrench, t):
         wrench[:, 2] -= 0.0008 * speed[:, 0]
@@ -212,16 +212,18 @@ def test_an_effect_of_its_own_stays_beside_a_strong_one() -> None:
 
     setup = set_up(stand_set(change, rotors=1))
     model = fitted_model(setup, make_terms(setup)[0])
-    before = {model.search.terms[k].effect for k in model.selection.active}
-    model, leftovers = without_leftovers_of_forms(model)
-    assert leftovers == ()
-    assert len(before) == 3 and {"thrust_curve", "tare_offset"} < before
-    assert before == {model.search.terms[k].effect for k in model.selection.active}
+    found = {model.search.terms[k].effect for k in model.selection.active}
+    assert len(found) == 3 and {"thrust_curve", "tare_offset"} < found
 
 
 def test_hats_add_up_to_one() -> None:
     np.testing.assert_allclose(hats(np.array([0.0, 1 / 6, 0.5, 1.0])).sum(axis=1), 1.0)
     np.testing.assert_allclose(hats(np.array([1 / 6]))[0], [0.5, 0.5, 0, 0])
+
+
+def test_rows_later_hold_the_first() -> None:
+    assert later(np.array([1.0, 2.0, 3.0, 4.0]), 2).tolist() == [1.0, 1.0, 1.0, 2.0]
+    assert later(np.array([1.0, 2.0]), 8).tolist() == [1.0, 1.0]
 
 
 def test_noise_of_a_voltmeter_is_told_from_a_supply_in_steps() -> None:
@@ -243,27 +245,6 @@ def test_the_voltage_of_a_stand_is_what_can_be_expected_of_it() -> None:
     assert found.voltage_read is read
     (same,) = without_voltmeter_noise([replace(with_volts, command=None)])
     assert same.motion.voltage is read
-
-
-def test_a_model_says_which_effect_only_made_up_for_another() -> None:
-    """Without the power of the speed among the forms, two others share a power law: one of them is taken out."""
-
-    def change(speed, wrench, t):
-        wrench[:, 2] = -C_F * 900.0**2 * (speed[:, 0] / 900.0) ** 1.85
-        return wrench
-
-    setup = set_up(stand_set(change, rotors=1, noise=(0.005, 0.0005)))
-    terms = [t for t in make_terms(setup)[0] if t.form is None or t.form.name != "power of the speed"]
-    model, leftovers = without_leftovers_of_forms(reading_model(setup, terms))
-    curves = {"thrust_curve", "load_nonlinearity"}
-    kept = {model.search.terms[k].effect for k in model.selection.active}
-    assert len(kept & curves) == 1
-    assert all(c.effect in model.selection.not_established and c.either for c in leftovers if c.effect in curves)
-
-
-def test_rows_later_hold_the_first() -> None:
-    assert later(np.array([1.0, 2.0, 3.0, 4.0]), 2).tolist() == [1.0, 1.0, 1.0, 2.0]
-    assert later(np.array([1.0, 2.0]), 8).tolist() == [1.0, 1.0]
 
 
 def test_a_cube_beside_its_own_square_by_hand() -> None:

@@ -62,7 +62,7 @@ def test_the_curve_of_the_throttle_is_found_from_steady_points() -> None:
 def test_a_curve_found_at_one_supply_is_not_held_to_carry_over_to_another() -> None:
     runs = [steady_run("a", 16.0, 1), steady_run("b", 16.0, 2), steady_run("c", 11.0, 3)]
     analysis = analyse_instrument(one_rotor(runs, ["c"]))
-    assert analysis.unexplained_share > 0.15 and "rotor_speed_1" in analysis.unexplained_channels
+    assert "rotor_speed_1" in analysis.unexplained_channels
     assert "battery_voltage_v" in analysis.unexplained_depends_on
 
 

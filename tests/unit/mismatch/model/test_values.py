@@ -102,21 +102,6 @@ def test_the_coefficient_of_a_mass_is_its_share_of_the_true_one():
     assert relative_change("thrust", 0.1, 0.009) == (0.1, 0.009)
 
 
-def test_a_value_that_one_run_alone_needs_is_not_called_wrong():
-    """A torque coefficient 25 % off in one of three fitted runs and right in the others is not the vehicle's."""
-    rng = np.random.default_rng(3)
-    rows = []
-    for name, off in (("a", 0.25), ("b", 0.0), ("c", 0.0)):
-        x = columns(4000, rng)
-        y = np.full((4000, 12), np.nan)
-        for channel in (2, 5):
-            y[:, channel] = x[:, channel] @ np.array([0.0, off, 0.0, 0.0]) + coloured(4000, NOISE, rng, pole=0.0)
-        rows.append(Rows(name, np.arange(4000) / RATE_HZ, y, x))
-    terms = [Term(key, "value", prior_sd=(sd,)) for key, sd in TRUST.items()]
-    made = build(rows, terms, {c: np.array([1.0 / NOISE]) for c in (2, 5)}, lambda run, t: True, 1.0, RATE_HZ)
-    assert wrong_values(made, Selection([], made.fit(list(TRUST))), lambda key, change: 1.0) == {}
-
-
 def test_a_value_that_a_member_of_an_open_class_would_change_is_suggested_with_the_reason():
     """A vehicle heavier than believed, or one that is right and carries a payload."""
     mass, arms = (0.65, 0.8, 0.78, 0.82), (1.0, 0.9, 0.88, 0.92)

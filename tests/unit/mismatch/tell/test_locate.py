@@ -46,7 +46,7 @@ def test_drag_is_located_in_the_dash_and_its_regime_is_airspeed():
 
 def test_a_run_that_differs_from_the_others_is_located_as_a_whole():
     """Run b is off by 3 of its noise throughout; reported only where the analysis says that runs differ."""
-    made = analysis(unexplained_depends_on=("run",), unexplained_share=1.0)
+    made = analysis(unexplained_depends_on=("run",))
     traces = tuple(
         replace(t, after=t.after + 3 * made.noise_floor[t.channel]) if (t.run, t.channel) == ("b", "moment_y") else t
         for t in made.traces

@@ -42,9 +42,8 @@ OTHERS = [
 
 
 @pytest.mark.parametrize("findings", [(), (drag_finding(),), (CLASS,), (drag_finding(), *OTHERS), (CLASS, *OTHERS)])
-@pytest.mark.parametrize("share", [0.0, 0.4, 0.95])
-def test_the_page_opens_with_the_sentence_of_the_verdict(findings, share):
-    made = analysis(findings=findings, dash=bool(findings), unexplained_share=share)
+def test_the_page_opens_with_the_sentence_of_the_verdict(findings):
+    made = analysis(findings=findings, dash=bool(findings))
     verdict = verdict_of(made)
     assert f"<h1>{pretty(verdict.sentence)}</h1>" in make_page(made, verdict)
     assert 4 <= len(verdict.sentence.split()) <= MOST_WORDS
