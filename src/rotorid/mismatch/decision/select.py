@@ -18,8 +18,8 @@ from rotorid.mismatch.plant.regression import (
     Regression,
     Solution,
     hotelling,
+    making_room,
     quadratic_form,
-    with_room,
 )
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
@@ -157,7 +157,7 @@ class Search:
         """A term added to (or, if in `active`, kept in) the model; remembered."""
         asked = key, self.regression.set_of([*active, key]), jackknife
         if asked not in self._judged:
-            with_room(self._judged, MOST_JUDGED)[asked] = self._judge(key, active, jackknife)
+            making_room(self._judged, MOST_JUDGED)[asked] = self._judge(key, active, jackknife)
         return self._judged[asked]
 
     def _judge(self, key: str, active: list[str], jackknife: bool) -> Candidate:
@@ -207,7 +207,7 @@ class Search:
             fit, sizes = self.regression.solution(self.always + active), [self.ask.known_sizes]
             for key in active:
                 sizes.append(self.ask.sizes_of(key, fit.beta[fit.places(self.regression.columns([key]))]))
-            with_room(self._largest, MOST_JUDGED)[asked] = np.max(sizes, axis=0)
+            making_room(self._largest, MOST_JUDGED)[asked] = np.max(sizes, axis=0)
         return self._largest[asked]
 
     def without(self, key: str, active: list[str]) -> Solution:
@@ -313,7 +313,7 @@ class Search:
         """Why a term of the model does not hold given the others (None where it does), and its score; remembered."""
         asked = key, self.regression.set_of(active)
         if asked not in self._failing:
-            with_room(self._failing, MOST_JUDGED)[asked] = self._fails(key, active)
+            making_room(self._failing, MOST_JUDGED)[asked] = self._fails(key, active)
         return self._failing[asked]
 
     def _fails(self, key: str, active: list[str]) -> tuple[str | None, float]:

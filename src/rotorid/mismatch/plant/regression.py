@@ -36,6 +36,8 @@ MOST_ATTENUATION = 0.3
 DOUBT_OF_CORRECTION = 0.5
 MOST_REMEMBERED = 2000
 """Fits that a regression remembers."""
+MOST_LEFT_OUT = 200
+"""Models of which a regression remembers the fits without each fold."""
 MOST_EXPLAINED = 100_000
 """Models of which a regression remembers what they explain."""
 MOST_DISTRUST = 3.0
@@ -361,7 +363,7 @@ class Regression:
             return self._fit(keys, mask, jackknife, loose)
         asked = keys, jackknife, tuple(sorted((loose or {}).items()))
         if asked not in self._fits:
-            with_room(self._fits, MOST_REMEMBERED)[asked] = self._fit(keys, self.training, jackknife, loose)
+            making_room(self._fits, MOST_REMEMBERED)[asked] = self._fit(keys, self.training, jackknife, loose)
         return self._fits[asked]
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
@@ -432,7 +434,7 @@ class Regression:
         """
         asked = self.set_of(keys)
         if asked not in self._explained:
-            with_room(self._explained, MOST_EXPLAINED)[asked] = self._solved(asked).gain
+            making_room(self._explained, MOST_EXPLAINED)[asked] = self._solved(asked).gain
         return self._explained[asked]
 
     def explained_with(self, keys: Sequence[str], further: Sequence[str]) -> list[float]:
@@ -440,7 +442,7 @@ class Regression:
         base = self.set_of(keys)
         sets = [base | self._number[key] for key in further]
         new = [i for i, asked in enumerate(sets) if asked not in self._explained]
-        known = with_room(self._explained, MOST_EXPLAINED)
+        known = making_room(self._explained, MOST_EXPLAINED)
         if len(new) > 1:
             known.update(self._all_explained(base, [(sets[i], self._where[further[i]]) for i in new]))
         return [known[s] if s in known else self.explained([*keys, k]) for s, k in zip(sets, further, strict=True)]
@@ -486,7 +488,7 @@ class Regression:
         """What `fit` finds on the training blocks without how well it is known; columns ascend."""
         asked = self.set_of(keys)
         if asked not in self._solutions:
-            with_room(self._solutions, MOST_REMEMBERED)[asked] = self._solved(asked)
+            making_room(self._solutions, MOST_REMEMBERED)[asked] = self._solved(asked)
         return self._solutions[asked]
 
     def _solved(self, asked: int) -> Solution:
@@ -527,7 +529,7 @@ class Regression:
         """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
-            with_room(self._left_out, MOST_REMEMBERED)[asked] = self._leave_out(*asked)
+            making_room(self._left_out, MOST_LEFT_OUT)[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
     def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -716,7 +718,7 @@ class Regression:
         return hotelling(quadratic_form(fit.beta[where], fit.covariance[np.ix_(where, where)]), len(where), count)
 
 
-def with_room(memory: dict, most: int) -> dict:
+def making_room(memory: dict, most: int) -> dict:
     """A memory for one more, emptied where it holds `most`."""
     if len(memory) >= most:
         memory.clear()

@@ -129,7 +129,7 @@ def test_a_rotor_may_be_as_heavy_as_stated_whatever_the_stand_s_inertia():
 def test_an_offset_in_time_must_be_three_standard_errors_from_none():
     """Of two offsets, 4 and 2.4 of their errors, the surer one is delivered."""
     keys = ["offset:surely", "offset:hardly"]
-    fit = Fit(np.array([0, 1]), np.array([0.004, -0.0043]), np.diag([0.001**2, 0.0018**2]), np.zeros(1), 0.0)
+    fit = Fit(np.array([0, 1]), np.array([0.004, -0.0043]), 0.0, np.diag([0.001**2, 0.0018**2]), np.zeros(1))
     regression = SimpleNamespace(
         keys_of=lambda *kinds: keys if kinds == ("nuisance",) else [],
         columns=lambda asked: np.array([keys.index(k) for k in asked]),

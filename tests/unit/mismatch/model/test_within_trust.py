@@ -33,7 +33,7 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
         def fit(self, keys):
             columns = self.columns(keys).astype(int)
             beta = np.array([thrust if c == 0 else 0.0 for c in columns])
-            return Fit(columns, beta, 1e-8 * np.eye(len(columns)), np.zeros(1), 0.0)
+            return Fit(columns, beta, 0.0, 1e-8 * np.eye(len(columns)), np.zeros(1))
 
     made = Regression()
     made.terms = terms
