@@ -204,10 +204,10 @@ class Search:
         """Largest size of what is in a model per channel, (12,); remembered."""
         asked = self.regression.set_of(active)
         if asked not in self._largest:
-            fit, sizes = self.regression.solution(self.always + active), [self.ask.known_sizes]
+            fit, sizes = self.regression.solution(self.always + active), [np.zeros(1)]
             for key in active:
                 sizes.append(self.ask.sizes_of(key, fit.beta[fit.places(self.regression.columns([key]))]))
-            making_room(self._largest, MOST_JUDGED)[asked] = np.max(sizes, axis=0)
+            making_room(self._largest, MOST_JUDGED)[asked] = np.max(np.broadcast_arrays(*sizes), axis=0)
         return self._largest[asked]
 
     def without(self, key: str, active: list[str]) -> Solution:
