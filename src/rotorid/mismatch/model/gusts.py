@@ -27,8 +27,8 @@ from rotorid.mismatch.model.wrench import (
     with_linear,
     wrench_model,
 )
+from rotorid.mismatch.plant.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.plant.motion import Segment
-from rotorid.mismatch.plant.noise_band import NOISE_BAND, band_power
 from rotorid.mismatch.plant.regression import Fit, Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import training_rule

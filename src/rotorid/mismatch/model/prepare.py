@@ -13,8 +13,10 @@ from scipy.signal import welch
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion, not_testable_reason
+from rotorid.mismatch.decision import rules
 from rotorid.mismatch.model.made import Memory
 from rotorid.mismatch.plant.estimated_velocity import made_from_accelerometer
+from rotorid.mismatch.plant.excess_noise import noise_factors
 from rotorid.mismatch.plant.motion import (
     HIGHEST_CUTOFF_HZ,
     Segment,
@@ -245,6 +247,13 @@ def prepare(
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 0), full)
     thinner = Thinner(rate_hz, cutoff)
+    if len(noisy) == len(segments) and rules.COLOURED_NOISE(
+        bool(factors := noise_factors(segments, noisy, vehicle, thinner))
+    ):
+        noise = {k: v * factors.get(k, 1.0) for k, v in noise.items()}
+        noisy = []
+        for run in recordings.runs:
+            noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 1), full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     segments = representative(without_noise(segments))
     if made_from_accelerometer(segments, cutoff):

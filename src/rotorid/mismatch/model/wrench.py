@@ -12,12 +12,14 @@ from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.effects.contract import Form
 from rotorid.effects.scale import rotor_radius_m
 from rotorid.effects.steady_wind import through_drag
+from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import coefficient_of, coefficients, relative_change
 from rotorid.mismatch.decision.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.model.prepare import Prepared, assemble_rows, form_terms
+from rotorid.mismatch.plant.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.plant.contributions import Contributions
+from rotorid.mismatch.plant.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.plant.motion import Segment
-from rotorid.mismatch.plant.noise_band import NOISE_BAND, band_power
 from rotorid.mismatch.plant.regression import (
     AGREEMENT,
     Fit,
@@ -408,7 +410,14 @@ def speed_path(
 
         force_z = 2 if "force" in groups else None
         rate_hz = prepared.thinner.rate_hz
-        problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z)
+        noisy = [s for s in prepared.noisy_segments if s.run in prepared.split.training]
+        late_s = (
+            closed_loop_bias_s(segments, noisy, vehicle, prepared.thinner.cutoff_hz)
+            if noisy and "moment" in groups
+            else 0.0
+        )
+        late_s = late_s if rules.CLOSED_LOOP_BIAS(late_s > 0.0) else 0.0
+        problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
     forms = candidate_forms(segments, full_voltage is not None)
     return CommandChain(SpeedSearch(problem, forms).run(), full_speed, full_voltage)
 

@@ -261,9 +261,12 @@ class WrenchOnly(SpeedProblem):
         residual_of: Callable,
         precision: np.ndarray,
         force_z: int | None = None,
+        closed_loop_bias_s: float = 0.0,
     ):
-        """`force_z` is the channel of the force along the rotors' axis, if there is one."""
+        """`force_z` is the channel of the force along the rotors' axis, if there is one; `closed_loop_bias_s` is by how
+        much the commands may look late through the gyroscope's noise alone."""
         super().__init__(segments, full_speed, full_voltage)
+        self.shift_prior_s = float(np.hypot(self.shift_prior_s, closed_loop_bias_s))
         self.force_z = force_z
         self.rate_hz, self.residual_of, self.precision = rate_hz, residual_of, precision
         self._known: tuple[np.ndarray, np.ndarray] | None = None
