@@ -1,9 +1,9 @@
 """Whether what an effect explains is enough to state it, and what the held-out runs say of it.
 
 A selected effect stays established if what it contributes to the fitted runs is more than what the model leaves over,
-and if it takes a share of the error or gains much in some channel. Else it is too small to matter: not established, or
-suggested where it is not known to be at work. The held-out runs change no status: from them come the gain that is
-reported and the shares.
+if it takes a share of the error or gains much in some channel, and if its main parameter is away from nothing. Else it
+is too small to matter: not established, or suggested where it is not known to be at work. The held-out runs change no
+status: from them come the gain that is reported and the shares.
 """
 
 from __future__ import annotations
@@ -125,6 +125,8 @@ def judged(
     reason = ""
     if rules.BELOW_LEFTOVER(not found.beyond_leftover):
         reason = "it is smaller than what the model leaves over"
+    elif rules.MAY_BE_NOTHING(not away_from_nothing(finding)):
+        reason = "every number of it may be nothing"
     elif rules.SLIGHT(bool(share < LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
     best = reported.ratios[0] if reported.ratios else None
@@ -217,3 +219,10 @@ def block_energies(trace: Trace, added: np.ndarray, mask: np.ndarray, block_s: f
     for rows in np.array_split(index, max(1, len(index) // max(1, int(round(block_s / period_s))))):
         after, own = trace.after[rows], added[rows]
         yield float(after @ after), float((after + own) @ (after + own)), float(own @ own)
+
+
+def away_from_nothing(finding: Finding) -> bool:
+    """Whether the interval of some number of a finding does not hold the value at which it does nothing."""
+    if not finding.parameters:
+        return True
+    return any(not p.low <= 0.0 <= p.high for p in finding.parameters)

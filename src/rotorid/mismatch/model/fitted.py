@@ -12,9 +12,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rotorid.effects.contract import Form
+from rotorid.effects.catalogue import ids_of_stage
+from rotorid.effects.contract import CURVE, Form
+from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import coefficients
+from rotorid.mismatch.decision.findings import Reason
 from rotorid.mismatch.decision.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.model.delivered import Values
 from rotorid.mismatch.model.gains import wrong_values_of
@@ -44,7 +47,7 @@ from rotorid.mismatch.model.wrench import (
     wrench_model,
 )
 from rotorid.mismatch.plant.rows import RUN_SCALE, Term
-from rotorid.mismatch.plant.speedpath import CommandChain
+from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult
 from rotorid.recordings.signal.kernels import causal
 
 RUN_P = 1e-6
@@ -113,12 +116,30 @@ def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, W
         model = refined_model(prepared, *turning(prepared, chain))
         if trusted or not (trusted := strains(model)):
             break
+    if rules.MERE_SCALE(only_scales(chain.result)):
+        curves = ids_of_stage(CURVE)
+        chain = speed_path(prepared, chosen(model), tuple(curves), trusted=trusted)
+        reason = Reason("mere_scale", "another thrust coefficient explains as much")
+        dropped = {**chain.result.dropped, **dict.fromkeys(curves, reason)}
+        chain = chain._replace(result=replace(chain.result, dropped=dropped))
+        model = refined_model(prepared, *turning(prepared, chain))
     return chain, model
 
 
 def strains(model: WrenchModel) -> bool:
     """Whether the recordings ask a value that is not called wrong to move beyond its trust."""
     return beyond_trust(model, wrong_values_of(model).values, model.selection.active)
+
+
+def only_scales(result: SpeedResult) -> bool:
+    """Whether a throttle curve between command and speed is nothing but another slope, as far as it is known."""
+    key, form = next(((k, f) for k, f in result.fit.chain if f.stage == CURVE), (None, None))
+    if form is None or SLOPE not in [p.symbol for p in form.parameters]:
+        return False
+    where = result.fit.slice_of(key)
+    sd = np.sqrt(np.diag(result.fit.covariance)[where])
+    away = np.abs(result.fit.values[where] - np.array(form.neutral)) > 1.96 * sd
+    return not any(away[i] for i, p in enumerate(form.parameters) if p.symbol != SLOPE)
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:

@@ -358,12 +358,11 @@ def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full
 def speed_path(
     prepared: Prepared,
     known: list[tuple[Form, np.ndarray]] | None = None,
+    refused: Sequence[str] = (),
     trusted: bool = False,
 ) -> CommandChain | None:
-    """Search between command and rotor speed; None where no command is recorded, or nothing can show it.
-
-    Where only commands are recorded believed values are free with it unless `trusted`.
-    """
+    """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
+    nothing can show it. Where only commands are recorded believed values are free with it unless `trusted`."""
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
     if not segments or any(s.command is None for s in segments):
         return None
@@ -418,7 +417,7 @@ def speed_path(
         )
         late_s = late_s if rules.CLOSED_LOOP_BIAS(late_s > 0.0) else 0.0
         problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
-    forms = candidate_forms(segments, full_voltage is not None)
+    forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
     return CommandChain(SpeedSearch(problem, forms).run(), full_speed, full_voltage)
 
 
