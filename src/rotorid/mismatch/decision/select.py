@@ -153,17 +153,17 @@ class Search:
         limits = [term.form.parameters[i].negligible for i in term.form.linear]
         return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
 
-    def judge(self, key: str, active: list[str], jackknife: bool = False) -> Candidate:
+    def judge(self, key: str, active: list[str]) -> Candidate:
         """A term added to (or, if in `active`, kept in) the model; remembered."""
-        asked = key, self.regression.set_of([*active, key]), jackknife
+        asked = key, self.regression.set_of([*active, key])
         if asked not in self._judged:
-            making_room(self._judged, MOST_JUDGED)[asked] = self._judge(key, active, jackknife)
+            making_room(self._judged, MOST_JUDGED)[asked] = self._judge(key, active)
         return self._judged[asked]
 
-    def _judge(self, key: str, active: list[str], jackknife: bool) -> Candidate:
+    def _judge(self, key: str, active: list[str]) -> Candidate:
         base = self.without(key, active)
         keys = self.always + sorted({*active, key}, key=self._place)
-        fit = self.regression.fit(keys, jackknife=jackknife)
+        fit = self.regression.fit(keys)
         where = fit.places(self.regression.columns([key]))
         beta, covariance = fit.beta[where], fit.covariance[np.ix_(where, where)]
         statistic = quadratic_form(beta, covariance)
