@@ -162,8 +162,8 @@ class Multibody:
     """A vehicle that MuJoCo flies, with its loggers."""
 
     seed: int
-    quad: object
-    grade: object
+    quad: vehicle.Quad
+    grade: logger.Grade
 
     def draft_of(self, families: dict[int, str]) -> tuple[multibody.Draft, dict[str, float]]:
         """The vehicle with some families of changes, by the number that each is drawn with; factors of its values."""

@@ -67,14 +67,14 @@ class Joint:
     """The second set, corrected for its mistakes."""
     recorded: tuple[Segment, ...]
     """Its stretches of flight as recorded."""
-    segments_of_new: tuple[Segment, ...]
-    """The same with the rotors turning."""
     rows_of_new: tuple[Rows, ...]
     mistakes_of_new: tuple[Finding, ...]
     """Mistakes in the recordings of the second set, corrected."""
     squares: dict[str, np.ndarray]
     """To the key of each effect and believed value what its columns amount to in the second set
     (`absent.squares_of`)."""
+    segments_of_new: tuple[Segment, ...] = ()
+    """Its stretches of flight with the rotors turning; none of an instrument."""
     own_effects: Effects = ()
     """Forms at work in the second set alone, for the accelerations in its columns."""
     more_usual: np.ndarray | float = 0.0

@@ -180,7 +180,6 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
         flown_by_new=how_large(setup.loadings, channels),
         recordings=new,
         recorded=(),
-        segments_of_new=(),
         rows_of_new=second.rows,
         mistakes_of_new=(*mistakes, *steps_of(setup, model)),
         squares=mean_squares(second.rows, second.regression, compared, scales(setup.instrument.largest)),

@@ -201,13 +201,13 @@ class Search:
         return float(own.max()) / (limits["times_for_burst"] if burst else 1.0)
 
     def largest(self, active: list[str]) -> np.ndarray:
-        """Largest size of what is in a model per channel, (12,); remembered."""
+        """Largest size of what is in a model per channel, (12,), or (1,) where it holds nothing; remembered."""
         asked = self.regression.set_of(active)
         if asked not in self._largest:
-            fit, sizes = self.regression.solution(self.always + active), [np.zeros(1)]
-            for key in active:
-                sizes.append(self.ask.sizes_of(key, fit.beta[fit.places(self.regression.columns([key]))]))
-            making_room(self._largest, MOST_JUDGED)[asked] = np.max(np.broadcast_arrays(*sizes), axis=0)
+            fit = self.regression.solution(self.always + active)
+            beta = {key: fit.beta[fit.places(self.regression.columns([key]))] for key in active}
+            sizes = [self.ask.sizes_of(key, own) for key, own in beta.items()]
+            making_room(self._largest, MOST_JUDGED)[asked] = np.max(sizes or [np.zeros(1)], axis=0)
         return self._largest[asked]
 
     def without(self, key: str, active: list[str]) -> Solution:

@@ -247,8 +247,8 @@ def fit(
 
     def explained_by(lags: np.ndarray) -> np.ndarray:
         late = np.repeat((base * delay(frequency, lags))[:, :, None], blocks.x.shape[2], axis=2)
-        beside = np.ones((*late.shape[:2], blocks.z.shape[2]))
-        return explained_at(products, weight, np.concatenate([late, beside], axis=2))
+        not_late = np.ones((*late.shape[:2], blocks.z.shape[2]))
+        return explained_at(products, weight, np.concatenate([late, not_late], axis=2))
 
     for _ in range(2):
         lag = _peak(lags_s, explained_by(lags_s))

@@ -388,7 +388,7 @@ def columns_of(
     grow together would leave a copy of the effects for themselves, and loose trust in values would swallow physics.
     """
     vehicle, groups, made = prepared.vehicle, prepared.groups, prepared.memory.made
-    flown, beside = segment, (vehicle, groups, segment.independent_velocity)
+    flown, same = segment, (vehicle, groups, segment.independent_velocity)
     if segment.motion.rotor_speed is not None:
         segment = with_predictions(flown, prepared, effects)
 
@@ -415,10 +415,10 @@ def columns_of(
         elif term.kind == "state":
             yield thinned([state_column(term, segment, vehicle, groups)])
         elif term.kind == "effect":
-            given = (*beside, term.form, term.values)
+            given = (*same, term.form, term.values)
             yield made((term.key,), given, segment.motion, partial(of_effect, term))
         elif term.kind == "value":
-            yield made((term.key,), (*beside, measured_moment), flown.motion, partial(of_value, term))
+            yield made((term.key,), (*same, measured_moment), flown.motion, partial(of_value, term))
         else:
             yield thinned([offset_columns(term.key, segment, vehicle, groups)])
 

@@ -1,4 +1,4 @@
-"""What each of many further terms would explain beside the same others: one solution of those, all terms at once.
+"""What each of many further terms would explain given the same others: one solution of those, all terms at once.
 
 A further term borders the normal equations of the others by its few columns (Schur's complement), so what it explains
 follows from the inverse of theirs. It is what `Regression.explained` says of the two together, to rounding.

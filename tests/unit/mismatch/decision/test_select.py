@@ -195,7 +195,7 @@ def test_a_value_far_beyond_its_trust_is_not_taken_up_by_an_effect_that_looks_li
     assert found.not_established["unequal_rotors"].rule == "free_values"
 
 
-def test_an_effect_that_is_there_stays_beside_a_value_that_is_off():
+def test_an_effect_that_is_there_stays_next_to_a_value_that_is_off():
     for change in (0.2, 0.02):  # held at its limit, and not
         assert imitated_value(change, 0.2).run().active == ["unequal_rotors/form"]
 

@@ -203,7 +203,7 @@ def test_what_is_left_of_a_form_is_not_sold_as_another_effect() -> None:
 
 
 def test_an_effect_of_its_own_stays_beside_a_strong_one() -> None:
-    """A tare and a leaning thrust beside a thrust curve: all are needed."""
+    """A tare and a leaning thrust next to a thrust curve: all are needed."""
 
     def change(speed, wrench, t):
         wrench[:, 2] -= 0.0008 * speed[:, 0]
