@@ -20,7 +20,15 @@ from rotorid.mismatch.changes.chain import (
     squares_of_speeds,
 )
 from rotorid.mismatch.changes.hanging import carrying
-from rotorid.mismatch.changes.joint import Joint, Reference, evidence_at, joined_at, joints_of, reference_of
+from rotorid.mismatch.changes.joint import (
+    Joint,
+    Reference,
+    evidence_at,
+    joined_at,
+    joints_of,
+    recorded_stretches,
+    reference_of,
+)
 from rotorid.mismatch.changes.notes import command_notes, notes_of
 from rotorid.mismatch.changes.of_instruments import (
     InstrumentReference,
@@ -109,7 +117,7 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
         )
     if isinstance(reference, Reference):
         joint, options = most_alike(reference, new, prior)
-        stretches = reference.recorded, joint.recorded
+        stretches = reference.recorded, stretches_of_commands(reference, new, joint)
         found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
         stated, notes = changes_in(options, prior), command_notes(*stretches, base.name, new.name)
     else:
@@ -185,6 +193,27 @@ def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarra
         return joint.decide(flights, other, usual, prior)
 
     return np.hypot(usual, spread_of_flights(runs, decide))
+
+
+def stretches_of_commands(reference: Reference, new: RecordingSet, joint: Joint) -> Sequence[Segment]:
+    """Stretches of the second set from which its chain is told: corrected, or as recorded.
+
+    Where the clock of the rotor speeds was late and is corrected, commands that it stamped, too, would seem early.
+    """
+    if not joint.mistakes_of_new or reference.chain is None or reference.found.commanded:
+        return joint.recorded
+    as_it_is = recorded_stretches(reference.found, replace(new, held_out=()))
+    return most_like(reference.found, reference.chain, (joint.recorded, as_it_is))
+
+
+def most_like(found: Fitted, chain: ChainTerms, variants: Sequence[Sequence[Segment]]) -> Sequence[Segment]:
+    """The variant of some stretches in which rotor speeds follow commands most as a chain has it."""
+    known = [own for own in variants if own and all(s.command is not None for s in own)]
+
+    def left(own: Sequence[Segment]) -> float:
+        return float(np.mean(np.concatenate([r.y.ravel() for r in speed_rows(own, found, chain, chain)]) ** 2))
+
+    return min(known, key=left, default=variants[0])
 
 
 def decided_of_speeds(

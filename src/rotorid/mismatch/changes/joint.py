@@ -274,7 +274,9 @@ def rows_of(
     model = found.model
     turned = found if chain is None else turning(found, chain)
     segments = as_flown(list(recorded), turned)
-    rows = assemble_rows(model.prepared, list(terms), segments, [*(model.effects or []), *own_effects])
+    # What lasts of the residual moment is what lasts of the rotors' own. Free coefficients of a column with that part
+    # (arm) and of one without (inertia) would together explain it, whatever it is of.
+    rows = assemble_rows(model.prepared, list(terms), segments, [*(model.effects or []), *own_effects], lasting=True)
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
     rows = as_seen(against_own(rows, model, segments, vehicle), model, [t.key for t in terms])
     if columns is not None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.changes.chain import chain_terms
-from rotorid.mismatch.changes.compare import changes_in, decided_of_speeds, mistakes_that_differ
+from rotorid.mismatch.changes.compare import changes_in, decided_of_speeds, mistakes_that_differ, most_like
 from rotorid.mismatch.changes.notes import command_notes
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.plant.speedpath import CommandChain
@@ -53,6 +53,22 @@ def test_a_battery_that_sags_is_named():
     changed = compared(**GOOD, battery_sag=("power of voltage", (0.9,)))
     assert changed.keys() == {"battery_sag"}
     assert changed["battery_sag"].parameters[0].value == pytest.approx(0.9, abs=0.1)
+
+
+@pytest.mark.parametrize("late_steps", [0, 4])
+def test_commands_that_the_late_clock_stamped_too_are_not_taken_for_early(late_steps):
+    """Of speeds moved to the other sensors' time and as recorded, those that follow commands as before."""
+    first = [recorded(k, voltage=VOLTAGE, **GOOD) for k in (1, 2)]
+    found = SimpleNamespace(chain=CommandChain(searched(*first), FULL, float(VOLTAGE.max())), commanded=False)
+    good = [recorded(3, voltage=VOLTAGE, **GOOD)]
+
+    def earlier(steps):
+        moved = np.roll(good[0].motion.rotor_speed, -steps, axis=0)
+        return [replace(good[0], motion=replace(good[0].motion, rotor_speed=moved))]
+
+    as_recorded, corrected = earlier(late_steps), earlier(late_steps - 4)
+    chosen = most_like(found, chain_terms(found, first), (corrected, as_recorded))
+    assert chosen is (corrected if late_steps else as_recorded)
 
 
 def test_a_set_without_commands_is_said_to_have_none():
