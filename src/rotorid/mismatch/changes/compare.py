@@ -44,6 +44,7 @@ from rotorid.mismatch.model.values import believed_value
 from rotorid.mismatch.plant.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.rows import CHANNELS, Rows
+from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.prior import Prior
@@ -202,7 +203,7 @@ def stretches_of_commands(reference: Reference, new: RecordingSet, joint: Joint)
     """
     if not joint.mistakes_of_new or reference.chain is None or reference.found.commanded:
         return joint.recorded
-    as_it_is = recorded_stretches(reference.found, replace(new, held_out=()))
+    as_it_is, _ = recorded_stretches(reference.found, replace(new, held_out=()))
     return most_like(reference.found, reference.chain, (joint.recorded, as_it_is))
 
 
@@ -245,7 +246,7 @@ def decided_of_speeds(
 def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]:
     """What is stated of the best option; a part of the chain in whose place another would do is one of a class."""
     out = []
-    for stated in statements_of(options[0].found, of_change=True):
+    for stated in statements_of(options[0].found, of_change=True, form_sd=FORM_SD):
         others = others_in_place(options, stated.id, prior)
         if others and stated.status in CLAIMED:
             members = tuple(sorted({stated.id, *stated.alternatives, *others}))
@@ -289,7 +290,7 @@ def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]
             continue
         at = scored(problem, tuple(sorted({*found.model, key})))
         if at.mode is not None:
-            out += in_percent(term.effect, parameters(problem, at, key), base, new)
+            out += in_percent(term.effect, parameters(problem, at, key, FORM_SD), base, new)
     return tuple(out)
 
 

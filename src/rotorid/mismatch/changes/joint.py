@@ -103,6 +103,8 @@ class Reference:
     """(K,) coefficients of the effects that its model holds, 0 of all others."""
     usual_of_chain: np.ndarray
     """(K,) one-sigma of the chain's parameters between flights in which nothing changed, 0 of all others."""
+    noise: np.ndarray
+    """(C, K, K) what the sensors' noise adds to the products in a block, in either set."""
     evidence: Evidence
     runs: tuple[Evidence, ...]
     """The same run by run."""
@@ -119,7 +121,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     model = found.model
     terms = [t for t in model.terms if not t.run]
     # As another set's stretches are made: what making them leaves out is left out of both.
-    recorded = recorded_stretches(found, base)
+    recorded, noisy = recorded_stretches(found, base)
     chain = chain_terms(found, recorded)
     segments, rows = rows_of(found, terms, chain, recorded)
     of_chain = chain.terms if found.commanded else []
@@ -128,7 +130,9 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     usual = np.zeros(len(known))
     if of_chain:
         usual[-len(chain.values) :] = chain.spread
-    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, known, block_s)
+    again = rows_of(found, terms, chain, noisy)[1] if noisy else []
+    noise = noise_of(found, rows, again, [*terms, *of_chain], block_s)
+    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, known, block_s, noise)
     return Reference(
         recordings=base,
         found=found,
@@ -139,6 +143,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
         block_s=block_s,
         known=known,
         usual_of_chain=usual,
+        noise=noise,
         evidence=evidence,
         runs=runs,
         recorded=tuple(recorded),
@@ -150,7 +155,8 @@ def on_terms(reference: Reference, terms: Sequence[Term]) -> Reference:
     """The first set with the nonlinear parameters of its columns at other values."""
     found, chain = reference.found, reference.chain
     _, rows = rows_of(found, terms, chain, reference.recorded)
-    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, reference.known, reference.block_s)
+    given = reference.known, reference.block_s, reference.noise
+    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, *given)
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
 
 
@@ -158,7 +164,8 @@ def evidence_at(reference: Reference, chain: ChainTerms) -> Evidence:
     """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
     found, first = reference.found, reference.chain
     _, rows = rows_of(found, reference.terms, chain, reference.recorded, first)
-    return evidence_of_rows(found, reference.terms, chain, first, rows, reference.known, reference.block_s)[0]
+    given = reference.known, reference.block_s, reference.noise
+    return evidence_of_rows(found, reference.terms, chain, first, rows, *given)[0]
 
 
 def evidence_of_rows(
@@ -169,13 +176,30 @@ def evidence_of_rows(
     rows: list[Rows],
     known: np.ndarray,
     block_s: float,
+    noise: np.ndarray,
 ) -> tuple[Evidence, tuple[Evidence, ...]]:
     """Evidence of the first set's rows, and the same run by run; parameters as of `rows_of` and Reference."""
     of_chain = chain.terms if found.commanded else []
     regression = regression_of(rows, [*terms, *of_chain], found.model, block_s)
-    evidence = with_known_effects(evidence_from(regression), known)
+    evidence = with_known_effects(noisy_evidence(regression, noise), known)
     evidence = chain.named(evidence, first) if of_chain else evidence
     return evidence, by_run(evidence, regression)
+
+
+def noise_of(found: Fitted, rows: list[Rows], noisy: list[Rows], terms: Sequence[Term], block_s: float) -> np.ndarray:
+    """What the sensors' noise adds to the products in a block, (C, K, K); `noisy` are the rows with it added once more.
+
+    None is added where the two are not of the same stretches.
+    """
+    alike = [len(r.y) for r in rows] == [len(r.y) for r in noisy]
+    evidence = evidence_from(regression_of(rows, terms, found.model, block_s, noisy if alike else None))
+    return evidence.bias_gram / evidence.blocks.sum()
+
+
+def noisy_evidence(regression: Regression, noise: np.ndarray) -> Evidence:
+    """Evidence with the `noise` (C, K, K) of a block in its products."""
+    evidence = evidence_from(regression)
+    return replace(evidence, bias_gram=noise * evidence.blocks.sum())
 
 
 def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
@@ -195,7 +219,7 @@ def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
     variants = (
         [(corrected, mistakes)] if all(m.which in known for m in mistakes) else [(corrected, mistakes), (new, ())]
     )
-    stretches = [(own, recorded_stretches(reference.found, own), found) for own, found in variants]
+    stretches = [(own, recorded_stretches(reference.found, own)[0], found) for own, found in variants]
     joints = [
         joined_at(reference, own, recorded, reference.chain, found) for own, recorded, found in stretches if recorded
     ]
@@ -220,7 +244,8 @@ def joined_at(
     segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     of_new = regression_of(rows, terms, model, reference.block_s)
-    evidence = within_bounds(with_known_effects(evidence_from(of_new), reference.known), reference)
+    evidence = with_known_effects(noisy_evidence(of_new, reference.noise), reference.known)
+    evidence = within_bounds(evidence, reference)
     inertia, inertia_of_base = (
         inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
     )
@@ -323,7 +348,7 @@ def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
 
     Its columns hold the rotors' part alone; a vehicle that is heavier is moved less by its drag, too.
     """
-    gram, cross = evidence.gram.copy(), evidence.cross.copy()
+    gram, cross, bias = evidence.gram.copy(), evidence.cross.copy(), evidence.bias_gram.copy()
     for place, channel in enumerate(evidence.channels):
         key = "mass" if channel in FORCES else INERTIA_OF.get(int(channel))
         if key is None or key not in evidence.start:
@@ -332,7 +357,8 @@ def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
         turn[:, evidence.start[key]] -= known
         gram[place] = np.einsum("ki,ekl,lj->eij", turn, gram[place], turn, optimize=True)
         cross[place] = cross[place] @ turn
-    return replace(evidence, gram=gram, cross=cross)
+        bias[place] = turn.T @ bias[place] @ turn
+    return replace(evidence, gram=gram, cross=cross, bias_gram=bias)
 
 
 def within_bounds(evidence: Evidence, reference: Reference) -> Evidence:
@@ -364,10 +390,11 @@ def against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], v
     return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
-def recorded_stretches(found: Fitted, recordings: RecordingSet) -> list[Segment]:
-    """Stretches of a set that have all that the first set's model needs, as recorded."""
-    own, _ = prepare_like(replace(found.prepared, vehicle=recordings.vehicle), recordings)
-    return [s for s in own if comparable(s, found.model)]
+def recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[Segment], list[Segment]]:
+    """Stretches of a set with all that the first set's model needs: as recorded, and with noise added once more."""
+    both = prepare_like(replace(found.prepared, vehicle=recordings.vehicle), recordings)
+    as_it_is, noisy = ([s for s in own if comparable(s, found.model)] for own in both)
+    return as_it_is, noisy
 
 
 def as_seen(rows: list[Rows], model: WrenchModel, keys: list[str]) -> list[Rows]:
@@ -377,8 +404,13 @@ def as_seen(rows: list[Rows], model: WrenchModel, keys: list[str]) -> list[Rows]
     return [replace(r, x=r.x * seen) for r in rows]
 
 
-def regression_of(rows: list[Rows], terms: list[Term], model: WrenchModel, block_s: float) -> Regression:
-    """The regression that some rows make, whitened as the model's, with its products by channel."""
+def regression_of(
+    rows: list[Rows], terms: list[Term], model: WrenchModel, block_s: float, noisy: list[Rows] | None = None
+) -> Regression:
+    """The regression that some rows make, whitened as the model's, with its products by channel.
+
+    `noisy` are the rows with the sensors' noise added once more.
+    """
     rate_hz = model.prepared.thinner.rate_hz
     return build(
         rows,
@@ -387,5 +419,6 @@ def regression_of(rows: list[Rows], terms: list[Term], model: WrenchModel, block
         lambda run, time_s: True,
         block_s,
         rate_hz,
+        noisy,
         by_channel=True,
     )

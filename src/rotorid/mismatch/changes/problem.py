@@ -10,7 +10,8 @@ the leftover of each taken out (`posterior/leftover`),
     S̃ = (1 + S T)⁻¹ S                  s̃ = (1 + S T)⁻¹ s
 
 are the products of a problem in Δ alone, which is decided as one flight is. What the catalogue's forms, the whitening
-and a controller's answer are wrong by is in b and cancels.
+and a controller's answer are wrong by is in b and cancels. What the noise of the regressors adds to B and N adds to S,
+with Q = N (B + N + Λ⁻¹)⁻¹, (1 − Q) N_noise (1 − Q)ᵀ + Q B_noise Qᵀ; it is taken out as in one flight.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.problem import Problem, believed, log_priors
+from rotorid.mismatch.posterior.problem import Problem, believed, limiting, log_priors
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found, most_probable
 
@@ -162,7 +163,8 @@ def problem_of_changes(
     unit, size, rows = spectra[1].unit, len(spectra[1].unit), spectra[1].rows
     terms = {t.key: as_change(t) for t in new.terms}
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
-    gram, cross = products_of_changes(spectra, variance, spread, free_of(terms, columns_of, rows))
+    gram, cross, bias, bias_cross = products_of_changes(spectra, variance, spread, free_of(terms, columns_of, rows))
+    root = limiting(gram, bias, prior)
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
     # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change. What
@@ -188,9 +190,9 @@ def problem_of_changes(
         unit=unit,
         gram=gram,
         cross=cross,
-        bias=np.zeros((size, size)),
-        limited_bias=np.zeros((size, size)),
-        limited_bias_cross=np.zeros(size),
+        bias=bias,
+        limited_bias=bias * np.outer(root, root),
+        limited_bias_cross=bias_cross * root,
         place_apart=np.full(size, -1),
         gram_apart=np.zeros((0, size)),
         cross_apart=np.zeros(0),
@@ -207,13 +209,15 @@ def problem_of_changes(
 
 def products_of_changes(
     spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """S̃ (K, K) and s̃ (K,) of the module's equations, scaled; `free` as `free_of`."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """S̃ (K, K) and s̃ (K,) of the module's equations, scaled, and what the regressors' noise adds to each."""
     base, new = (s.weighed(variance) for s in spectra)
     gram, cross = difference_products(base, new, free)
     usual = in_units(spread, spectra[1].unit) ** 2
-    gram, cross = np.hsplit(np.linalg.solve(np.eye(len(cross)) + gram * usual, np.column_stack([gram, cross])), [-1])
-    return 0.5 * (gram + gram.T), cross[:, 0]
+    turn = np.linalg.inv(np.eye(len(cross)) + gram * usual)
+    bias = turn @ noise_of_difference(base, new, free) @ turn.T
+    gram, cross = turn @ gram, turn @ cross
+    return 0.5 * (gram + gram.T), cross, bias, -bias @ (usual * (np.linalg.solve(turn, cross)))
 
 
 def free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
@@ -232,6 +236,13 @@ def difference_products(base: Weighed, new: Weighed, free: np.ndarray) -> tuple[
     """
     inverse = np.linalg.inv(base.gram + new.gram + np.diag(1.0 / free))
     return new.gram - new.gram @ inverse @ new.gram, new.cross - new.gram @ inverse @ (base.cross + new.cross)
+
+
+def noise_of_difference(base: Weighed, new: Weighed, free: np.ndarray) -> np.ndarray:
+    """What the noise of the regressors adds to S, (K, K)."""
+    taken = new.gram @ np.linalg.inv(base.gram + new.gram + np.diag(1.0 / free))
+    rest = np.eye(len(free)) - taken
+    return rest @ new.bias @ rest.T + taken @ base.bias @ taken.T
 
 
 def looks_like(gram: np.ndarray, spread: np.ndarray) -> np.ndarray:

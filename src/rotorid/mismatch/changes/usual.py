@@ -148,7 +148,7 @@ def joined(flights: Sequence[Evidence]) -> Evidence:
         name: np.concatenate([getattr(f, name) for f in flights], axis=axis)
         for name, axis in (("gram", 1), ("cross", 1), ("square", 1), ("blocks", 0))
     }
-    return replace(flights[0], **parts)
+    return replace(flights[0], **parts, bias_gram=sum(f.bias_gram for f in flights))
 
 
 def of_environments(evidence: Evidence, chosen: np.ndarray) -> Evidence:
@@ -159,4 +159,5 @@ def of_environments(evidence: Evidence, chosen: np.ndarray) -> Evidence:
         cross=evidence.cross[:, chosen],
         square=evidence.square[:, chosen],
         blocks=evidence.blocks[chosen],
+        bias_gram=evidence.bias_gram * evidence.blocks[chosen].sum() / max(evidence.blocks.sum(), 1),
     )

@@ -42,6 +42,8 @@ class Weighed:
     """(K, K)."""
     cross: np.ndarray
     """(K,)."""
+    bias: np.ndarray
+    """(K, K) what the noise of the regressors adds to `gram`."""
     kept: np.ndarray
     """(C,) share of each channel's energy that is kept. One number for all columns of a channel: the noise of their
     regressors cancels in some of their sums, and has to go on doing so."""
@@ -68,6 +70,8 @@ class Spectrum:
     unit: np.ndarray
     """(K,) coefficient in its own unit of a scaled one of 1; 0 for a column that is never excited."""
     channels: tuple[ChannelSpectrum, ...]
+    bias: np.ndarray
+    """(C, K, K) what the noise of the regressors adds to the products."""
     rows: float
     """Whitened squares that the model of all columns leaves: the number of rows, as the whitening counts them."""
 
@@ -81,7 +85,7 @@ class Spectrum:
             gram[np.ix_(own.columns, own.columns)] += np.tensordot(root, root, axes=([0, 2], [0, 2]))
             cross[own.columns] += np.einsum("eik,ek->i", own.vectors, shrunk * own.turned)
             kept[c] = (own.values * shrunk).sum() / max(own.values.sum(), TINY)
-        return Weighed(gram, cross, kept)
+        return Weighed(gram, cross, np.tensordot(kept, self.bias, 1), kept)
 
     def evidence_of(self, variance: np.ndarray) -> float:
         """Log marginal likelihood of a leftover of `variance` (C,) where no model explains anything, nats, less a
@@ -127,4 +131,5 @@ def spectrum_of(evidence: Evidence, unit: np.ndarray | None = None) -> Spectrum:
     gram = evidence.gram.sum(axis=(0, 1)) * np.outer(unit, unit)
     total = evidence.cross.sum(axis=(0, 1)) * unit
     left = evidence.square.sum() - total @ np.linalg.solve(gram + FULL_RIDGE * np.eye(len(unit)), total)
-    return Spectrum(unit, tuple(channels), max(float(left), FEWEST_ROWS))
+    bias = evidence.bias_gram * np.outer(unit, unit)
+    return Spectrum(unit, tuple(channels), bias, max(float(left), FEWEST_ROWS))

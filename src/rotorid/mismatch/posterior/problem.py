@@ -111,10 +111,8 @@ def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, pri
     always = [columns_of[t.key] for kind in ALWAYS for t in evidence.terms if t.kind == kind]
     unit = spectrum.unit
     seen = spectrum.weighed(variance)
-    bias = np.tensordot(seen.kept, evidence.bias_gram, 1) * np.outer(unit, unit)
     bias_cross = (seen.kept @ evidence.bias_cross) * unit
-    energy = np.maximum(np.diag(seen.gram), TINY)
-    root = np.sqrt(np.minimum(1.0, prior.attenuation * energy / np.maximum(np.diag(bias), TINY)))
+    root = limiting(seen.gram, seen.bias, prior)
     rows = spectrum.rows
     place, gram_apart, cross_apart = scaled_apart(evidence, unit)
     sd, low, high, is_value = believed(evidence.terms, trusts_of(evidence.terms), columns_of, unit, rows, prior)
@@ -135,8 +133,8 @@ def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, pri
         unit=unit,
         gram=seen.gram,
         cross=seen.cross,
-        bias=bias,
-        limited_bias=bias * np.outer(root, root),
+        bias=seen.bias,
+        limited_bias=seen.bias * np.outer(root, root),
         limited_bias_cross=bias_cross * root,
         place_apart=place,
         gram_apart=gram_apart,
@@ -150,6 +148,12 @@ def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, pri
         prior=prior,
         channel_gram=evidence.gram.sum(axis=1) * np.outer(unit, unit),
     )
+
+
+def limiting(gram: np.ndarray, bias: np.ndarray, prior: Prior) -> np.ndarray:
+    """Factor (K,) of each column with which its noise is no more than a share of its energy."""
+    energy = np.maximum(np.diag(gram), TINY)
+    return np.sqrt(np.minimum(1.0, prior.attenuation * energy / np.maximum(np.diag(bias), TINY)))
 
 
 def scaled_apart(evidence: Evidence, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -59,12 +59,13 @@ class Statement:
         return f"its probability is {100 * self.probability:.0f} %"
 
 
-def statements_of(found: Found, of_change: bool = False) -> tuple[Statement, ...]:
+def statements_of(found: Found, of_change: bool = False, form_sd: float = 0.0) -> tuple[Statement, ...]:
     """A statement for each named effect of the most probable model, the surest first.
 
     Of a change a class may hold an effect that explains alone what several do together: an offset of the centre of
     mass and a weaker thrust are a payload. Its numbers are stated with a wide prior: the one that models are compared
-    by, of what one row determines, would shrink large changes.
+    by, of what one row determines, would shrink large changes. `form_sd` is the share of itself that each number is
+    wrong by for its equation alone, one sigma.
     """
     at = scored(found.problem, found.model)
     numbers = widened(found.problem) if of_change else found.problem
@@ -77,7 +78,8 @@ def statements_of(found: Found, of_change: bool = False) -> tuple[Statement, ...
         seen = [(key, (*others, *more), odds) for key, others, odds in seen]
     known = scored(numbers, found.model)
     stated = [
-        statement(found, at, weights, key, others, odds, parameters(numbers, known, key)) for key, others, odds in seen
+        statement(found, at, weights, key, others, odds, parameters(numbers, known, key, form_sd))
+        for key, others, odds in seen
     ]
     return tuple(sorted(stated, key=lambda s: -s.odds))
 
@@ -206,12 +208,16 @@ def squares_of(found: Found, at: Scored, key: str) -> np.ndarray:
     return np.einsum("i,cij,j->c", beta, found.problem.channel_gram[:, own[:, None], own], beta)
 
 
-def parameters(problem: Problem, at: Scored, key: str) -> tuple[Estimate, ...]:
-    """Linear parameters of a term as its form states them, with 95 % intervals; none of a form without."""
+def parameters(problem: Problem, at: Scored, key: str, form_sd: float = 0.0) -> tuple[Estimate, ...]:
+    """Linear parameters of a term as its form states them, with 95 % intervals; none of a form without.
+
+    `form_sd` as of `statements_of`.
+    """
     term, own = problem.terms[key], problem.columns_of[key]
     where, unit = places(at.columns, own), problem.unit[own]
     beta = at.mode.beta[where] * unit
-    reach = Z95 * np.sqrt(np.maximum(np.diag(at.mode.covariance)[where], 0.0)) * unit
+    sd = np.sqrt(np.maximum(np.diag(at.mode.covariance)[where], 0.0)) * unit
+    reach = Z95 * np.hypot(sd, form_sd * beta)
     out = []
     for k, parameter in enumerate(term.linear):
         moved = (np.where(np.arange(len(beta)) == k, beta + step, beta) for step in (0.0, -reach, reach))

@@ -35,6 +35,35 @@ def test_what_both_sets_have_is_no_change_and_what_one_has_more_is():
     assert decided(made([0.0, 0.9, 0.0], 2)).model == (DRAG,)
 
 
+@pytest.mark.parametrize("spread", [0.0, 0.2])
+def test_noise_of_a_column_makes_no_change_smaller(spread):
+    """A fifth of the column's squares is noise; without the correction the change of 2 would read 1.6 to 1.7."""
+    share, (own, new) = 0.2, (flight([0.0, b, 0.0], TERMS[:3], seed, noise=0.3) for b, seed in ((0.5, 1), (2.5, 2)))
+
+    def seen(of, seed: int, known: bool):
+        noise = np.zeros(3)
+        noise[1] = share / (1.0 - share) * np.mean(of.x[:, :, 1] ** 2)
+        shaken = of.x + np.sqrt(noise) * np.random.default_rng(seed).normal(size=of.x.shape)
+        bias = np.diag(noise) * of.y.size * known
+        return replace(replace(of, x=shaken).evidence(), bias_gram=bias[None])
+
+    def size(known: bool) -> float:
+        found = decide_changes(seen(own, 3, known), seen(new, 4, known), np.array([0.0, spread, spread]), Prior())
+        (said,) = statements_of(found, of_change=True)
+        return said.parameters[0].value
+
+    assert size(False) < 1.75
+    assert size(True) == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_change_is_stated_no_more_surely_than_its_equation_holds():
+    found = decided(made([0.0, 9.0, 0.0], 2))
+    plain, with_form = (statements_of(found, form_sd=own)[0].parameters[0] for own in (0.0, 0.02))
+    assert with_form.value == plain.value == pytest.approx(8.5, abs=0.3)
+    of_form = 1.96 * 0.02 * plain.value
+    assert with_form.high - with_form.value == pytest.approx(np.hypot(plain.high - plain.value, of_form), rel=0.01)
+
+
 def test_a_change_far_beyond_what_flights_differ_by_is_not_drawn_to_nothing():
     """Ten times as large as flights differ by, and a hundred times as large as a row's noise."""
     (said,) = statements_of(decided(made([0.0, 100.5, 0.0], 2), spread=10.0))
