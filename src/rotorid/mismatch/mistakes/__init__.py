@@ -5,26 +5,15 @@ from __future__ import annotations
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units, vibration
 from rotorid.mismatch.mistakes.dead_voltmeter import connected
-from rotorid.mismatch.mistakes.signals import ReadSet
+from rotorid.mismatch.mistakes.signals import ReadSet, Result
 from rotorid.recordings import RecordingSet
 
 
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding, ...], tuple[str, ...]]:
-    """The set as corrected, what was wrong with it, and notes for the reader."""
-    findings: list[Finding] = []
-    recordings = ReadSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out)
-    if recordings.vehicle.kind == "flight":
-        recordings, lost = dropout.find(recordings)
-        findings += [lost] if lost else []
-    for error in units.by_size(recordings):
-        recordings = units.corrected(recordings, error)
-        findings.append(units.as_finding(error))
-    recordings, notes = connected(recordings)
-    for step in (axes.find, rotor_layout.find, timing.find):
-        found = step(recordings)
-        recordings, notes = found.recordings, notes + found.notes
-        findings += found.findings
-    shaking = vibration.find(recordings)
-    findings += [shaking] if shaking else []
-    recordings = RecordingSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out)
-    return recordings, tuple(findings), notes
+    """The set of a vehicle in flight as corrected, what was wrong with it, and notes for the reader."""
+    recordings, lost = dropout.find(ReadSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out))
+    result = Result(recordings, (lost,) if lost else ())
+    for step in (units.find, connected, axes.find, rotor_layout.find, timing.find, vibration.find):
+        result = result.then(step)
+    last = result.recordings
+    return RecordingSet(last.name, last.vehicle, last.runs, last.held_out), result.findings, result.notes

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.stats import t as student
+from scipy.stats import ttest_1samp
 
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.lagged import LaggedFit
-from rotorid.mismatch.mistakes.signals import ReadSet, Signals, read_signals, replace_columns, sensor_columns
-from rotorid.mismatch.mistakes.units import UnitError, as_finding, corrected, nearest
-from rotorid.recordings import RecordingSet, Run
+from rotorid.mismatch.mistakes.signals import (
+    SENSOR_WORDS,
+    ReadSet,
+    Result,
+    Signals,
+    replace_sensor,
+    sensor_columns,
+)
+from rotorid.mismatch.mistakes.units import RATES, UnitError, corrected, nearest
+from rotorid.recordings import Vehicle
 
 LEAST_EXPLAINED = 0.4
 """Share of an axis that the other sensor must explain before anything is said of it."""
 LEAST_T = 8.0
+"""Standard errors from zero of a gain that names an axis."""
 DOMINANCE = 3.0
 """The largest entry of a row over the next, for an axis to be identified."""
 LEAST_GRAVITY = 0.6
@@ -67,6 +78,7 @@ class Reading:
     """What a fit of X to Y (both three axes) says: `turn` of X, `scale` of X, and how sure."""
 
     turn: Turn | None
+    """None where only the scale was asked for."""
     scale: float
     scale_sd: float
     p_value: float
@@ -80,7 +92,6 @@ def read(fit: LaggedFit | None) -> Reading | None:
     if fit is None:
         return None
     source, sign, gains, p_values = [0, 1, 2], [1, 1, 1], [], []
-    clear = 0
     for j in range(3):
         row, sd = fit.gain[j], np.maximum(fit.gain_sd[j], 1e-12)
         order = np.argsort(-np.abs(row))
@@ -89,171 +100,100 @@ def read(fit: LaggedFit | None) -> Reading | None:
             continue
         if abs(row[best]) < DOMINANCE * abs(row[order[1]]):
             continue
-        clear += 1
         # Row j of M names the column of X that is true axis j.
         source[best], sign[best] = j, int(np.sign(row[best]))
         gains.append((abs(row[best]), sd[best]))
         p_values.append(float(student.sf(abs(row[best]) / sd[best], max(fit.block_count - 1, 1))))
-    if clear < 1 or sorted(source) != [0, 1, 2]:
+    if not gains or sorted(source) != [0, 1, 2]:
         return None
-    value = float(np.median([g for g, _ in gains]))
-    return Reading(Turn(tuple(source), tuple(sign)), value, float(np.median([s for _, s in gains])), max(p_values))
+    scale, scale_sd = np.median(gains, axis=0)
+    return Reading(Turn(tuple(source), tuple(sign)), float(scale), float(scale_sd), max(p_values))
 
 
-@dataclass(frozen=True)
-class Result:
-    """A set as corrected so far, and what was found."""
-
-    recordings: RecordingSet
-    findings: tuple[Finding, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
-def signals_of(recordings: RecordingSet) -> list[Signals]:
-    """Signals of every run."""
-    if isinstance(recordings, ReadSet):
-        return recordings.signals
-    return [read_signals(run, recordings.vehicle) for run in recordings.runs]
-
-
-def mean_gravity(all_signals: list[Signals], gravity: float) -> np.ndarray | None:
-    """Mean of the accelerometer over −g along body z, per axis; about (0, 0, 1) where all is well."""
-    parts = [s.values["accelerometer"] for s in all_signals if "accelerometer" in s.values]
-    if not parts:
-        return None
-    return np.nanmean(np.concatenate(parts), axis=0) / -gravity
-
-
-def apply_turn(recordings: RecordingSet, sensor: str, turn: Turn) -> RecordingSet:
-    """The set with one sensor's columns in the contract's axes."""
-    names = sensor_columns(recordings.vehicle)[sensor]
-
-    def change(run: Run):
-        if not run.has(*names):
-            return None
-        fixed = turn.undo(run.array(names))
-        return {n: fixed[:, k] for k, n in enumerate(names)}
-
-    return replace_columns(recordings, change)
-
-
-def apply_attitude(recordings: RecordingSet, signs: np.ndarray, order: tuple[int, ...]) -> RecordingSet:
-    """The set with its quaternions' columns reordered and flipped."""
-    names = sensor_columns(recordings.vehicle)["attitude"]
-
-    def change(run: Run):
-        if not run.has(*names):
-            return None
-        fixed = run.array(names)[:, list(order)] * signs
-        return {n: fixed[:, k] for k, n in enumerate(names)}
-
-    return replace_columns(recordings, change)
-
-
-SENSOR_NAMES = {
-    "gyroscope": "the gyroscope's axes",
-    "accelerometer": "the accelerometer's axes",
-    "velocity": "the velocity's axes",
-    "position": "the position's axes",
-}
-
-
-def axis_finding(recordings: RecordingSet, sensor: str, turn: Turn, p_value: float) -> Finding:
-    """The finding of a sensor with wrong axes."""
+def turned(recordings: ReadSet, sensor: str, turn: Turn, p_value: float) -> Result:
+    """The set with a sensor's columns in the contract's axes, and the finding that they were not."""
     names = sensor_columns(recordings.vehicle)[sensor]
     touched = [n for i, n in enumerate(names) if turn.sign[i] < 0 or turn.source[i] != i]
     remedy = "flipped" if turn.source == (0, 1, 2) else "put in order"
-    return Finding(
+    finding = Finding(
         id="axis_sign",
         status="established",
-        sentence=f"Of {SENSOR_NAMES[sensor]}, {turn.text()} ({', '.join(touched)}): {remedy}.",
+        sentence=f"Of {SENSOR_WORDS[sensor]}'s axes, {turn.text()} ({', '.join(touched)}): {remedy}.",
         p_value=p_value,
         channels=tuple(touched),
     )
+    return Result(replace_sensor(recordings, sensor, turn.undo), (finding,))
 
 
-def find(recordings: RecordingSet) -> Result:
+def find(recordings: ReadSet) -> Result:
     """Wrong axes and units of inertial sensors, attitude, velocity and position."""
     result = Result(recordings)
-    if recordings.vehicle.kind != "flight":
-        return result
     for step in (_gravity, _turning, _accelerating, _sideways, _moving):
-        found = step(result.recordings)
-        result = Result(found.recordings, result.findings + found.findings, result.notes + found.notes)
+        result = result.then(step)
     return result
 
 
-def _gravity(recordings: RecordingSet) -> Result:
+def _gravity(recordings: ReadSet) -> Result:
     """The accelerometer's z axis by gravity: a flying vehicle is supported by thrust along −z."""
-    mean = mean_gravity(signals_of(recordings), recordings.vehicle.gravity_m_s2)
-    if mean is None or not np.isfinite(mean).all():
+    runs = [s for s in recordings.signals if "accelerometer" in s.values]
+    if not runs:
         return Result(recordings)
+    # Over −g along body z: about (0, 0, 1) where all is well.
+    mean = np.nanmean(np.concatenate([s.values["accelerometer"] for s in runs]), axis=0)
+    mean = mean / -recordings.vehicle.gravity_m_s2
     axis = int(np.argmax(np.abs(mean)))
-    if abs(mean[axis]) < LEAST_GRAVITY or (axis == 2 and mean[2] > 0):
+    if not np.isfinite(mean).all() or abs(mean[axis]) < LEAST_GRAVITY or (axis == 2 and mean[2] > 0):
         return Result(recordings)
-    if axis == 2:
-        turn = Turn((0, 1, 2), (1, 1, -1))
-    else:
-        source = [0, 1, 2]
-        source[axis], source[2] = 2, axis
-        sign = [1, 1, 1]
-        sign[axis] = int(np.sign(mean[axis]))
-        turn = Turn(tuple(source), tuple(sign))
-    finding = axis_finding(recordings, "accelerometer", turn, _gravity_p(recordings, axis))
-    return Result(apply_turn(recordings, "accelerometer", turn), (finding,))
+    source, sign = [0, 1, 2], [1, 1, 1]
+    source[axis], source[2] = 2, axis
+    sign[axis] = int(np.sign(mean[axis]))
+    return turned(recordings, "accelerometer", Turn(tuple(source), tuple(sign)), _gravity_p(runs, axis))
 
 
-def _gravity_p(recordings: RecordingSet, axis: int) -> float:
-    """p-value that the mean of an axis is zero, from means of two seconds."""
+def _gravity_p(runs: list[Signals], axis: int) -> float:
+    """p-value that the mean of an axis of the accelerometer is zero, from means of two seconds."""
     means = []
-    for s in signals_of(recordings):
-        if "accelerometer" in s.values:
-            values = s.values["accelerometer"][:, axis]
-            count = max(1, int(len(values) / (2.0 * s.rate_hz)))
-            means += [np.nanmean(part) for part in np.array_split(values, count) if np.isfinite(part).any()]
-    if len(means) < 3:
-        return 1.0
-    return float(student.sf(abs(np.mean(means)) / (np.std(means, ddof=1) / np.sqrt(len(means))), len(means) - 1))
+    for s in runs:
+        values = s.values["accelerometer"][:, axis]
+        count = max(1, int(len(values) / (2.0 * s.rate_hz)))
+        means += [np.nanmean(part) for part in np.array_split(values, count) if np.isfinite(part).any()]
+    return float(ttest_1samp(means, 0.0).pvalue / 2) if len(means) > 2 else 1.0
 
 
-def _scaled_sensor(recordings: RecordingSet, sensor: str, what: str, unit, expected: str, reading: Reading) -> Result:
+UNITS = {
+    "gyroscope": ("the body rates", "rad/s", {**RATES, "mrad/s": 1000.0}),
+    "velocity": ("the velocity", "m/s", {"cm/s": 100.0, "mm/s": 1000.0, "km/h": 3.6, "ft/s": 3.28084}),
+    "position": ("the position", "m", {"cm": 100.0, "mm": 1000.0, "ft": 3.28084}),
+}
+"""Of a sensor its quantity, the contract's unit, and other units with their factor."""
+
+
+def in_contract_units(recordings: ReadSet, sensor: str, reading: Reading, among: Collection[str] = ()) -> Result:
+    """The set with a sensor's columns in the contract's unit, where their scale is that of another (`among` some)."""
+    what, expected, factors = UNITS[sensor]
+    unit = nearest(1.0 / reading.scale, {name: f for name, f in factors.items() if not among or name in among})
+    if unit is None:
+        return Result(recordings)
+    measured, spread = 1.0 / reading.scale, 1.96 * reading.scale_sd / reading.scale
     columns = sensor_columns(recordings.vehicle)[sensor]
-    error = UnitError(
-        columns,
-        what,
-        unit[0],
-        expected,
-        unit[1],
-        1.0 / reading.scale,
-        1.96 * reading.scale_sd / reading.scale,
-        reading.p_value,
-    )
-    return Result(corrected(recordings, error), (as_finding(error),))
+    return corrected(recordings, UnitError(columns, what, *unit, expected, measured, spread, reading.p_value))
 
 
-RATE_UNITS = {"deg/s": 180 / np.pi, "rpm": 60 / (2 * np.pi), "mrad/s": 1000.0, "rev/s": 1 / (2 * np.pi)}
-
-
-def _turning(recordings: RecordingSet) -> Result:
+def _turning(recordings: ReadSet) -> Result:
     """The gyroscope against the attitude, and who of the two is wrong."""
     vehicle = recordings.vehicle
-    signals = signals_of(recordings)
-    reading = read(lagged.fit(compare.turning(signals)))
+    reading = read(lagged.fit(compare.turning(recordings.signals)))
     if reading is None:
-        return _gyroscope_units(recordings, signals)
-    unit = nearest(1.0 / reading.scale, RATE_UNITS)
-    result = Result(recordings)
-    if unit:
-        result = _scaled_sensor(recordings, "gyroscope", "the body rates", unit, "rad/s", reading)
-        signals = signals_of(result.recordings)
+        return _gyroscope_units(recordings)
+    result = in_contract_units(recordings, "gyroscope", reading)
     if reading.turn.identity:
         return result
-    if not attitude_fits(signals, vehicle):
+    if not attitude_fits(result.recordings.signals, vehicle):
         for name, (signs, order) in ATTITUDES.items():
-            trial = apply_attitude(result.recordings, signs, order)
-            trial_signals = signals_of(trial)
-            again = read(lagged.fit(compare.turning(trial_signals)))
-            if again and again.turn.identity and attitude_fits(trial_signals, vehicle, strict=True):
+            undo = partial(_quaternions, signs=signs, order=order)
+            trial = replace_sensor(result.recordings, "attitude", undo)
+            again = read(lagged.fit(compare.turning(trial.signals)))
+            if again and again.turn.identity and attitude_fits(trial.signals, vehicle, strict=True):
                 finding = Finding(
                     id="axis_sign",
                     status="established",
@@ -261,12 +201,23 @@ def _turning(recordings: RecordingSet) -> Result:
                     p_value=again.p_value,
                     channels=sensor_columns(vehicle)["attitude"],
                 )
-                return Result(trial, result.findings + (finding,))
-    finding = axis_finding(recordings, "gyroscope", reading.turn, reading.p_value)
-    return Result(apply_turn(result.recordings, "gyroscope", reading.turn), result.findings + (finding,))
+                return Result(trial, (*result.findings, finding))
+    return result.then(partial(turned, sensor="gyroscope", turn=reading.turn, p_value=reading.p_value))
 
 
-def attitude_fits(all_signals: list[Signals], vehicle, strict: bool = False) -> bool:
+def _quaternions(recorded: np.ndarray, signs: np.ndarray, order: tuple[int, ...]) -> np.ndarray:
+    """Quaternions (n, 4) reordered and flipped."""
+    return recorded[:, list(order)] * signs
+
+
+def force_source(all_signals: list[Signals]) -> str | None:
+    """What the velocity's changes are compared with: the accelerometer, else rotor speeds read or commanded."""
+    if any("accelerometer" in s.values for s in all_signals):
+        return "accelerometer"
+    return next((n for n in map(compare.speeds_of, all_signals) if n in ("rotors", "commands")), None)
+
+
+def attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = False) -> bool:
     """Whether the attitude agrees with what carries the vehicle: gravity on average, and velocity's changes.
 
     `strict` asks for agreement, otherwise a lack of evidence counts as agreement.
@@ -278,21 +229,19 @@ def attitude_fits(all_signals: list[Signals], vehicle, strict: bool = False) -> 
             agree.append(np.nanmean(world[:, 2]) < -LEAST_GRAVITY * vehicle.gravity_m_s2)
     if agree and not all(agree):
         return False
-    source = "accelerometer" if any("accelerometer" in s.values for s in all_signals) else None
-    source = source or next((n for n in map(compare.speeds_of, all_signals) if n in ("rotors", "commands")), None)
+    source = force_source(all_signals)
     fit = lagged.fit(compare.accelerating(all_signals, vehicle, source)) if source else None
     if fit is None:
         return not strict or bool(agree)
-    ratios = [fit.gain[k, k] / max(fit.gain_sd[k, k], 1e-12) for k in (0, 1) if fit.explained[k] > LEAST_EXPLAINED]
-    gain = [fit.gain[k, k] for k in (0, 1) if fit.explained[k] > LEAST_EXPLAINED]
-    if not ratios:
-        crossed = [k for k in (0, 1) if fit.explained[k] > 0.2]
-        return not crossed or not strict
-    return bool(np.all(np.array(ratios) > LEAST_T / 2) and np.all(np.array(gain) > 0.3))
+    gains = [(fit.gain[k, k], fit.gain_sd[k, k]) for k in (0, 1) if fit.explained[k] > LEAST_EXPLAINED]
+    if not gains:
+        return not strict or not np.any(fit.explained[:2] > 0.2)
+    return all(gain > max(0.3, LEAST_T / 2 * max(sd, 1e-12)) for gain, sd in gains)
 
 
-def _gyroscope_units(recordings: RecordingSet, signals: list[Signals]) -> Result:
+def _gyroscope_units(recordings: ReadSet) -> Result:
     """Without an attitude that shows it: the gyroscope's unit from the size of the believed moments."""
+    signals = recordings.signals
     sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
     if sensor is None or sensor == "throttle" and not recordings.vehicle.rotor_speed_limits_rad_s:
         return Result(recordings)
@@ -303,45 +252,33 @@ def _gyroscope_units(recordings: RecordingSet, signals: list[Signals]) -> Result
     fit = lagged.fit(blocks)
     if fit is None or np.min(fit.explained) < LEAST_EXPLAINED:
         return Result(recordings)
-    gain = np.abs(np.diag(fit.gain))
-    sd = np.diag(fit.gain_sd)
-    unit = nearest(float(np.sqrt(gain[0] * gain[1])), {"deg/s": 180 / np.pi, "mrad/s": 1000.0})
-    if unit is None or np.any(gain < LEAST_T * sd):
+    gain, sd = np.abs(np.diag(fit.gain)), np.diag(fit.gain_sd)
+    if np.any(gain < LEAST_T * sd):
         return Result(recordings)
     p = float(student.sf(np.min(gain / sd), max(fit.block_count - 1, 1)))
     size = float(np.sqrt(gain[0] * gain[1]))
     reading = Reading(None, 1.0 / size, float(np.max(sd / gain)) / size, p)
-    return _scaled_sensor(recordings, "gyroscope", "the body rates", unit, "rad/s", reading)
+    return in_contract_units(recordings, "gyroscope", reading, ("deg/s", "mrad/s"))
 
 
-def _accelerating(recordings: RecordingSet) -> Result:
+def _accelerating(recordings: ReadSet) -> Result:
     """The velocity against the specific force turned into the world."""
-    signals, vehicle = signals_of(recordings), recordings.vehicle
-    source = "accelerometer" if any("accelerometer" in s.values for s in signals) else None
-    source = source or next((n for n in map(compare.speeds_of, signals) if n in ("rotors", "commands")), None)
+    source = force_source(recordings.signals)
     if source is None:
         return Result(recordings)
-    fit = lagged.fit(compare.accelerating(signals, vehicle, source))
-    return _judge_world(recordings, "velocity", "the velocity", "m/s", fit, _velocity_units())
+    fit = lagged.fit(compare.accelerating(recordings.signals, recordings.vehicle, source))
+    return _in_the_world(recordings, "velocity", fit)
 
 
-def _velocity_units() -> dict[str, float]:
-    return {"cm/s": 100.0, "mm/s": 1000.0, "km/h": 3.6, "ft/s": 3.28084}
-
-
-def _judge_world(recordings, sensor, what, expected, fit, units) -> Result:
-    """Y is the suspect: Y = M X with X sound."""
+def _in_the_world(recordings: ReadSet, sensor: str, fit: LaggedFit | None) -> Result:
+    """Unit and axes of a sensor Y = M X with X sound."""
     reading = read(_inverse(fit))
     if reading is None:
         return Result(recordings)
-    result = Result(recordings)
-    unit = nearest(1.0 / reading.scale, units)
-    if unit:
-        result = _scaled_sensor(recordings, sensor, what, unit, expected, reading)
+    result = in_contract_units(recordings, sensor, reading)
     if reading.turn.identity:
         return result
-    finding = axis_finding(recordings, sensor, reading.turn, reading.p_value)
-    return Result(apply_turn(result.recordings, sensor, reading.turn), result.findings + (finding,))
+    return result.then(partial(turned, sensor=sensor, turn=reading.turn, p_value=reading.p_value))
 
 
 def _inverse(fit: LaggedFit | None) -> LaggedFit | None:
@@ -349,19 +286,15 @@ def _inverse(fit: LaggedFit | None) -> LaggedFit | None:
     if fit is None:
         return None
     size = np.maximum(np.abs(fit.gain).max(axis=1, keepdims=True), 1e-300)
+    # Of each axis of X is explained what is of the axis of Y which it feeds.
+    explained = fit.explained[np.abs(fit.gain).argmax(axis=0)]
     # For signed, scaled axes the inverse is the transpose over the squared scale.
-    return replace(fit, gain=(fit.gain / size**2).T, gain_sd=(fit.gain_sd / size**2).T, explained=_carried(fit))
+    return replace(fit, gain=(fit.gain / size**2).T, gain_sd=(fit.gain_sd / size**2).T, explained=explained)
 
 
-def _carried(fit: LaggedFit) -> np.ndarray:
-    """Explained share of each axis of X: that of the axis of Y which it feeds."""
-    return np.array([fit.explained[int(np.argmax(np.abs(fit.gain[:, k])))] for k in range(fit.gain.shape[1])])
-
-
-def _sideways(recordings: RecordingSet) -> Result:
+def _sideways(recordings: ReadSet) -> Result:
     """The accelerometer's x and y, where there is enough sideways force to decide."""
-    signals = signals_of(recordings)
-    fit = lagged.fit(compare.sideways(signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
+    fit = lagged.fit(compare.sideways(recordings.signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
     if fit is None:
         return Result(recordings)
     sign, p_values = [1, 1, 1], []
@@ -373,11 +306,9 @@ def _sideways(recordings: RecordingSet) -> Result:
     turn = Turn((0, 1, 2), tuple(sign))
     if turn.identity:
         return Result(recordings)
-    finding = axis_finding(recordings, "accelerometer", turn, max(p_values))
-    return Result(apply_turn(recordings, "accelerometer", turn), (finding,))
+    return turned(recordings, "accelerometer", turn, max(p_values))
 
 
-def _moving(recordings: RecordingSet) -> Result:
+def _moving(recordings: ReadSet) -> Result:
     """The position against the velocity (already checked against the forces where there were any)."""
-    fit = lagged.fit(compare.moving(signals_of(recordings)))
-    return _judge_world(recordings, "position", "the position", "m", fit, {"cm": 100.0, "mm": 1000.0, "ft": 3.28084})
+    return _in_the_world(recordings, "position", lagged.fit(compare.moving(recordings.signals)))

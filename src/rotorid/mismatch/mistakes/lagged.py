@@ -7,7 +7,6 @@ are; covariances are sandwiches over blocks of time, so that they hold whatever 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +20,8 @@ OVERSAMPLING = 5.0
 """Rate of the thinned signals over the cutoff."""
 PERFECTION = 1e-3
 """Share of an output's own power that is always taken as noise: files hold columns computed from each other."""
+SMOOTHED = 5
+"""Neighbouring frequencies over which powers are averaged."""
 OVERLAP = 1.94
 """Neighbouring frequencies of a Hann window are correlated: sums of squares vary by this more."""
 FEWEST_BLOCKS = 4
@@ -33,6 +34,10 @@ MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
 UNDECIDED = 12.0
 """Motor lags within this log-likelihood are not distinguished."""
+
+
+OF_BLOCKS = ("y", "x", "z", "run", "time_s")
+"""What a block has of its own."""
 
 
 @dataclass(frozen=True)
@@ -58,17 +63,21 @@ class Blocks:
 
     def outputs(self, chosen) -> Blocks:
         """The same with some outputs only."""
-        return Blocks(self.frequency_hz, self.y[:, :, chosen], self.x, self.z, self.run, self.time_s)
+        return replace(self, y=self.y[:, :, chosen])
+
+    def delayed(self, lag_s) -> Blocks:
+        """The same with X late by a time, or by one of each block (b,)."""
+        return replace(self, x=self.x * delay(self.frequency_hz, lag_s)[:, :, None])
 
     def up_to(self, top_hz: float) -> Blocks:
         """The same at frequencies up to `top_hz` only."""
         kept = self.frequency_hz <= top_hz * (1.0 + 1e-9)
-        return Blocks(self.frequency_hz[kept], *(v[:, kept] for v in (self.y, self.x, self.z)), self.run, self.time_s)
+        y, x, z = (v[:, kept] for v in (self.y, self.x, self.z))
+        return replace(self, frequency_hz=self.frequency_hz[kept], y=y, x=x, z=z)
 
     def part(self, chosen) -> Blocks:
         """Some of the blocks only."""
-        kept = [getattr(self, n)[chosen] for n in ("y", "x", "z", "run", "time_s")]
-        return Blocks(self.frequency_hz, *kept)
+        return replace(self, **{n: getattr(self, n)[chosen] for n in OF_BLOCKS})
 
 
 @dataclass(frozen=True)
@@ -79,23 +88,16 @@ class Signal:
     derivative: bool = False
 
 
-def join(parts: list[Blocks]) -> Blocks | None:
+def join(parts: list[Blocks | None]) -> Blocks | None:
     """Blocks of several runs as one, None for none."""
     parts = [p for p in parts if p is not None]
     if not parts:
         return None
-    stacked = [np.concatenate([getattr(p, n) for p in parts]) for n in ("y", "x", "z")]
-    runs = np.concatenate([p.run for p in parts])
-    return Blocks(parts[0].frequency_hz, *stacked, runs, np.concatenate([p.time_s for p in parts]))
+    return replace(parts[0], **{n: np.concatenate([getattr(p, n) for p in parts]) for n in OF_BLOCKS})
 
 
 def cut(
-    y: Signal,
-    x: Signal,
-    z: Signal | None,
-    rate_hz: float,
-    band_hz: tuple[float, float],
-    run: int,
+    y: Signal, x: Signal, z: Signal | None, rate_hz: float, band_hz: tuple[float, float], run: int
 ) -> Blocks | None:
     """Blocks of one run: both sides pass the same low-pass, missing samples are left out."""
     cutoff = band_hz[1]
@@ -148,17 +150,9 @@ class LaggedFit:
     block_count: int
 
 
-def _smooth(power: np.ndarray) -> np.ndarray:
-    """Running mean over five frequencies along axis 1."""
-    width = min(5, power.shape[1])
-    padded = np.pad(power, ((0, 0), (width // 2, width - 1 - width // 2)), mode="edge")
-    return np.stack([np.convolve(row, np.ones(width) / width, mode="valid") for row in padded])
-
-
 def noise_weight(blocks: Blocks, left: np.ndarray) -> np.ndarray:
     """1 / power of a residual (b, m, q), with a floor, (q, m)."""
-    power = _smooth(np.mean(np.abs(left) ** 2, axis=0).T)
-    own = _smooth(np.mean(np.abs(blocks.y) ** 2, axis=0).T)
+    power, own = (smooth(np.mean(np.abs(v) ** 2, axis=0)).T for v in (left, blocks.y))
     return 1.0 / (power + PERFECTION * own + 1e-30)
 
 
@@ -167,33 +161,32 @@ def coherence(blocks: Blocks) -> np.ndarray:
 
     What chance would explain is taken off. Where only noise is left in X, its size must not shrink the gains.
     """
-    x, y, width = blocks.x, blocks.y, 5
-    sxx = _around(np.einsum("bmk,bml->mkl", x.conj(), x), width)
-    sxy = _around(np.einsum("bmk,bmj->mkj", x.conj(), y), width)
-    syy = _around(np.sum(np.abs(y) ** 2, axis=0), width)
+    x, y = blocks.x, blocks.y
+    sxx = smooth(np.einsum("bmk,bml->mkl", x.conj(), x))
+    sxy = smooth(np.einsum("bmk,bmj->mkj", x.conj(), y))
+    syy = smooth(np.sum(np.abs(y) ** 2, axis=0))
     size = np.sqrt(np.real(np.einsum("mkk->mk", sxx)) + 1e-300)
     scaled = sxx / size[:, :, None] / size[:, None, :] + 1e-9 * np.eye(x.shape[2])
     cross = sxy / size[:, :, None]
     share = np.real(np.einsum("mkj,mkj->mj", cross.conj(), np.linalg.solve(scaled, cross))) / (syy + 1e-300)
     rank = np.mean(np.sum(np.linalg.eigvalsh(scaled) > 1e-3, axis=1))
-    chance = min(0.9, rank * OVERLAP / (width * blocks.count))
+    chance = min(0.9, rank * OVERLAP / (SMOOTHED * blocks.count))
     return np.clip((share - chance) / (1 - chance), 0.0, 1.0).T
 
 
-def _around(values: np.ndarray, width: int) -> np.ndarray:
-    """Running mean along axis 0 over a number of frequencies."""
-    width = min(width, len(values))
+def smooth(values: np.ndarray) -> np.ndarray:
+    """Running mean along axis 0, over neighbouring frequencies."""
+    width = min(SMOOTHED, len(values))
     pad = [(width // 2, width - 1 - width // 2)] + [(0, 0)] * (values.ndim - 1)
     padded = np.pad(values, pad, mode="edge")
     return sum(padded[k : k + len(values)] for k in range(width)) / width
 
 
-def _moments(blocks: Blocks, weight, transfer):
-    """Normal equations of every block: (b, q, K, K), (b, q, K)."""
-    x = np.concatenate([blocks.x * transfer[:, :, None], blocks.z], axis=2)
+def _moments(x: np.ndarray, y: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normal equations of every block with columns x (b, m, K): (b, q, K, K), (b, q, K)."""
     weighted = x.conj()[:, None] * weight[None, :, :, None]
     gram = np.real(np.swapaxes(weighted, 2, 3) @ x[:, None])
-    cross = np.real(np.swapaxes(weighted, 2, 3) @ np.swapaxes(blocks.y, 1, 2)[..., None])[..., 0]
+    cross = np.real(np.swapaxes(weighted, 2, 3) @ np.swapaxes(y, 1, 2)[..., None])[..., 0]
     return gram, cross
 
 
@@ -225,19 +218,14 @@ def delay(frequency_hz: np.ndarray, lag_s) -> np.ndarray:
     return np.exp(-2j * np.pi * np.atleast_1d(lag_s)[:, None] * frequency_hz[None, :])
 
 
-def fit(
-    blocks: Blocks,
-    lags_s: np.ndarray | None = None,
-    transfer: Callable[[np.ndarray], np.ndarray] | None = None,
-) -> LaggedFit | None:
+def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | None:
     """The best delay with free real gains; None where there are too few blocks.
 
-    `transfer(frequency)` multiplies X (a motor's lag). `lags_s` is the grid to search, `[0]` to hold it there.
+    `lags_s` is the grid to search, `[0]` to hold it there.
     """
     if blocks is None or blocks.count < FEWEST_BLOCKS:
         return None
     frequency = blocks.frequency_hz
-    base = np.ones((1, len(frequency)), complex) if transfer is None else transfer(frequency)[None, :]
     if lags_s is None:
         step = 1.0 / (8 * frequency[-1])
         lags_s = np.arange(-LONGEST_LAG_S, LONGEST_LAG_S + step / 2, step)
@@ -246,25 +234,21 @@ def fit(
     products = by_frequency(blocks)
 
     def explained_by(lags: np.ndarray) -> np.ndarray:
-        late = np.repeat((base * delay(frequency, lags))[:, :, None], blocks.x.shape[2], axis=2)
+        late = np.repeat(delay(frequency, lags)[:, :, None], blocks.x.shape[2], axis=2)
         not_late = np.ones((*late.shape[:2], blocks.z.shape[2]))
         return explained_at(products, weight, np.concatenate([late, not_late], axis=2))
 
     for _ in range(2):
         lag = _peak(lags_s, explained_by(lags_s))
         if len(lags_s) > 1:
-            fine = lag + np.linspace(-1, 1, 5) * (lags_s[1] - lags_s[0]) / 4
+            step = lags_s[1] - lags_s[0]
+            fine = lag + np.linspace(-1, 1, 5) * step / 4
             lag = _peak(fine, explained_by(fine))
-        phase = base * delay(frequency, lag)
-        gram_b, cross_b = _moments(blocks, weight, phase)
-        gram, cross = gram_b.sum(axis=0), cross_b.sum(axis=0)
-        beta = _solve(gram, cross)
-        x = np.concatenate([blocks.x * phase[:, :, None], blocks.z], axis=2)
-        left = blocks.y - x @ beta.T
-        new = trusted * noise_weight(blocks, left)
-        lags_s = lags_s if len(lags_s) == 1 else lag + np.linspace(-3, 3, 13) * (lags_s[1] - lags_s[0])
-        weight = new
-    gram_b, cross_b = _moments(blocks, weight, phase)
+            lags_s = lag + np.linspace(-3, 3, 13) * step
+        x = np.concatenate([blocks.delayed(lag).x, blocks.z], axis=2)
+        gram_b, cross_b = _moments(x, blocks.y, weight)
+        weight = trusted * noise_weight(blocks, blocks.y - x @ _solve(gram_b.sum(axis=0), cross_b.sum(axis=0)).T)
+    gram_b, cross_b = _moments(x, blocks.y, weight)
     gram, cross = gram_b.sum(axis=0), cross_b.sum(axis=0)
     beta = _solve(gram, cross)
     left = blocks.y - x @ beta.T
@@ -277,7 +261,7 @@ def fit(
         spread = inverse @ (score.T @ score) @ inverse * count / (count - 1)
         sd[j] = np.sqrt(np.maximum(np.diag(spread), np.diag(inverse)))
     # The delay's derivative -i 2π f M X is orthogonal to every real multiple of X itself, but not to Z.
-    model = (blocks.x * phase[:, :, None]) @ beta[:, :p].T
+    model = x[:, :, :p] @ beta[:, :p].T
     turn = beyond_nuisances(-2j * np.pi * frequency[None, :, None] * model, blocks.z, weight)
     w = weight.T[None]
     score = np.real(np.sum(w * turn.conj() * left, axis=(1, 2)))
@@ -318,12 +302,6 @@ def _peak(at: np.ndarray, score: np.ndarray) -> float:
     return float(at[k] + shift * (at[1] - at[0]))
 
 
-def loss_by_block(blocks: Blocks, found: LaggedFit, gain: np.ndarray, lag_s) -> np.ndarray:
-    """Weighted squares that a given M and delay leave in every block, (b, q); N as found."""
-    model = (blocks.x * delay(blocks.frequency_hz, lag_s)[:, :, None]) @ gain.T + blocks.z @ found.nuisance.T
-    return np.sum(found.weight.T[None] * np.abs(blocks.y - model) ** 2, axis=1)
-
-
 def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
     """Commands replaced by what a first-order motor makes of them, its time constant fitted jointly with the delay."""
     base = fit(blocks)
@@ -335,8 +313,10 @@ def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
         through = 1.0 / (1.0 + 2j * np.pi * blocks.frequency_hz * tau)
         trial = replace(blocks, x=blocks.x * through[None, :, None])
         found = fit(trial, DEAD_TIMES_S)
-        left = float(np.sum(loss_by_block(trial, weighted_as(found, base), found.gain, found.lag_s)))
-        trials[float(tau)] = (left, abs(found.lag_s), trial)
+        left = trial.y - trial.delayed(found.lag_s).x @ found.gain.T - trial.z @ found.nuisance.T
+        # By the weights of one fit, so that fits can be compared.
+        squares = float(np.sum(np.sum(base.weight.T[None] * np.abs(left) ** 2, axis=1)))
+        trials[float(tau)] = (squares, abs(found.lag_s), trial)
 
     for tau in MOTOR_LAGS_S:
         attempt(tau)
@@ -350,17 +330,3 @@ def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
     least = min(plausible, key=lambda tau: trials[tau][1])
     chosen = least if trials[least][1] < 0.5 * trials[best][1] else best
     return chosen, trials[chosen][2]
-
-
-def weighted_as(found: LaggedFit, base: LaggedFit) -> LaggedFit:
-    """A fit's numbers under another fit's weights, so that fits can be compared."""
-    return LaggedFit(
-        found.lag_s,
-        found.lag_sd,
-        found.gain,
-        found.gain_sd,
-        found.explained,
-        base.weight,
-        found.nuisance,
-        found.block_count,
-    )

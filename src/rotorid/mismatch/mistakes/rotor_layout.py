@@ -8,6 +8,7 @@ compete: each predicts roll, pitch and yaw acceleration from all squared speeds 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -17,10 +18,10 @@ from scipy.stats import t as student
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
-from rotorid.mismatch.mistakes.axes import Result, Turn, apply_turn, axis_finding, signals_of
+from rotorid.mismatch.mistakes.axes import Turn, turned
 from rotorid.mismatch.mistakes.lagged import OVERLAP, Blocks, LaggedFit, Signal
-from rotorid.mismatch.mistakes.signals import Signals, replace_columns, sensor_columns
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.mismatch.mistakes.signals import ReadSet, Result, Signals, replace_columns, sensor_columns
+from rotorid.recordings import Run, Vehicle
 
 YAW_BAND_HZ = (0.7, 15.0)
 MOST_ROTORS_FOR_EVERY_ORDER = 6
@@ -44,6 +45,10 @@ class Moments:
     """(n, k)."""
     gram: np.ndarray
     """(n, k, k)."""
+
+    def whole(self) -> tuple[float, np.ndarray, np.ndarray]:
+        """The three summed over the pieces."""
+        return float(self.square.sum()), self.cross.sum(axis=0), self.gram.sum(axis=0)
 
 
 def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> Moments:
@@ -71,23 +76,15 @@ def rows_of(vehicle: Vehicle) -> np.ndarray:
 
 def best_gain(m: Moments, row: np.ndarray) -> np.ndarray:
     """A row (k,) times its best positive gain."""
-    gram = row @ m.gram.sum(axis=0) @ row
-    return row * (max(m.cross.sum(axis=0) @ row / gram, 0.0) if gram > 0 else 0.0)
+    _, cross, gram = m.whole()
+    size = row @ gram @ row
+    return row * (max(cross @ row / size, 0.0) if size > 0 else 0.0)
 
 
 def loss(m: Moments, row: np.ndarray) -> float:
     """What a row (k,) leaves of an axis."""
-    return float(m.square.sum() - 2 * m.cross.sum(axis=0) @ row + row @ m.gram.sum(axis=0) @ row)
-
-
-def clearly_better(whole: float, believed: float, best: float, c: Contest) -> bool:
-    """Whether a layout that leaves `best` of `whole` is overwhelmingly better than one that leaves `believed`."""
-    return (
-        (believed - best) / OVERLAP > LEAST_LIKELIHOOD
-        and whole - best > LEAST_ADVANTAGE * (whole - believed)
-        and c.step > LEAST_STEP
-        and c.p_value < P_LIMIT
-    )
+    square, cross, gram = m.whole()
+    return float(square - 2 * cross @ row + row @ gram @ row)
 
 
 def tie(whole: float, best: float) -> float:
@@ -100,10 +97,10 @@ def losses_of_orders(m: list[Moments], rows: np.ndarray, orders: np.ndarray) -> 
     total = np.zeros(len(orders))
     for axis, part in enumerate(m):
         b = rows[axis][orders]
-        cross = b @ part.cross.sum(axis=0)
-        gram = np.einsum("hk,kl,hl->h", b, part.gram.sum(axis=0), b)
-        gain = np.where(gram > 0, np.maximum(cross, 0.0), 0.0)
-        total += part.square.sum() - gain**2 / np.maximum(gram, 1e-300)
+        square, cross, gram = part.whole()
+        size = np.einsum("hk,kl,hl->h", b, gram, b)
+        gain = np.where(size > 0, np.maximum(b @ cross, 0.0), 0.0)
+        total += square - gain**2 / np.maximum(size, 1e-300)
     return total
 
 
@@ -111,12 +108,10 @@ def orders_to_try(count: int) -> np.ndarray:
     """Orders of the columns: every one for few rotors, else every exchange of two; the believed one first."""
     if count <= MOST_ROTORS_FOR_EVERY_ORDER:
         return np.array(list(permutations(range(count))))
-    found = [tuple(range(count))]
-    for i, j in combinations(range(count), 2):
-        order = list(range(count))
+    exchanges = np.tile(np.arange(count), (1 + count * (count - 1) // 2, 1))
+    for order, (i, j) in zip(exchanges[1:], combinations(range(count), 2), strict=True):
         order[i], order[j] = j, i
-        found.append(tuple(order))
-    return np.array(found)
+    return exchanges
 
 
 def moves(order: np.ndarray) -> int:
@@ -132,18 +127,12 @@ def moves(order: np.ndarray) -> int:
     return len(order) - cycles
 
 
-@dataclass(frozen=True)
-class Contest:
-    """How far the data go from a believed prediction towards another, and how surely."""
+def contest(axis_moments: list[Moments], believed: list[np.ndarray], other: list[np.ndarray]) -> tuple[float, float]:
+    """How far the data go from a believed prediction (rows (k,) an axis, gains included) towards another.
 
-    step: float
-    """0: the believed one fits; 1: the other does."""
-    p_value: float
-    """That the step is zero, for pieces that are independent of each other."""
-
-
-def contest(axis_moments: list[Moments], believed: list[np.ndarray], other: list[np.ndarray]) -> Contest:
-    """Step along the difference of two predictions (rows (k,) an axis, gains included)."""
+    The step (0: the believed one fits; 1: the other does), and the p-value that it is zero, for pieces that are
+    independent of each other.
+    """
     scores, curvatures = [], []
     for m, old, new in zip(axis_moments, believed, other, strict=True):
         change = new - old
@@ -156,15 +145,15 @@ def contest(axis_moments: list[Moments], believed: list[np.ndarray], other: list
     sd = np.sqrt(max(np.sum(rest**2) * count / max(count - 1, 1), OVERLAP * curvature.sum())) / max(
         curvature.sum(), 1e-300
     )
-    return Contest(step, float(student.sf(step / sd, max(count - 1, 1))))
+    return step, float(student.sf(step / sd, max(count - 1, 1)))
 
 
-def find(recordings: RecordingSet) -> Result:
+def find(recordings: ReadSet) -> Result:
     """The layout (order of the columns, turning senses) that needs the fewest changes among those that fit."""
     vehicle = recordings.vehicle
-    if vehicle.kind != "flight" or not 3 <= vehicle.rotor_count <= 8:
+    if not 3 <= vehicle.rotor_count <= 8:
         return Result(recordings)
-    signals = signals_of(recordings)
+    signals = recordings.signals
     sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
     blocks = _thrust_blocks(signals, vehicle, sensor) if sensor else None
     free = lagged.fit(blocks)
@@ -187,8 +176,8 @@ def find(recordings: RecordingSet) -> Result:
     least = float(losses.min())
     tied = np.argwhere(losses <= tie(whole, least))
     ranked = sorted(tied.tolist(), key=lambda at: (costs[at[0], at[1]], losses[at[0], at[1]]))
-    order, turned = ranked[0]
-    if costs[order, turned] == 0:
+    order, spun = ranked[0]
+    if costs[order, spun] == 0:
         return Result(recordings)
     # Only axes on which the two layouts differ can distinguish them.
     contested, now, then = [], [], []
@@ -198,33 +187,32 @@ def find(recordings: RecordingSet) -> Result:
             now.append(best_gain(m, rows[a]))
             then.append(best_gain(m, rows[a][orders[order]]))
     same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
-    if yaw and turned != same:
+    if yaw and spun != same:
         contested.append(yaw)
         now.append(yaw_rows[same])
-        then.append(yaw_rows[turned])
-    outcome = contest(contested, now, then)
-    outcome = replace(outcome, p_value=min(1.0, outcome.p_value * losses.size))
+        then.append(yaw_rows[spun])
+    step, p_value = contest(contested, now, then)
+    p_value = min(1.0, p_value * losses.size)
     disputed = float(sum(m.square.sum() for m in contested))
-    left = [sum(loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then)]
-    if not clearly_better(disputed, left[0], left[1], outcome):
+    as_believed, best = (sum(loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then))
+    likely = (as_believed - best) / OVERLAP > LEAST_LIKELIHOOD
+    explains = disputed - best > LEAST_ADVANTAGE * (disputed - as_believed)
+    if not (likely and explains and step > LEAST_STEP and p_value < P_LIMIT):
         return Result(recordings)
-    checked = any({"attitude", "gyroscope"} <= set(s.values) for s in signals)
-    if not checked:
-        turned_gyroscope = _turned_gyroscope(
-            recordings, parts, rows, yaw, believed, tie(whole, least), int(costs[order, turned]), outcome.p_value
-        )
-        if turned_gyroscope:
-            return turned_gyroscope
-    rival = any(costs[a, b] == costs[order, turned] for a, b in ranked[1:])
+    cost = int(costs[order, spun])
+    if not any({"attitude", "gyroscope"} <= set(s.values) for s in signals):
+        gyroscope = _turned_gyroscope(recordings, parts, rows, yaw, believed, tie(whole, least), cost, p_value)
+        if gyroscope:
+            return gyroscope
+    rival = any(costs[a, b] == cost for a, b in ranked[1:])
     result = Result(recordings)
     if order:
-        result = _reordered(recordings, orders[order], outcome.p_value, rival)
-    turning = np.flatnonzero(senses[turned] != believed[orders[order]]) if yaw else np.zeros(0, int)
+        result = _reordered(recordings, orders[order], p_value, rival)
+    turning = np.flatnonzero(senses[spun] != believed[orders[order]]) if yaw else []
     if len(turning):
         # Columns are in order by now: column i belongs to rotor orders[order][i].
         rotors = sorted(int(orders[order][i]) for i in turning)
-        found = _turned(result.recordings, rotors, outcome.p_value, rival)
-        result = Result(found.recordings, result.findings + found.findings)
+        result = result.then(partial(_spun, rotors=rotors, p_value=p_value, ambiguous=rival))
     return result
 
 
@@ -235,7 +223,7 @@ def _turned_cost(senses: np.ndarray, expected: np.ndarray) -> np.ndarray:
 
 
 def _turned_gyroscope(
-    recordings: RecordingSet,
+    recordings: ReadSet,
     parts: list[Moments],
     rows: np.ndarray,
     yaw: Moments | None,
@@ -260,7 +248,8 @@ def _turned_gyroscope(
     if best is None or best[0] == cost and best[1].source == (0, 1, 2):
         return None
     note = "No attitude is recorded: the gyroscope's axes were identified from the believed rotors' moments."
-    finding = axis_finding(recordings, "gyroscope", best[1], p_value)
+    found = turned(recordings, "gyroscope", best[1], p_value)
+    finding = found.findings[0]
     if best[0] == cost:
         words = "; or else rotors are in another order than vehicle.yaml has them, which nothing recorded shows."
         finding = replace(
@@ -269,7 +258,7 @@ def _turned_gyroscope(
             alternatives=("axis_sign", "rotor_order"),
             sentence=finding.sentence.removesuffix(".") + words,
         )
-    return Result(apply_turn(recordings, "gyroscope", best[1]), (finding,), (note,))
+    return Result(found.recordings, (finding,), (note,))
 
 
 def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
@@ -281,7 +270,7 @@ def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blo
     return compare.gather(signals, ("gyroscope", sensor), compare.MOMENT_BAND_HZ, make)
 
 
-def _reordered(recordings: RecordingSet, order: np.ndarray, p: float, ambiguous: bool) -> Result:
+def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool) -> Result:
     """Column i belongs to rotor order[i] of vehicle.yaml."""
     names = sensor_columns(recordings.vehicle)
 
@@ -325,7 +314,7 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
     return moments(blocks, 0, late, free.weight[0]) if free else None
 
 
-def _turned(recordings: RecordingSet, rotors: list[int], p_value: float, ambiguous: bool) -> Result:
+def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: bool) -> Result:
     """The believed turning senses of some rotors reversed."""
     vehicle = recordings.vehicle
     every = len(rotors) == vehicle.rotor_count
@@ -354,7 +343,8 @@ def _yaw_row(m: Moments, signs: np.ndarray) -> np.ndarray:
     k = len(signs)
     basis = np.zeros((2 * k, 2))
     basis[:k, 0], basis[k:, 1] = signs, signs
-    gram, cross = basis.T @ m.gram.sum(axis=0) @ basis, basis.T @ m.cross.sum(axis=0)
+    _, cross, gram = m.whole()
+    gram, cross = basis.T @ gram @ basis, basis.T @ cross
     scale = 1 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
     root = np.sqrt(np.maximum(values, 1e-9))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import pandas as pd
 from scipy.interpolate import CubicSpline
 
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.plant.motion import continuous, fresh_samples, own_rate_hz, rotation_matrices
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
@@ -37,6 +38,18 @@ def sensor_columns(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
         "velocity": c.VELOCITY,
         "position": c.POSITION,
     }
+
+
+SENSOR_WORDS = {
+    "rotors": "the rotor speeds",
+    "commands": "the commands",
+    "throttle": "the throttle",
+    "gyroscope": "the gyroscope",
+    "accelerometer": "the accelerometer",
+    "attitude": "the attitude",
+    "velocity": "the velocity",
+    "position": "the position",
+}
 
 
 def channel_of(column: str, vehicle: Vehicle) -> str:
@@ -121,10 +134,25 @@ def replace_columns(recordings: RecordingSet, change) -> RecordingSet:
     return replace(recordings, runs=tuple(runs))
 
 
-def scaled(recordings: RecordingSet, names: tuple[str, ...], factor: float) -> RecordingSet:
-    """The set with some columns multiplied by a factor in every run that has them."""
+def replace_sensor(recordings: RecordingSet, sensor: str, change: Callable[[np.ndarray], np.ndarray]) -> RecordingSet:
+    """The set with a sensor's readings (n, m) passed through `change` in every run that has all of them."""
+    names = sensor_columns(recordings.vehicle)[sensor]
 
-    def change(run: Run) -> dict[str, pd.Series]:
-        return {n: run.table[n] * factor for n in names if n in run.table.columns}
+    def changed(run: Run):
+        return dict(zip(names, change(run.array(names)).T, strict=True)) if run.has(*names) else None
 
-    return replace_columns(recordings, change)
+    return replace_columns(recordings, changed)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A set as corrected so far, and what was found."""
+
+    recordings: ReadSet
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def then(self, step: Callable[[ReadSet], Result]) -> Result:
+        """The same after a further step, which looks at the set as corrected so far."""
+        found = step(self.recordings)
+        return Result(found.recordings, self.findings + found.findings, self.notes + found.notes)

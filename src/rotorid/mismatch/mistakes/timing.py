@@ -8,22 +8,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import combinations, permutations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.stats import t as student
 
 from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decision.words import capital, listed
 from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
-from rotorid.mismatch.mistakes.axes import Result, signals_of
 from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit
-from rotorid.mismatch.mistakes.signals import COMMANDED, Signals, replace_columns, sensor_columns
-from rotorid.mismatch.plant.motion import fresh_samples
+from rotorid.mismatch.mistakes.signals import (
+    COMMANDED,
+    SENSOR_WORDS,
+    ReadSet,
+    Result,
+    Signals,
+    on_grid,
+    replace_columns,
+    sensor_columns,
+)
 from rotorid.mismatch.posterior.status import Estimate
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import Run, Vehicle
 
 LEAST_ALONE = 0.9
 """Share of the motion that commands must explain to show a constant lateness: below it the motors' lag, fitted later,
@@ -68,11 +75,35 @@ SCALES = (0.85, 1.25)
 
 
 @dataclass(frozen=True)
+class Comparison:
+    """Two sensors that may show each other's time."""
+
+    late: str
+    """The later one."""
+    over: str
+    """The earlier one."""
+    blocks: Blocks
+    fit: LaggedFit
+    motor_s: float
+    """Motor lag taken out of the command first."""
+    shares: tuple[tuple[str, float], ...]
+    """Earlier sensors, and by which share of its own lateness each moves this one; the shares sum to one."""
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Every sensor of which the lateness counts."""
+        return self.late, *(name for name, _ in self.shares)
+
+    def part(self, sensors: Sequence[str]) -> float:
+        """By which share of their own lateness some sensors, late together, move this one."""
+        return float(self.late in sensors) - sum(share for name, share in self.shares if name in sensors)
+
+
+@dataclass(frozen=True)
 class Difference:
     """Lateness of one sensor over another at the start of a run, and how it grows."""
 
-    late: str
-    over: str
+    of: Comparison
     start_s: float
     growth: float
     """s/s."""
@@ -83,17 +114,10 @@ class Difference:
     pieces: int
     """Independent pieces of the spectra, from which the covariance is."""
     explained: float
-    motor_s: float
-    """Motor lag taken out of the command first."""
     gained: float
     """Rise of the log-likelihood by the growth over the best constant."""
-    shares: tuple[tuple[str, float], ...]
-    """Earlier sensors, and by which share of its own lateness each moves this one; the shares sum to one."""
-    bias_s: float = 0.0
+    bias_s: float
     """The most that disturbances, which the rotors answer in a closed loop, can feign of lateness."""
-    longest_s: float = 0.0
-    """Length of the longest run."""
-    runs: int = 1
 
     def sd(self, key: int) -> float:
         """One sigma of lateness (key 0) or growth (1)."""
@@ -107,34 +131,23 @@ class Difference:
         of their number.
         """
         if key == 0:
-            return max(self.bias_s, MOTOR_FORM * self.motor_s)
-        disturbed = 2 * self.bias_s / np.sqrt(self.runs) / max(self.longest_s, 1e-9)
-        return max(disturbed, MOTOR_SLOWS_PER_S * self.motor_s)
-
-    def part(self, sensors: list[str]) -> float:
-        """By which share of their own lateness some sensors, late together, move this one."""
-        return float(self.late in sensors) - sum(share for name, share in self.shares if name in sensors)
+            return max(self.bias_s, MOTOR_FORM * self.of.motor_s)
+        blocks = self.of.blocks
+        longest_s = float(blocks.time_s.max()) + lagged.BLOCK_S / 2
+        disturbed = 2 * self.bias_s / np.sqrt(len(np.unique(blocks.run))) / longest_s
+        return max(disturbed, MOTOR_SLOWS_PER_S * self.of.motor_s)
 
 
-def find(recordings: RecordingSet) -> Result:
+def find(recordings: ReadSet) -> Result:
     """Clocks that drift first, then constant delays."""
-    if recordings.vehicle.kind != "flight":
-        return Result(recordings)
-    known = comparisons(signals_of(recordings), recordings.vehicle)
+    known = comparisons(recordings)
     result = _skew(recordings, known)
-    if result.findings:
-        known = comparisons(signals_of(result.recordings), recordings.vehicle)
-    found = _delay(result.recordings, known)
-    return Result(found.recordings, result.findings + found.findings, result.notes + found.notes)
+    return result.then(partial(_delay, known=comparisons(result.recordings) if result.findings else known))
 
 
-Shares = tuple[tuple[str, float], ...]
-
-
-def comparisons(
-    all_signals: list[Signals], vehicle: Vehicle
-) -> list[tuple[str, str, Blocks, LaggedFit, float, Shares]]:
-    """Every comparison that may show time: later and earlier sensor, spectra, fit, motor lag taken out (s), shares."""
+def comparisons(recordings: ReadSet) -> list[Comparison]:
+    """Every comparison of two sensors that may show time."""
+    all_signals, vehicle = recordings.signals, recordings.vehicle
     have = set().union(*(s.values for s in all_signals))
     speeds = next((n for n in map(compare.speeds_of, all_signals) if n), None)
     force = "accelerometer" if "accelerometer" in have else None
@@ -161,9 +174,8 @@ def comparisons(
     for late, over, blocks in pairs:
         if blocks is None:
             continue
-        shares: Shares = ((over, 1.0),)
-        motor_s = 0.0
-        if over in ("commands", "throttle"):
+        shares, motor_s = ((over, 1.0),), 0.0
+        if over in COMMANDED:
             motor_s, blocks = lagged.through_motor(blocks)
         if over == "gyroscope" or (late == "velocity" and source == "accelerometer"):
             blocks = one_quantity(blocks, [2] if (late, over) == ("velocity", source) else range(blocks.y.shape[2]))
@@ -174,7 +186,7 @@ def comparisons(
             continue
         if late == "velocity":
             shares = shares_of(all_signals, vehicle, source, [0, 1] if over == "attitude" else [2], found)
-        out.append((late, over, blocks, found, motor_s, shares))
+        out.append(Comparison(late, over, blocks, found, motor_s, shares))
     return out
 
 
@@ -201,7 +213,7 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
 
 def shares_of(
     all_signals: list[Signals], vehicle: Vehicle, source: str, outputs: list[int], found: LaggedFit
-) -> Shares:
+) -> tuple[tuple[str, float], ...]:
     """By how much the lateness of the velocity follows that of the attitude, and that of the force turned by it.
 
     In gentle flight level motion follows the tilt; in a fast one the force itself changes more. Both late together move
@@ -223,41 +235,31 @@ def _late(signals: Signals, sensor: str, steps: int) -> Signals:
     """Signals with one sensor written some samples late."""
     if sensor not in signals.values:
         return signals
-    values = np.full_like(signals.values[sensor], np.nan)
-    values[steps:] = signals.values[sensor][:-steps]
-    return replace(signals, values={**signals.values, sensor: values})
+    return replace(signals, values={**signals.values, sensor: _moved(signals.values[sensor], -steps)})
 
 
-def difference(
-    late: str,
-    over: str,
-    blocks: Blocks,
-    found: LaggedFit,
-    motor_s: float,
-    shares: Shares,
-    drifting: bool,
-    free: bool = True,
-) -> Difference:
+def difference(of: Comparison, drifting: bool, free: bool = True) -> Difference:
     """Lateness, and its growth if asked for, at the likelihood's peak.
 
     Where `free`, gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the
     first fit.
     """
+    blocks, found = of.blocks, of.fit
     longest = LONGEST_DRIFT_S if drifting else lagged.LONGEST_LAG_S
     lags = np.arange(-longest, longest + 1e-9, LAG_STEP_S)
     # Only the fast comparisons with the gyroscope blur beyond recognition.
-    if free and drifting and np.min(found.explained) < LEAST_EXPLAINED and "gyroscope" in (late, over):
+    if free and drifting and np.min(found.explained) < LEAST_EXPLAINED and "gyroscope" in (of.late, of.over):
         found = unblurred(blocks, found)
     start, growth = found.lag_s, 0.0
     for _ in range(3 if drifting else 1):
         curves = likelihood(blocks, found, lags)
         middle = start + growth * float(blocks.time_s.mean())
         start, growth = _peak(lags, curves, blocks.time_s, middle, drifting)
-        phase = lagged.delay(blocks.frequency_hz, start + growth * blocks.time_s)
+        aligned = blocks.delayed(start + growth * blocks.time_s)
         if free:
-            found = lagged.fit(replace(blocks, x=blocks.x * phase[:, :, None]), np.zeros(1))
+            found = lagged.fit(aligned, np.zeros(1))
     # Newton's steps to the peak itself, and the likelihood's shape there.
-    model = (blocks.x * phase[:, :, None]) @ found.gain.T
+    model = aligned.x @ found.gain.T
     turn = -2j * np.pi * blocks.frequency_hz[None, :, None] * model
     turn = lagged.beyond_nuisances(turn, blocks.z, found.weight)
     left = blocks.y - model - blocks.z @ found.nuisance.T
@@ -282,27 +284,12 @@ def difference(
     gained = 0.0
     if drifting:
         # The aligned fit's likelihood at no further lag is that of the drift itself.
-        drift = likelihood(replace(blocks, x=blocks.x * phase[:, :, None]), found, np.zeros(1)).sum()
+        drift = likelihood(aligned, found, np.zeros(1)).sum()
         gained = float(drift - likelihood(blocks, found, lags).sum(axis=0).max())
     explained = float(np.min(found.explained))
-    bias = disturbed_s(blocks, found) if over == "rotors" or (over in COMMANDED and late != "rotors") else 0.0
-    longest = float(blocks.time_s.max()) + lagged.BLOCK_S / 2
-    return Difference(
-        late,
-        over,
-        start,
-        growth,
-        covariance,
-        rise,
-        len(time_s),
-        explained,
-        motor_s,
-        gained,
-        shares,
-        bias,
-        longest,
-        len(np.unique(blocks.run)),
-    )
+    answered = of.over == "rotors" or (of.over in COMMANDED and of.late != "rotors")
+    bias_s = disturbed_s(blocks, found) if answered else 0.0
+    return Difference(of, start, growth, covariance, rise, len(time_s), explained, gained, bias_s)
 
 
 def disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
@@ -324,8 +311,7 @@ def unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
     aside = blocks.time_s - blocks.time_s.mean()
     best = found
     for rate in np.arange(-COARSE_SKEWS, COARSE_SKEWS + 1) * LARGEST_SKEW / COARSE_SKEWS:
-        phase = lagged.delay(blocks.frequency_hz, rate * aside)
-        trial = lagged.fit(replace(blocks, x=blocks.x * phase[:, :, None]), COARSE_LAGS_S)
+        trial = lagged.fit(blocks.delayed(rate * aside), COARSE_LAGS_S)
         if np.min(trial.explained) > np.min(best.explained):
             best = trial
     return best
@@ -347,46 +333,53 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
     return np.cos(angle), np.sin(angle)
 
 
-def telling_differences(known: list, drifting: bool) -> tuple[list[Difference], list]:
-    """Every difference of lateness that a comparison is good enough to show, and those comparisons."""
-    found = [(difference(*c, drifting=drifting), c) for c in known]
-    kept = [
-        (d, c)
-        for d, c in found
-        if d.explained > (LEAST_ALONE if d.over in COMMANDED and not drifting else LEAST_EXPLAINED)
-    ]
-    return [d for d, _ in kept], [c for _, c in kept]
+def differences(known: list[Comparison], drifting: bool) -> list[Difference]:
+    """Every difference of lateness that a comparison is good enough to show."""
+    least = dict.fromkeys(COMMANDED, LEAST_EXPLAINED if drifting else LEAST_ALONE)
+    found = [difference(c, drifting) for c in known]
+    return [d for d in found if d.explained > least.get(d.of.over, LEAST_EXPLAINED)]
 
 
-def differences(known: list, drifting: bool) -> list[Difference]:
-    """The differences of `telling_differences` alone."""
-    return telling_differences(known, drifting)[0]
-
-
-def across(differences: list[Difference], wrong: list[str], key: int) -> tuple[float, float]:
+def across(differences: Sequence[Difference], wrong: Sequence[str], key: int) -> tuple[float, float]:
     """Lateness (key 0) or growth (1) of some sensors over the rest, and one sigma, from comparisons between the two.
 
     What disturbances can feign counts as another one sigma: it is a bound, and seldom met.
     """
     values, weights = [], []
     for d in differences:
-        part = d.part(wrong)
+        part = d.of.part(wrong)
         if abs(part) > LEAST_SHARE:
             values.append((d.growth if key else d.start_s) / part)
             weights.append(part**2 / (d.sd(key) ** 2 + d.bound(key) ** 2))
     return float(np.average(values, weights=weights)), float(1.0 / np.sqrt(np.sum(weights)))
 
 
-def in_every_run(whole: Difference, comparison: tuple) -> bool:
+def remeasured(
+    recordings: ReadSet, wrong: Sequence[str], key: int, first: float, aside: Sequence[str] = ()
+) -> tuple[float, float] | None:
+    """What is left of the lateness (key 0) or growth (1) of some sensors of a set in which a `first` estimate of it is
+    taken out, added to that; and its one sigma.
+
+    From close by, where the blocks of two sensors hold the same motion. Comparisons with sensors `aside` do not count;
+    None where none is left.
+    """
+    again = [d for d in differences(comparisons(recordings), drifting=bool(key)) if not {*aside} & {*d.of.sensors}]
+    if not any(abs(d.of.part(wrong)) > LEAST_SHARE for d in again):
+        return None
+    rest, sd = across(again, wrong, key)
+    return first + rest, sd
+
+
+def in_every_run(whole: Difference) -> bool:
     """Whether each run by itself shows the growth: what acts in part of a flight only must not pass for a clock."""
-    late, over, blocks, found, motor_s, shares = comparison
+    blocks = whole.of.blocks
     agree, shown = [], []
     for run in np.unique(blocks.run):
         own = blocks.part(blocks.run == run)
         if own.count < 2:
             continue
         # A run of a few blocks cannot determine gains of its own.
-        d = difference(late, over, own, found, motor_s, shares, drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
+        d = difference(replace(whole.of, blocks=own), drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
         sd = d.sd(1)
         agree.append(abs(d.growth - whole.growth) < RUN_SIGMAS * sd + RUN_AGREEMENT * abs(whole.growth))
         due = min(LEAST_LIKELIHOOD, whole.gained * own.count / blocks.count) / 4
@@ -452,12 +445,8 @@ class Lateness:
 
 def lateness(differences: list[Difference], key: int) -> Lateness:
     """Lateness (key 0) or growth (key 1) of every sensor by weighted least squares."""
-    names = sorted({d.late for d in differences} | {n for d in differences for n, _ in d.shares})
-    rows = np.zeros((len(differences), len(names)))
-    for k, d in enumerate(differences):
-        rows[k, names.index(d.late)] = 1.0
-        for name, share in d.shares:
-            rows[k, names.index(name)] -= share
+    names = sorted({n for d in differences for n in d.of.sensors})
+    rows = np.array([[d.of.part([n]) for n in names] for d in differences])
     target = np.array([d.growth if key else d.start_s for d in differences])
     sd, bound = (np.array([f(key) for f in fs]) for fs in zip(*((d.sd, d.bound) for d in differences), strict=True))
     scale = 1.0 / np.hypot(sd, bound)
@@ -468,8 +457,8 @@ def lateness(differences: list[Difference], key: int) -> Lateness:
 def _connected(names: list[str], differences: list[Difference]) -> list[list[str]]:
     groups = [{n} for n in names]
     for d in differences:
-        for name, _ in d.shares:
-            a = next(g for g in groups if d.late in g)
+        for name, _ in d.of.shares:
+            a = next(g for g in groups if d.of.late in g)
             b = next(g for g in groups if name in g)
             if a is not b:
                 a |= b
@@ -559,21 +548,8 @@ def own_period_s(all_signals: list[Signals]) -> dict[str, float]:
     return out
 
 
-WORDS = {
-    "rotors": "the rotor speeds",
-    "commands": "the commands",
-    "throttle": "the throttle",
-    "gyroscope": "the gyroscope",
-    "accelerometer": "the accelerometer",
-    "attitude": "the attitude",
-    "velocity": "the velocity",
-    "position": "the position",
-}
-
-
-def _listed(sensors: list[str]) -> str:
-    words = [WORDS[s] for s in sensors]
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+def _listed(sensors: Sequence[str]) -> str:
+    return listed([SENSOR_WORDS[s] for s in sensors])
 
 
 def one_clock(differences: list[Difference], growing: list[Difference]) -> tuple[str, ...]:
@@ -582,41 +558,41 @@ def one_clock(differences: list[Difference], growing: list[Difference]) -> tuple
     Candidates are the two sides of the comparisons with a significant growth. Nothing but height rests on the
     position, so that it is none of them.
     """
-    names = {n for d in growing for n in (d.late, *(name for name, _ in d.shares))} - {"position"}
+    names = {n for d in growing for n in d.of.sensors} - {"position"}
     left = {}
     for name in names:
         rate, _ = across(differences, [name], 1)
         left[name] = sum(
-            (d.growth - d.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
+            (d.growth - d.of.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
         )
     trusted = {n: PREFERRED.index(n) if n in PREFERRED else len(PREFERRED) for n in names}
     alike = [n for n in names if left[n] < min(left.values()) + AS_WELL]
     return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
 
 
-def _skew(recordings: RecordingSet, known: list) -> Result:
+def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
     """Sensors whose lateness grows."""
-    signals = signals_of(recordings)
-    found, sources = telling_differences(known, drifting=True)
+    signals = recordings.signals
+    found = differences(known, drifting=True)
     longest = max((s.time_s[-1] - s.time_s[0] for s in signals), default=0.0)
     periods = own_period_s(signals)
     growing = []
-    for d, source in zip(found, sources, strict=True):
+    for d in found:
         beyond = abs(d.growth) - d.bound(1)
         p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.pieces - 2, 1)))
-        slowest = max(periods[n] for n in (d.late, *(name for name, _ in d.shares)))
-        if p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > LEAST_LIKELIHOOD:
-            if not in_every_run(d, source):
-                continue
+        slowest = max(periods[n] for n in d.of.sensors)
+        significant = p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > LEAST_LIKELIHOOD
+        if significant and in_every_run(d):
             growing.append((p, d))
     if not growing:
         return Result(recordings)
     solved = lateness(found, 1)
-    drift = relative_to_most(solved, {n: 0.5 * max(periods[n], 2e-3) / longest for n in solved.names}, 3.0)
+    least = {n: 0.5 * max(periods[n], 2e-3) / longest for n in solved.names}
+    drift = relative_to_most(solved, least, 3.0)
     wrong = [
         n
         for n, (value, sd, bound) in drift.items()
-        if abs(value) > 0.5 * max(periods[n], 2e-3) / longest + 3 * sd + bound and abs(value) * longest > periods[n]
+        if abs(value) > least[n] + 3 * sd + bound and abs(value) * longest > periods[n]
     ]
     wrong = [n for n in wrong if n != "position" or {"velocity", "attitude"} & set(wrong)]
     other = ""
@@ -635,38 +611,30 @@ def _skew(recordings: RecordingSet, known: list) -> Result:
     wrong = max(sides, key=len)
     rate, sd = across(found, wrong, 1)
     # Large drifts move the motion out of its block: measured once more with the first estimate taken out.
-    nearly = recordings
-    for sensor in wrong:
-        nearly = shifted(nearly, sensor, 0.0, rate)
-    again = differences(comparisons(signals_of(nearly), recordings.vehicle), drifting=True)
-    if any(abs(d.part(wrong)) > LEAST_SHARE for d in again):
-        rest, sd = across(again, wrong, 1)
-        rate += rest
-    everywhere = wrong + (["position"] if {"velocity", "attitude"} <= set(wrong) and "position" not in wrong else [])
-    fixed = recordings
-    for sensor in everywhere:
-        fixed = shifted(fixed, sensor, 0.0, rate)
-    columns = [sensor_columns(recordings.vehicle)[n][0] for n in wrong]
+    rate, sd = remeasured(shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
+    change = "fall behind by" if rate > 0 else "gain"
     finding = Finding(
         id="clock_skew",
         status="established",
         sentence=(
-            f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps fall behind by {1e3 * rate:.2f} ms "
-            f"every second; put on the other sensors' time."
-            if rate > 0
-            else f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps gain {-1e3 * rate:.2f} ms "
+            f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps {change} {1e3 * abs(rate):.2f} ms "
             f"every second; put on the other sensors' time."
         ),
         parameters=(Estimate("skew", rate, "1", rate - 1.96 * sd, rate + 1.96 * sd),),
-        p_value=max(min(p for p, _ in growing), 0.0),
-        channels=tuple(columns),
+        p_value=min(p for p, _ in growing),
+        channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in wrong),
     )
-    return Result(fixed, (finding,))
+    return Result(shifted(recordings, with_position(wrong), 0.0, rate), (finding,))
 
 
-def _delay(recordings: RecordingSet, known: list) -> Result:
+def with_position(sensors: list[str]) -> list[str]:
+    """Sensors, with the position where velocity and attitude are both among them: one clock stamps the three."""
+    return [*sensors, "position"] if {"velocity", "attitude"} <= {*sensors} and "position" not in sensors else sensors
+
+
+def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
     """Sensors that are late by a constant of more than one sample."""
-    signals = signals_of(recordings)
+    signals = recordings.signals
     periods = own_period_s(signals)
     found = differences(known, drifting=False)
     if not found:
@@ -679,7 +647,7 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
     tolerance = {n: max(periods[n], 3 * sd) for n, (_, sd, _) in relative.items()}
     wrong, notes, limits = [], [], {}
     for n, (value, sd, bound) in relative.items():
-        touching = [d for d in found if abs(d.part([n])) > LEAST_SHARE]
+        touching = [d for d in found if abs(d.of.part([n])) > LEAST_SHARE]
         limit = limits[n] = max(periods[n], sample, bound)
         count = max(d.pieces for d in touching)
         p = float(student.sf((abs(value) - limit) / max(sd, 1e-9), max(count - 2, 1)))
@@ -696,31 +664,23 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
     own = [c[0] for c in clusters if len(c) == 1 and c[0] in SMALL_LAGS and abs(late[c[0]]) < small]
     for sensor in own:
         notes.append(
-            f"{WORDS[sensor].capitalize()}: {1e3 * late[sensor]:+.1f} ms against the rest, {SMALL_LAGS[sensor]}."
+            f"{capital(SENSOR_WORDS[sensor])}: {1e3 * late[sensor]:+.1f} ms against the rest, {SMALL_LAGS[sensor]}."
         )
         if sensor in INERTIAL:
-            fixed = shifted(fixed, sensor, late[sensor], 0.0)
+            fixed = shifted(fixed, [sensor], late[sensor])
     unfiltered = fixed
     for cluster in clusters:
         if cluster[0] in own:
             continue
         others = [n for n, _ in wrong if n not in cluster and n not in own]
         amount, sd = float(np.mean([late[n] for n in cluster])), max(relative[n][1] for n in cluster)
-        everywhere = cluster + (["position"] if {"velocity", "attitude"} <= set(cluster) else [])
-        nearly, steps = unfiltered, round(amount / sample) * sample
-        for sensor in everywhere:
-            nearly = shifted(nearly, sensor, steps, 0.0)
-        again = differences(comparisons(signals_of(nearly), recordings.vehicle), drifting=False)
-        again = [d for d in again if not _touches(d, others)]
-        if any(abs(d.part(cluster)) > LEAST_SHARE for d in again):
-            # Measured once more from close by, where the blocks of the two sensors hold the same motion.
-            rest, sd = across(again, cluster, 0)
-            amount = steps + rest
+        steps = round(amount / sample) * sample
+        nearly = shifted(unfiltered, with_position(cluster), steps)
+        amount, sd = remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
         if abs(amount) < min(limits[n] for n in cluster):
-            notes.append(f"{_listed(cluster).capitalize()}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
+            notes.append(f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
             continue
-        for sensor in everywhere:
-            fixed = shifted(fixed, sensor, amount, 0.0)
+        fixed = shifted(fixed, with_position(cluster), amount)
         word = "late" if amount > 0 else "early"
         findings.append(
             Finding(
@@ -740,11 +700,6 @@ def _delay(recordings: RecordingSet, known: list) -> Result:
     return Result(fixed, tuple(findings), tuple(notes))
 
 
-def _touches(d: Difference, sensors: list[str]) -> bool:
-    """Whether a comparison has one of some sensors on either side."""
-    return d.late in sensors or any(name in sensors for name, _ in d.shares)
-
-
 def _clusters(names: list[str], values: dict[str, float], tolerance: dict[str, float]) -> list[list[str]]:
     out: list[list[str]] = []
     for n in sorted(names, key=lambda m: values[m]):
@@ -755,44 +710,34 @@ def _clusters(names: list[str], values: dict[str, float], tolerance: dict[str, f
     return out
 
 
-def shifted(recordings: RecordingSet, sensor: str, late_s: float, growth: float) -> RecordingSet:
-    """The set with a sensor's columns moved earlier by `late_s` + `growth` × time since the run's start.
+def shifted(recordings: ReadSet, sensors: Sequence[str], late_s: float, growth: float = 0.0) -> ReadSet:
+    """The set with some sensors' columns moved earlier by `late_s` + `growth` × time since the run's start.
 
     Evenly sampled columns move by whole samples, which leaves their noise as it is; the rest (below half a
     sample) stays for the analysis to carry. A growing shift is interpolated.
     """
-    names = [n for n in sensor_columns(recordings.vehicle)[sensor]]
 
-    def change(run: Run):
-        present = [n for n in names if run.has(n)]
-        if not present:
-            return None
-        t, values = run.time_s, run.array(tuple(present))
+    def change(run: Run) -> dict[str, np.ndarray]:
+        t, columns = run.time_s, {}
         period = float(np.median(np.diff(t)))
         even = np.max(np.abs(np.diff(t) - period)) < 0.1 * period
-        if even and growth == 0.0:
-            steps = int(np.round(late_s / period))
-            out = np.full_like(values, np.nan)
-            if steps >= 0:
-                out[: len(out) - steps] = values[steps:]
+        for sensor in sensors:
+            present = tuple(n for n in sensor_columns(recordings.vehicle)[sensor] if run.has(n))
+            if not present:
+                continue
+            values = run.array(present)
+            if even and growth == 0.0:
+                out = _moved(values, int(np.round(late_s / period)))
             else:
-                out[-steps:] = values[:steps]
-        else:
-            asked = t + late_s + growth * (t - t[0])
-            out = _read_at(t, values, asked)
-        return {n: out[:, k] for k, n in enumerate(present)}
+                out = on_grid(t, values, t + late_s + growth * (t - t[0]))
+            columns |= dict(zip(present, out.T, strict=True))
+        return columns
 
     return replace_columns(recordings, change)
 
 
-def _read_at(t: np.ndarray, values: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Readings (n, m) at other instants, cubic between fresh samples, NaN where the recording has none."""
-    keep = fresh_samples(values)
-    if keep.sum() < 4:
-        return values
-    out = CubicSpline(t[keep], values[keep], axis=0, extrapolate=False)(asked)
-    gap = np.diff(t[keep])
-    longest = 6 * float(np.median(gap))
-    left = np.clip(np.searchsorted(t[keep], asked) - 1, 0, len(gap) - 1)
-    out[gap[left] > longest] = np.nan
+def _moved(values: np.ndarray, steps: int) -> np.ndarray:
+    """Readings (n, m) some samples earlier, NaN where there are none."""
+    out = np.full_like(values, np.nan)
+    out[max(-steps, 0) : len(out) - max(steps, 0)] = values[max(steps, 0) : len(out) - max(-steps, 0)]
     return out

@@ -15,11 +15,9 @@ from scipy.signal import lfilter
 from scipy.stats import gamma
 
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes.axes import signals_of
-from rotorid.mismatch.mistakes.signals import Signals
+from rotorid.mismatch.mistakes.signals import ReadSet, Result, Signals
 from rotorid.mismatch.plant.motion import full_speed
 from rotorid.mismatch.posterior.status import Estimate
-from rotorid.recordings import RecordingSet
 from rotorid.recordings import columns as c
 
 WINDOW_S = 0.35
@@ -55,10 +53,8 @@ class Line:
     p_value: float
 
 
-def find(recordings: RecordingSet) -> Finding | None:
-    """A vibration that follows the rotors, None where there is no clear one."""
-    if recordings.vehicle.kind != "flight":
-        return None
+def find(recordings: ReadSet) -> Result:
+    """A vibration that follows the rotors, if there is a clear one; the set stays as it is."""
     signals = turning(recordings)
     lines = []
     for sensor, columns, unit in (
@@ -72,11 +68,11 @@ def find(recordings: RecordingSet) -> Finding | None:
                 if line and line.p_value < P_LIMIT and line.over_noise > LEAST_AMPLITUDE:
                     lines.append(line)
     if not lines:
-        return None
+        return Result(recordings)
     lines.sort(key=lambda x: x.p_value)
     strongest = max(lines, key=lambda x: (x.column.startswith("specific"), x.amplitude))
     where = ", ".join(dict.fromkeys(x.column for x in lines))
-    return Finding(
+    finding = Finding(
         id="vibration",
         status="established",
         sentence=(
@@ -88,14 +84,15 @@ def find(recordings: RecordingSet) -> Finding | None:
         p_value=lines[0].p_value,
         channels=tuple(dict.fromkeys(x.column for x in lines)),
     )
+    return Result(recordings, (finding,))
 
 
-def turning(recordings: RecordingSet) -> list[Signals]:
+def turning(recordings: ReadSet) -> list[Signals]:
     """Signals of the runs with their rotors' speed: as read, or as commanded, at the scale at which a line stands out.
 
     A command is followed late, and its full speed is only believed: half a window's turn too much hides a line.
     """
-    everything = signals_of(recordings)
+    everything = recordings.signals
     read = [s for s in everything if "rotors" in s.values]
     if read:
         return read

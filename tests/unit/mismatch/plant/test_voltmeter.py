@@ -77,8 +77,9 @@ def test_a_voltmeter_that_is_not_connected_is_not_believed():
     sound = dead.assign(battery_voltage_v=12.0)
     holes = sound.assign(battery_voltage_v=np.where(np.arange(100) % 10 == 0, 0.0, 12.0))
     recordings = RecordingSet("s", None, (Run("a", dead), Run("b", sound), Run("c", holes)))
-    fixed, notes = connected(recordings)
-    assert notes == ("battery_voltage_v of a reads below 0.5 V: taken as not connected.",)
+    found = connected(recordings)
+    fixed = found.recordings
+    assert found.notes == ("battery_voltage_v of a reads below 0.5 V: taken as not connected.",)
     assert not fixed.runs[0].has("battery_voltage_v")
     assert fixed.runs[1] is recordings.runs[1]
     left = fixed.runs[2].column("battery_voltage_v")
