@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.io.text.files import read_yaml
-from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
+from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE
 from rotorid.recordings import read_set
 from rotorid.report import log
 from rotorid_proof import campaign, quoted
@@ -37,7 +37,7 @@ def main(
     judged = [json.loads(Path(path).read_text(encoding="utf-8")) for path in verdicts]
     found = {verdict["set"]: verdict for verdict in judged}
     state = {"verdicts": {name: quoted.said(verdict) for name, verdict in found.items()}}
-    state["thresholds"] = {"explained": EXPLAINED_SHARE, "unexplained": UNEXPLAINED_SHARE}
+    state["thresholds"] = {"explained": EXPLAINED_SHARE, "unexplained": 1.0 - EXPLAINED_SHARE}
     rows = [row for name, verdict in found.items() for row in quoted.channels(name, verdict)]
     pd.DataFrame(rows, columns=quoted.CHANNEL_COLUMNS).to_csv(out["channels"], index=False, float_format="%.6g")
     if LINE in found:

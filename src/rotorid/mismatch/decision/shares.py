@@ -11,10 +11,8 @@ from rotorid.effects.loading import Loading
 from rotorid.mismatch.decision.findings import Analysis, Finding
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz, build_segments, full_speed
 from rotorid.mismatch.plant.readings import form_reading
-from rotorid.mismatch.plant.rows import project
+from rotorid.mismatch.plant.rows import GROUPS, project
 from rotorid.mismatch.plant.split import training_rule
-
-GROUPS = ("force", "moment", "accelerometer", "gyroscope")
 
 
 def segments_of(analysis: Analysis) -> list[Segment] | list[Loading]:

@@ -16,10 +16,9 @@ import numpy as np
 from rotorid.mismatch.decision.drift import drift_m
 from rotorid.mismatch.decision.findings import Analysis, Trace
 from rotorid.mismatch.decision.shares import fitted_part
-from rotorid.mismatch.decision.words import number
+from rotorid.mismatch.decision.words import channel_words, number
 from rotorid.recordings import Vehicle
 
-AXES = ("roll", "pitch", "yaw")
 FASTEST_RAD_S = 1.0
 """A body rate against which errors between gyroscope and attitude are stated."""
 
@@ -51,9 +50,9 @@ def of_flight(vehicle: Vehicle) -> dict[str, Scale]:
     x, y, _ = np.abs(vehicle.rotor_positions_m()).T
     moments = (y @ thrust, x @ thrust, vehicle.torque_coefficients_n_m_s2().sum() * hover**2)
     out = {f"force_{axis}": Scale(weight, "of the weight") for axis in "xyz"}
-    for axis, name, moment in zip("xyz", AXES, moments, strict=True):
+    for axis, moment in zip("xyz", moments, strict=True):
         if moment > 0:
-            out[f"moment_{axis}"] = Scale(float(moment), f"of the available {name} moment")
+            out[f"moment_{axis}"] = Scale(float(moment), f"of the available {channel_words(f'moment_{axis}')}")
     out |= {f"rotor_speed_{i + 1}": Scale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
     out |= {f"accelerometer_{axis}": Scale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
     return out | {f"gyroscope_{axis}": Scale(FASTEST_RAD_S, "of 1 rad/s") for axis in "xyz"}

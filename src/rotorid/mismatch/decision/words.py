@@ -6,9 +6,15 @@ import math
 
 from rotorid.effects.catalogue import catalogue
 
-AXIS = {"x": 0, "y": 1, "z": 2}
-FORCE_WORDS = ("forward force", "sideways force", "vertical force")
-MOMENT_WORDS = ("roll moment", "pitch moment", "yaw moment")
+WRENCH_WORDS = {
+    "force_x": ("forward force", "force along x"),
+    "force_y": ("sideways force", "force along y"),
+    "force_z": ("vertical force", "force along z"),
+    "moment_x": ("roll moment", "moment about x"),
+    "moment_y": ("pitch moment", "moment about y"),
+    "moment_z": ("yaw moment", "moment about z"),
+}
+"""Channels of force and moment in words: of a flight, and of a stand or bench."""
 SENSOR_WORDS = {
     "accelerometer": "accelerometer against the velocity along",
     "gyroscope": "gyroscope against the attitude about",
@@ -20,19 +26,10 @@ FORWARD_WORDS = {
     "angular_velocity": "body rates after half a second",
 }
 REGIME_WORDS = {
-    "airspeed_m_s": ("airspeed", "m/s"),
-    "forward_speed_m_s": ("forward speed", "m/s"),
-    "sideward_speed_m_s": ("sideward speed", "m/s"),
     "vertical_speed_over_hover_inflow": ("speed of descent over hover inflow", ""),
-    "height_over_rotor_radius": ("height over rotor radius", ""),
-    "height_m": ("height", "m"),
     "rotor_speed_rad_s": ("mean rotor speed", "rad/s"),
     "rotor_acceleration_rad_s2": ("rate of the rotor speed", "rad/s²"),
-    "tilt_rad": ("tilt", "rad"),
-    "body_rate_rad_s": ("body rate", "rad/s"),
-    "battery_voltage_v": ("battery voltage", "V"),
     "voltage_v": ("battery voltage", "V"),
-    "time_s": ("time", "s"),
     "run": ("the run", ""),
     "load_force_x": ("load along x", "N"),
     "load_force_y": ("load along y", "N"),
@@ -78,27 +75,11 @@ PARAMETER_WORDS = {
 GROUND_WORDS = (
     ("on flights not used", "on runs not used"),
     ("on the flight it was fitted to", "on the run it was fitted to"),
-    ("a flight not used", "a run not used"),
-    ("a flight that was fitted", "a run that was fitted"),
-    ("On held-out flight", "On held-out runs"),
-    ("half a second of flight", "half a second"),
     ("on held-out flight", "on held-out runs"),
-    ("Error on fitted flight", "Error on fitted runs"),
-    ("does not depend on how it was flown", "does not depend on how it was loaded"),
     ("What to fly next", "What to measure next"),
     ("Faster, higher or rougher flight would show", "Larger, faster and returning loads would show"),
-    ("The believed vehicle describes", "The believed values describe"),
     ("the believed vehicle describes", "the believed values describe"),
-    (
-        "The believed vehicle leaves out nothing that was found.",
-        "The believed values leave out nothing that was found.",
-    ),
-    ("forward force", "force along x"),
-    ("sideways force", "force along y"),
-    ("vertical force", "force along z"),
-    ("roll moment", "moment about x"),
-    ("pitch moment", "moment about y"),
-    ("yaw moment", "moment about z"),
+    *WRENCH_WORDS.values(),
 )
 """What is said of flights, as it is said of a stand or bench."""
 
@@ -112,13 +93,11 @@ def on_the_ground(text: str) -> str:
 
 def channel_words(channel: str) -> str:
     """A channel's name for a person: `force_y` is the sideways force."""
+    if channel in WRENCH_WORDS:
+        return WRENCH_WORDS[channel][0]
     if channel in FORWARD_WORDS:
         return FORWARD_WORDS[channel]
     group, _, last = channel.rpartition("_")
-    if group == "force" and last in AXIS:
-        return FORCE_WORDS[AXIS[last]]
-    if group == "moment" and last in AXIS:
-        return MOMENT_WORDS[AXIS[last]]
     if group == "rotor_speed":
         return f"speed of rotor {last}"
     if group in SENSOR_WORDS:

@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Channel, Errors, Location
 
 EXPLAINED_SHARE = 0.15
-"""Up to this share of the mismatch's energy may be left for the word `explained`."""
-UNEXPLAINED_SHARE = 0.85
-"""From this share on the findings are said to explain nothing that matters."""
+"""Up to this share of the mismatch's energy may be left for the word `explained`; from all but this share on the
+findings are said to explain nothing that matters."""
 PLAINLY_OFF = 1.5
 """Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is."""
-NINE_TENTHS = 0.9
 
 
 def quoted(channel: Channel) -> Errors:
@@ -55,7 +53,7 @@ def verdict_word(analysis: Analysis, locations: Sequence[Location], left: float)
         return "unexplained" if locations else "no_mismatch"
     if left <= EXPLAINED_SHARE:
         return "explained"
-    return "partly_explained" if left < UNEXPLAINED_SHARE else "unexplained"
+    return "partly_explained" if left < 1.0 - EXPLAINED_SHARE else "unexplained"
 
 
 def located_channels(locations: Sequence[Location], channels: Mapping[str, Channel]) -> tuple[str, ...]:
@@ -104,7 +102,7 @@ def carrying(findings: Sequence[Finding], shares: Mapping[str, float]) -> list[F
     ordered = by_share(findings, shares)
     whole = sum(shares.get(f.id, 0.0) for f in ordered)
     for finding in ordered:
-        if out and total >= NINE_TENTHS * whole:
+        if out and total >= 0.9 * whole:
             break
         out.append(finding)
         total += shares.get(finding.id, 0.0)

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.effects.contract import Contribution, Form, Motion, not_testable_reason
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.drift import WINDOW_S
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.decision.shares import fitted_part, segments_of
 from rotorid.mismatch.delivery.files import conditions_of, instruments_of
@@ -29,9 +30,7 @@ from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
 
-WINDOW_S = 0.5
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
-STAGES = ("before", "refitted", "after")
 SAME = 1e-5
 """Relative difference above which a vehicle read back is not the model written (errors are stated to six digits)."""
 
@@ -58,9 +57,8 @@ def forward_channels(analysis: Analysis) -> Forward:
     """Errors of every channel that the recording allows, for the three models."""
     vehicle = analysis.recordings.vehicle
     if vehicle.kind != "flight":
-        return Forward({}, ())
-    segments, noise = _segments(analysis)
-    notes: list[str] = []
+        return Forward({})
+    segments, notes = _segments(analysis), []
     if not segments:
         return Forward({}, ("No simulation run forward: rotor speeds and body rates are not recorded together.",))
     models = {
@@ -75,17 +73,16 @@ def forward_channels(analysis: Analysis) -> Forward:
         except InputError as error:
             notes.append(f"Simulation run forward leaves out the effects found: {error}.")
             errors[stage] = errors_of(segments, replace(model, forms=(), chain=(), chain_values=()))
-    floor = noise_floor(segments, models["refitted"], noise)
-    notes += _missing(errors["before"])
+    floor = noise_floor(segments, models["refitted"], sensor_noise(analysis.recordings.runs, analysis.believed))
     channels, part = {}, fitted_part(analysis)
-    for name in UNITS:
-        if not any(name in found.channels for found in errors["before"]):
-            continue
-
-        def share(sign, name=name):
-            return Errors(**{stage: _rms(errors[stage], name, part, sign) for stage in STAGES})
-
-        rmse = SplitErrors(training=share(1), held_out=share(-1))
+    there = {name for found in errors["before"] for name in found.channels}
+    if lacking := [name.replace("_", " ") for name in UNITS if name not in there]:
+        notes.append(f"Not run forward for want of recorded columns: {', '.join(lacking)}.")
+    for name in filter(there.__contains__, UNITS):
+        of_training, of_held_out = (
+            Errors(**{stage: _rms(found, name, part, sign) for stage, found in errors.items()}) for sign in (1, -1)
+        )
+        rmse = SplitErrors(training=of_training, held_out=of_held_out)
         left = [e for e in (rmse.training.after, rmse.held_out.after) if e is not None]
         channels[name] = Channel(
             unit=UNITS[name],
@@ -103,43 +100,32 @@ def delivered_model(analysis: Analysis) -> Model:
 
 def prove(analysis: Analysis, reloaded: Model, forward: Forward) -> None:
     """Simulate a model read back from its files; RuntimeError unless it makes the errors stated as `after`."""
-    segments, _ = _segments(analysis)
+    segments = _segments(analysis)
     if not forward.channels or not segments or any("leaves out" in note for note in forward.notes):
         return
     errors, part = errors_of(segments, reloaded), fitted_part(analysis)
     for name, channel in forward.channels.items():
         for sign, stated in ((1, channel.rmse.training.after), (-1, channel.rmse.held_out.after)):
             found = _rms(errors, name, part, sign)
-            if stated is None and found is None:
-                continue
-            if found is None or stated is None or abs(found - stated) > SAME * abs(stated) + 1e-12:
+            unknown = found is None or stated is None
+            if not (found is stated if unknown else abs(found - stated) <= SAME * abs(stated) + 1e-12):
                 raise RuntimeError(
                     f"improved_vehicle.yaml read back gives an error of {found} in {name}, the model gave {stated}"
                 )
 
 
-def _segments(analysis: Analysis) -> tuple[list[Segment], dict[str, float]]:
-    """Stretches of flight that can be simulated, and the sensors' noise."""
-    usable = [
+def _segments(analysis: Analysis) -> list[Segment]:
+    """Stretches of flight that can be simulated."""
+    return [
         s for s in segments_of(analysis) if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
     ]
-    return usable, sensor_noise(analysis.recordings.runs, analysis.believed)
-
-
-def _missing(errors: Sequence[WindowErrors]) -> list[str]:
-    names = {name for found in errors for name in found.channels}
-    lacking = [name.replace("_", " ") for name in UNITS if name not in names]
-    return [f"Not run forward for want of recorded columns: {', '.join(lacking)}."] if lacking else []
 
 
 def _rms(errors: Sequence[WindowErrors], name: str, part, sign: int) -> float | None:
     """Error over the windows that lie wholly in the fitted (+1) or held-out (-1) part; None without any."""
-    kept = [
-        e.channels[name][(part(e.run, e.start_s) == sign) & (part(e.run, e.stop_s) == sign)]
-        for e in errors
-        if name in e.channels
-    ]
-    values = np.concatenate([k.ravel() for k in kept]) if kept else np.zeros(0)
+    own = [e for e in errors if name in e.channels]
+    kept = [e.channels[name][(part(e.run, e.start_s) == sign) & (part(e.run, e.stop_s) == sign)] for e in own]
+    values = np.concatenate([np.zeros(0), *(k.ravel() for k in kept)])
     return float(np.sqrt(np.mean(values**2))) if len(values) else None
 
 

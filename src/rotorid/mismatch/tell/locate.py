@@ -20,7 +20,7 @@ Three sources, in this order of trust:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,9 +31,10 @@ from rotorid.mismatch.decision.findings import Analysis, Trace, with_status
 from rotorid.mismatch.decision.shares import effort, segments_of, shares
 from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.plant.between_runs import apart
-from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.motion import Segment, stretches
 from rotorid.mismatch.plant.regression import autoregression
-from rotorid.mismatch.tell.verdict import SMALLEST_P, Location, Regime, rms
+from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.tell.verdict import Location, Regime, rms
 from rotorid.recordings.signal.kernels import causal
 
 FAMILY_ERROR = 0.002
@@ -49,8 +50,6 @@ ON_SHARE_OF_NOISE = 0.15
 LOST_AT_ENDS_S = 1.0
 SMALLEST_SHARE = 0.03
 """Share of a run's mismatch energy below which an interval is not worth a line."""
-NIL = 1e-9
-"""Share of the largest value of a regime's variable below which a value is none."""
 SHORTEST_GAP_S = 0.25
 LONGEST_GAP_S = 2.0
 THROUGHOUT = 0.7
@@ -65,8 +64,6 @@ LARGER = 4.0
 MOVES_S = 0.2
 """Lags over which larger residuals may follow each other."""
 FIRST_LAGS = 4
-LIKE = 0.999
-"""Largest correlation that Fisher's transform is taken of."""
 MOVES_Z = 4.0
 """Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual."""
 WILD = 4.0
@@ -80,8 +77,6 @@ REGIME_BINS = 8
 REGIME_P = 1e-3
 CONTRAST = 2.0
 """Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
-MOST_OF_IT = 0.5
-"""Share of a stretch's energy that is a difference between two sensors, from which it is the sensor's matter."""
 EXCESS_SHARE = 0.25
 """Bins with at least this share of the largest excess belong to the regime."""
 
@@ -104,7 +99,7 @@ def locate(analysis: Analysis) -> list[Location]:
     segments = segments_of(analysis)
     stated = _stated(analysis)
     found: list[Interval] = []
-    if with_status(analysis, "established", "ambiguous", "absorbed") or analysis.wrong_values:
+    if with_status(analysis, *CLAIMED, "absorbed") or analysis.wrong_values:
         partial, throughout = _explained(analysis, segments)
         spoken_for = {loc.channel for loc in stated}
         found += [i for i in partial if i.trace.channel not in spoken_for]
@@ -130,7 +125,7 @@ def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]
                 channel=i.trace.channel,
                 start_s=_edge(analysis, i, i.start, 0),
                 stop_s=_edge(analysis, i, i.stop - 1, -1),
-                p_value=float(np.clip(i.p_value, SMALLEST_P, 1.0)),
+                p_value=i.p_value,
                 energy_share=_energy_share(mismatch_of(i.trace, i.explained), slice(i.start, i.stop)),
                 regime=None if i.of_the_run else regimes[key],
             )
@@ -158,15 +153,16 @@ def mismatch_of(trace: Trace, explained: bool) -> np.ndarray:
 
 def channel_noise(traces: Sequence[Trace]) -> float:
     """Usual size of the residual after the effects, robust against stretches in which it is larger."""
-    blocks = []
-    for trace in traces:
-        per = max(2, int(round(REGIME_BLOCK_S / _period(trace))))
-        count = len(trace.after) // per
-        if count:
-            blocks.append(np.sqrt(np.nanmean(trace.after[: count * per].reshape(count, per) ** 2, axis=1)))
-    if not blocks:
-        return rms([t.after for t in traces])
-    return float(np.nanmedian(np.concatenate(blocks)))
+    parts = [_blocks(t.after, _period(t)) for t in traces]
+    sizes = [np.sqrt(np.nanmean(blocks**2, axis=1)) for blocks in parts if len(blocks)]
+    return float(np.nanmedian(np.concatenate(sizes))) if sizes else rms([t.after for t in traces])
+
+
+def _blocks(values: np.ndarray, period_s: float) -> np.ndarray:
+    """Values (n,) in whole blocks of half a second, (blocks, samples)."""
+    per = max(2, int(round(REGIME_BLOCK_S / period_s)))
+    count = len(values) // per
+    return values[: count * per].reshape(count, per)
 
 
 def _period(trace: Trace) -> float:
@@ -188,7 +184,7 @@ def _stated(analysis: Analysis) -> list[Location]:
     share of the channel's mismatch is that of the time stated in the run.
     """
     vehicle, regimes, out = analysis.recordings.vehicle, {}, []
-    for finding in with_status(analysis, "established", "ambiguous"):
+    for finding in with_status(analysis, *CLAIMED):
         channels = dict.fromkeys(channel_of(name, vehicle) for name in finding.channels)
         for run, start_s, stop_s in finding.windows:
             stated_s = sum(b - a for r, a, b in finding.windows if r == run)
@@ -206,7 +202,7 @@ def _stated(analysis: Analysis) -> list[Location]:
                         channel=channel,
                         start_s=start_s,
                         stop_s=stop_s,
-                        p_value=float(np.clip(finding.p_value, SMALLEST_P, 1.0)),
+                        p_value=finding.p_value,
                         energy_share=share,
                         regime=regimes[channel],
                     )
@@ -224,7 +220,7 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interv
     causes = [{c: x for c, x in found.items() if c in channels} for found in shares(analysis, segments).values()]
     spoken_for = {channel for found in causes for channel in found}
     rest = {c: [mismatch_of(t, True) for t in ts] for c, ts in channels.items() if c not in spoken_for}
-    at_work = with_status(analysis, "established", "ambiguous")
+    at_work = with_status(analysis, *CLAIMED)
     formless = {c for f in at_work if f.form is None and not f.windows for c in f.channels}
     causes.append({c: x for c, x in rest.items() if c in formless})
     partial, throughout = [], []
@@ -275,7 +271,7 @@ def _tested(traces: Sequence[Trace], masks: Sequence[np.ndarray], count: int) ->
     found = []
     for trace, mask in zip(traces, masks, strict=True):
         energy = np.concatenate([[0.0], np.cumsum(np.nan_to_num(mismatch_of(trace, True)) ** 2)])
-        spans = [(a, b) for a, b in _spans(mask) if energy[b] - energy[a] >= SMALLEST_SHARE * energy[-1]]
+        spans = [(a, b) for a, b in stretches(mask) if energy[b] - energy[a] >= SMALLEST_SHARE * energy[-1]]
         for start, stop in spans:
             p = _energy_p(trace.before[start:stop], noise, freedom)
             if p < FAMILY_ERROR / max(len(spans) * count, 1):
@@ -297,14 +293,9 @@ def _moving_mean(values: np.ndarray, width: float) -> np.ndarray:
     return np.maximum(total[last] - total[first], 0.0) / (last - first)
 
 
-def _spans(mask: np.ndarray) -> list[tuple[int, int]]:
-    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
-    return [(int(a), int(b)) for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)]
-
-
 def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
     """The mask with gaps closed that are shorter than what surrounds them: a zero crossing is no end."""
-    spans = _spans(mask)
+    spans = stretches(mask)
     out = mask.copy()
     for (a, b), (c, d) in zip(spans, spans[1:], strict=False):
         allowed = min(max(SHORTEST_GAP_S, min(b - a, d - c) * period_s), LONGEST_GAP_S)
@@ -373,7 +364,7 @@ def _of_one_sensor(interval: Interval, differences: Mapping[tuple[str, str, floa
     if difference is None:
         return False
     left, whole = (float(np.nansum(x[part] ** 2)) for x in (trace.after - difference, trace.after))
-    return left < MOST_OF_IT * whole
+    return left < 0.5 * whole
 
 
 def _apart(traces, parts) -> list[Interval]:
@@ -428,10 +419,30 @@ def _window_sums(values: np.ndarray, length: int) -> np.ndarray:
     return total[starts + length] - total[starts]
 
 
+def _flagged(series: Sequence[np.ndarray], hits: Iterable[tuple[int, int, np.ndarray, np.ndarray]]):
+    """Stretches of windows that stand out: number of the series, start, stop, and the smallest p-value in the series.
+
+    `hits` are number of a series, length of its windows, p-values of all, and which of them stand out.
+    """
+    flagged = [np.zeros(len(x), bool) for x in series]
+    lowest = [1.0] * len(series)
+    for k, length, p, out in hits:
+        for j in np.flatnonzero(out):
+            start = _window_starts(len(series[k]), length)[j]
+            flagged[k][start : start + length] = True
+            lowest[k] = min(lowest[k], float(p[j]))
+    return [(k, a, b, lowest[k]) for k, mask in enumerate(flagged) for a, b in stretches(mask)]
+
+
+def _nearby(trace: Trace, start: int, stop: int) -> slice:
+    """A stretch and a second on either side: where its edges are looked for."""
+    reach = int(round(1.0 / _period(trace)))
+    return slice(max(start - reach, 0), min(stop + reach, len(trace.after)))
+
+
 def _louder(traces, white, limit) -> list[Interval]:
     """Windows with more energy than the spread of the windows' energies allows."""
-    flagged = [np.zeros(len(w), bool) for w in white]
-    lowest = [1.0] * len(white)
+    hits = []
     for length in _lengths(min(traces, key=lambda t: len(t.after))):
         means = [_window_sums(w**2, length) / length for w in white]
         pooled = np.concatenate(means)
@@ -440,20 +451,16 @@ def _louder(traces, white, limit) -> list[Interval]:
         degrees = max(min(2 * (usual / spread) ** 2, float(length)), 1.0)
         for k, mean in enumerate(means):
             p = chi2.sf(degrees * mean / usual, degrees)
-            for j in np.flatnonzero((p < limit) & (mean > LARGER * usual)):
-                start = _window_starts(len(white[k]), length)[j]
-                flagged[k][start : start + length] = True
-                lowest[k] = min(lowest[k], float(p[j]))
+            hits.append((k, length, p, (p < limit) & (mean > LARGER * usual)))
     out = []
-    for trace, w, mask, p in zip(traces, white, flagged, lowest, strict=True):
-        for start, stop in _spans(mask):
-            reach = int(round(1.0 / _period(trace)))
-            a, b = max(start - reach, 0), min(stop + reach, len(w))
-            variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
-            likelihood = -0.5 * np.log(variance) + 0.5 * w[a:b] ** 2 * (1.0 - 1.0 / variance)
-            first, last = _best_segment(likelihood)
-            if _moves(w[a + first : a + last], w, int(MOVES_S / _period(trace))):
-                out.append(Interval(trace, a + first, a + last, p, False))
+    for k, start, stop, p in _flagged(white, hits):
+        trace, w = traces[k], white[k]
+        here = _nearby(trace, start, stop)
+        variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
+        likelihood = -0.5 * np.log(variance) + 0.5 * w[here] ** 2 * (1.0 - 1.0 / variance)
+        first, last = (here.start + edge for edge in _best_segment(likelihood))
+        if _moves(w[first:last], w, int(MOVES_S / _period(trace))):
+            out.append(Interval(trace, first, last, p, False))
     return out
 
 
@@ -466,10 +473,8 @@ def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
     """
     count = len(part)
     lags = np.arange(1, min(most, count - 5) + 1)
-    usual, here = (np.array([_correlation(x, lag) for lag in lags]) for x in (whole, part))
-    sure = (np.arctanh(np.clip(here, -LIKE, LIKE)) - np.arctanh(np.clip(usual, -LIKE, LIKE))) * np.sqrt(
-        count - lags - 3
-    )
+    usual, here = (np.array([_correlation(x, lag) for lag in lags]).clip(-0.999, 0.999) for x in (whole, part))
+    sure = (np.arctanh(here) - np.arctanh(usual)) * np.sqrt(count - lags - 3)
     return len(lags) > 0 and max(np.abs(sure[:FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > MOVES_Z
 
 
@@ -480,10 +485,7 @@ def _correlation(values: np.ndarray, lag: int) -> float:
 
 def _shifted(traces, white, parts, limit) -> list[Interval]:
     """Windows whose mean is further from zero than the windows' own spread allows, and far enough to matter."""
-    noise = channel_noise(traces)
-    flagged = [np.zeros(len(w), bool) for w in white]
-    lowest = [1.0] * len(white)
-    least = 1.0
+    noise, least, hits = channel_noise(traces), 1.0, []
     for length in _lengths(min(traces, key=lambda t: len(t.after))):
         sums = [_window_sums(w, length) / np.sqrt(length) for w in white]
         local = [_window_sums(p, length) / length for p in parts]
@@ -493,18 +495,13 @@ def _shifted(traces, white, parts, limit) -> list[Interval]:
             # Where noise has a higher variance for a while its means are, too.
             spread = (_window_sums(white[k] ** 2, length) - total**2) / (length - 1)
             p = f.sf(total**2 / (least * np.maximum(spread, 1.0)), 1, max(count - 1, 1))
-            for j in np.flatnonzero((p < limit) & (np.abs(local[k]) > SHIFTED * noise)):
-                start = _window_starts(len(white[k]), length)[j]
-                flagged[k][start : start + length] = True
-                lowest[k] = min(lowest[k], float(p[j]))
+            hits.append((k, length, p, (p < limit) & (np.abs(local[k]) > SHIFTED * noise)))
     out = []
-    for trace, part, mask, p in zip(traces, parts, flagged, lowest, strict=True):
-        for start, stop in _spans(mask):
-            reach = int(round(1.0 / _period(trace)))
-            a, b = max(start - reach, 0), min(stop + reach, len(part))
-            level = float(np.mean(part[start:stop]))
-            first, last = _best_segment(level * part[a:b] - 0.5 * level**2)
-            out.append(Interval(trace, a + first, a + last, p, False))
+    for k, start, stop, p in _flagged(white, hits):
+        here = _nearby(traces[k], start, stop)
+        level = float(np.mean(parts[k][start:stop]))
+        first, last = (here.start + edge for edge in _best_segment(level * parts[k][here] - 0.5 * level**2))
+        out.append(Interval(traces[k], first, last, p, False))
     return out
 
 
@@ -538,26 +535,19 @@ def regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | Non
     chosen only where nothing else separates half as well.
     """
     traces = [t for t in analysis.traces if t.channel == channel]
-    noise = channel_noise(traces)
-    energies, values = [], {}
-    names = set.intersection(*(set(analysis.regimes.get(t.run, {})) for t in traces)) if traces else set()
-    for trace in traces:
-        per = max(2, int(round(REGIME_BLOCK_S / _period(trace))))
-        count = len(trace.time_s) // per
-
-        def blocks(x, per=per, count=count):
-            return x[: count * per].reshape(count, per).mean(axis=1)
-
-        energies.append(blocks(np.nan_to_num(mismatch_of(trace, explained)) ** 2) / max(noise, 1e-300) ** 2)
-        for name in names:
-            regimes = analysis.regimes[trace.run]
-            values.setdefault(name, []).append(blocks(np.interp(trace.time_s, regimes["time_s"], regimes[name])))
-    if not energies:
+    if not traces:
         return None
-    energy = np.concatenate(energies)
-    scored = []
+    noise = max(channel_noise(traces), 1e-300)
+
+    def by_block(values: Iterable[np.ndarray]) -> np.ndarray:
+        means = [_blocks(x, _period(t)).mean(axis=1) for t, x in zip(traces, values, strict=True)]
+        return np.concatenate(means)
+
+    energy = by_block(np.nan_to_num(mismatch_of(t, explained)) ** 2 for t in traces) / noise**2
+    flown = [analysis.regimes.get(t.run, {}) for t in traces]
+    names, scored = set.intersection(*map(set, flown)), []
     for name in sorted(names):
-        value = np.concatenate(values[name])
+        value = by_block(np.interp(t.time_s, r["time_s"], r[name]) for t, r in zip(traces, flown, strict=True))
         found = _separation(energy, value)
         if found is not None:
             share, p, low, high = found
@@ -574,7 +564,7 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     good = np.isfinite(value) & np.isfinite(energy)
     energy, value = energy[good], value[good]
     # A load turned into other axes is 1e-17 where it should be nothing: two bins of nothing, and no words for either.
-    value = np.where(np.abs(value) < NIL * np.abs(value).max(initial=0.0), 0.0, value)
+    value = np.where(np.abs(value) < 1e-9 * np.abs(value).max(initial=0.0), 0.0, value)
     edges = np.unique(np.quantile(value, np.linspace(0, 1, REGIME_BINS + 1))) if len(value) else np.zeros(0)
     if len(edges) < 3 or len(value) < 3 * len(edges):
         return None
@@ -586,9 +576,8 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     if total <= 0 or len(bins) < 2:
         return None
     between = total - within
-    p = f.sf(
-        between / (len(bins) - 1) / max(within / (len(log) - len(bins)), 1e-300), len(bins) - 1, len(log) - len(bins)
-    )
+    between_free, within_free = len(bins) - 1, len(log) - len(bins)
+    p = f.sf(between / between_free / max(within / within_free, 1e-300), between_free, within_free)
     means = np.array([energy[which == b].mean() for b in bins])
     floor = means.min()
     if means.max() < CONTRAST * floor:

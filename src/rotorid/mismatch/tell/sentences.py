@@ -95,14 +95,14 @@ def headline(contents: Contents) -> str:
         rest = "" if contents.word == "explained" else f" {_rest(contents)}"
         return first_words(f"{_corrected_mistakes(stated)}{rest}")
     main = main_channel(analysis, contents.locations, contents.channels)
-    places = _places(main, contents.locations, contents.channels, analysis)
+    places = _places(main, contents)
     causes = _causes(contents)
     if not causes:
         texts = [capital(f"{where}; {_rest(contents)}") for where in places]
         return next((text for text in texts if len(text.split()) <= MOST_WORDS), first_words(texts[-1]))
     better = _better_in_short(main, contents.channels)
     rest = "" if contents.word == "explained" else f"; {unexplained_words(contents.left)}"
-    still, short = _still_off(contents, main), _still_off(contents, main, metres=False)
+    still, short = (_still_off(contents, main, how) for how in ("both", "share"))
     surely, where, in_metres, off, off_in_metres, plain = places
     for parts in (
         (surely, causes, better, rest, still),
@@ -134,8 +134,8 @@ def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) ->
     return None if before is None else channel_size(analysis, main, before, "before")
 
 
-def _still_off(contents: Contents, main: str, metres: bool = True) -> str:
-    """The channel that stays off most with what was found, as a clause, with or without the metres that it leads off.
+def _still_off(contents: Contents, main: str, how: SizeWords) -> str:
+    """The channel that stays off most with what was found, as a clause, with its size as far as asked.
 
     Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
     """
@@ -150,7 +150,7 @@ def _still_off(contents: Contents, main: str, metres: bool = True) -> str:
         return ""
     size = channel_size(contents.analysis, most, left[most], "after")
     off = f"{number(left[most])} {contents.channels[most].unit}"
-    return f"; the {channel_words(most)} stays {off} off ({size_words(size, 'both' if metres else 'share')})"
+    return f"; the {channel_words(most)} stays {off} off ({size_words(size, how)})"
 
 
 def details(contents: Contents) -> list[str]:
@@ -170,10 +170,8 @@ def details(contents: Contents) -> list[str]:
     for name, (values, why) in analysis.suggested_values.items():
         out.append(_wrong(name, values, why=why))
     if contents.word in ("partly_explained", "unexplained"):
-        out.append(
-            capital(_rest(contents))
-            + (f" {capital(analysis.unexplained_description)}." if analysis.unexplained_description else "")
-        )
+        described = analysis.unexplained_description
+        out.append(capital(_rest(contents)) + (f" {capital(described)}." if described else ""))
     out += [_not_found(analysis.absent), *_run_forward(contents.forward)]
     return [text for text in out if text]
 
@@ -203,13 +201,12 @@ def _causes(contents: Contents) -> str:
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
         shown = f"{', '.join(names[:MOST_NAMES])}{more}" if more else listed(names)
         clauses.append(f"{shown} {'was' if len(names) == 1 else 'were'} left out")
-    wrong = list(analysis.wrong_values.items())
-    for name, values in wrong[: max(1, MOST_NAMES - len(names))]:
+    wrong, most = list(analysis.wrong_values.items()), max(1, MOST_NAMES - len(names))
+    for name, (believed, refitted, _, _) in wrong[:most]:
         words, unit = parameter_words(name)
-        refitted = f"{number(values[1], 3)} {unit}".rstrip()
-        clauses.append(f"the {words} is {refitted}, not {number(values[0], 3)}")
-    if len(wrong) > max(1, MOST_NAMES - len(names)):
-        clauses.append(f"{len(wrong) - max(1, MOST_NAMES - len(names))} more values are wrong")
+        clauses.append(f"the {words} is {f'{number(refitted, 3)} {unit}'.rstrip()}, not {number(believed, 3)}")
+    if len(wrong) > most:
+        clauses.append(f"{len(wrong) - most} more values are wrong")
     return listed(clauses)
 
 
@@ -230,10 +227,8 @@ def off_words(main: str, channels: Mapping[str, Channel], size: Size | None = No
 
 def size_words(size: Size, how: SizeWords = "both") -> str:
     """`6 % of the weight or 0.060 m after 0.5 s simulated`, or one of the two, or neither."""
-    share = share_words(size) if how in ("both", "share") else ""
     metres = metres_words(size) if how in ("both", "metres") else ""
-    if how == "metres" and not metres:
-        return share_words(size)
+    share = share_words(size) if how in ("both", "share") or (how == "metres" and not metres) else ""
     return " or ".join(filter(None, (share, metres)))
 
 
@@ -255,8 +250,7 @@ def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
     out = []
     for name, channel in channels.items():
         errors = channel.rmse.held_out
-        others = [("refitted", errors.refitted), ("believed", errors.before)]
-        known = [(word, value) for word, value in others if value is not None]
+        known = [(w, e) for w, e in (("refitted", errors.refitted), ("believed", errors.before)) if e is not None]
         if errors.after is None or not known or errors.after <= (channel.noise_floor or 0.0):
             continue
         word, best = min(known, key=lambda pair: pair[1])
@@ -296,13 +290,10 @@ def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Ma
 
     Of the channels located, those of what was named come first.
     """
-    inverse = [t.channel for t in analysis.traces]
     there = [loc.channel for loc in locations if loc.channel in channels]
-    named = [c for f in with_status(analysis, *CLAIMED) for c in f.channels if c in there]
-    pool = named or there or inverse
-
-    explained = bool(with_status(analysis, *CLAIMED) or analysis.wrong_values)
-    known = scales(analysis)
+    stated, known = with_status(analysis, *CLAIMED), scales(analysis)
+    named = [c for f in stated for c in f.channels if c in there]
+    explained = bool(stated or analysis.wrong_values)
 
     def size(name: str) -> float:
         errors = quoted(channels[name])
@@ -310,23 +301,27 @@ def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Ma
         off = math.sqrt(max(before**2 - after**2, 0.0)) if explained else before
         return off / known[name].value if name in known else 0.0
 
-    return max(dict.fromkeys(pool), key=size) if pool else ""
+    return max(named or there or [t.channel for t in analysis.traces], key=size, default="")
 
 
-def _places(
-    main: str, locations: Sequence[Location], channels: Mapping[str, Channel], analysis: Analysis
-) -> tuple[str, str, str, str, str, str]:
+def surest_location(here: Sequence[Location]) -> Location:
+    """The location with the smallest p-value."""
+    return min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
+
+
+def _places(main: str, contents: Contents) -> tuple[str, str, str, str, str, str]:
     """Where and how much the main channel is off, from all that can be said to the least.
 
     With regime, both sizes and significance; without the significance; with the metres alone; the same two without
     regime; and the error alone.
     """
+    analysis, channels = contents.analysis, contents.channels
     size = main_size(analysis, main, channels)
     both, metres, plain = (off_words(main, channels, size, how) for how in ("both", "metres", ""))
-    here = [loc for loc in locations if loc.channel == main]
+    here = [loc for loc in contents.locations if loc.channel == main]
     if not main or not here:
         return both, both, metres, both, metres, plain
-    best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
+    best = surest_location(here)
     doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < WORTH_SAYING_P else ""
     when = _when(best, here, analysis)
     return f"{when}{both}{doubt}", f"{when}{both}", f"{when}{metres}", both, metres, plain
@@ -341,13 +336,13 @@ def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
         flown = np.concatenate([r[regime.variable] for r in analysis.regimes.values() if regime.variable in r])
         to_the_end = regime.high >= np.nanquantile(flown, 0.98)
         from_the_start = regime.low <= np.nanquantile(flown, 0.02)
-        if from_the_start and not to_the_end:
+        if from_the_start and to_the_end:
+            return ""
+        if from_the_start:
             return f"up to {number(regime.high)}{space} of {name}, "
-        if to_the_end and not from_the_start:
+        if to_the_end:
             return f"from {number(regime.low)}{space} of {name} on, "
-        if not to_the_end:
-            return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "
-        return ""
+        return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "
     if best.energy_share < 0.99 and best.start_s is not None and best.stop_s is not None:
         more = f" (and in {len(here) - 1} more stretches)" if len(here) > 1 else ""
         return f"from {best.start_s:.1f} to {best.stop_s:.1f} s of {best.run}{more}, "
@@ -369,8 +364,8 @@ def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
         width = e.high - e.low
         return abs(e.value) / max(width, 1e-12 * abs(e.value), 1e-300) if np.isfinite(width) else 0.0
 
-    kept = sorted(range(len(parameters)), key=lambda k: -beyond(parameters[k]))[:most]
-    return [parameters[k] for k in sorted(kept)]
+    kept = sorted(parameters, key=beyond, reverse=True)[:most]
+    return [e for e in parameters if e in kept]
 
 
 def _left_out(finding: Finding, share: float | None) -> str:
@@ -390,9 +385,10 @@ def _left_out(finding: Finding, share: float | None) -> str:
 
 def _either(finding: Finding, analysis: Analysis) -> str:
     names = [effect_words(i) for i in dict.fromkeys((finding.id, *finding.alternatives))]
-    text = f"{capital('either ' if len(names) > 1 else '')}{listed(names, 'or')} was left out"
+    either, question = ("Either ", "show which") if len(names) > 1 else ("", "settle it")
+    text = f"{either}{listed(names, 'or')} was left out"
     text += "" if finding.probability is None else f" (probability {percent(finding.probability)})"
-    text += "; this recording cannot show which" if len(names) > 1 else "; this recording cannot settle it"
+    text += f"; this recording cannot {question}"
     # The next experiment is made for one class; it need not help with another.
     helps = analysis.next_manoeuvre and (not analysis.next_separates or finding.id in analysis.next_separates)
     return f"{text}, but this may: {analysis.next_manoeuvre.rstrip('.')}." if helps else f"{text}."
@@ -418,17 +414,14 @@ def _better(main: str, channels: Mapping[str, Channel], corrected: Sequence[str]
     if not main:
         return ""
     channel = channels[main]
-    errors, where = quoted(channel), _said_of(channel)
-    noise = number(channel.noise_floor)
+    errors, unit = quoted(channel), channel.unit
+    error = f"error of the {channel_words(main)} {_said_of(channel)}"
+    before, after, noise = map(number, (errors.before, errors.after, channel.noise_floor))
     if errors.before is not None and errors.after is not None and errors.after >= errors.before:
-        return (
-            f"The error of the {channel_words(main)} {where} is not smaller with this: {number(errors.before)} before, "
-            f"{number(errors.after)} {channel.unit} after."
-        )
+        return f"The {error} is not smaller with this: {before} before, {after} {unit} after."
     also = f", and believed values corrected within their trust ({listed(list(corrected))})," if corrected else ""
     return (
-        f"With this{also} the error of the {channel_words(main)} {where} goes from {number(errors.before)} to "
-        f"{number(errors.after)} {channel.unit}; the sensor's own noise is {noise} {channel.unit}."
+        f"With this{also} the {error} goes from {before} to {after} {unit}; the sensor's own noise is {noise} {unit}."
     )
 
 

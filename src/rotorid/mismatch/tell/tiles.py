@@ -14,6 +14,9 @@ from rotorid.mismatch.decision.words import (
     parameter_words,
     regime_words,
 )
+from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.tell.consistency import quoted
+from rotorid.mismatch.tell.sentences import surest_location
 from rotorid.mismatch.tell.verdict import Channel, EffectVerdict, Errors, Location, Verdict
 
 
@@ -28,22 +31,17 @@ class Tile:
 
 def errors_of(channel: Channel) -> tuple[Errors, str]:
     """Errors to quote and where they were made: on runs held out where there are any."""
-    if channel.rmse.held_out.after is not None:
-        return channel.rmse.held_out, "on runs held out"
-    return channel.rmse.training, "on the runs fitted"
+    return quoted(channel), "on the runs fitted" if channel.rmse.held_out.after is None else "on runs held out"
 
 
 def claims(verdict: Verdict) -> list[str]:
     """What is claimed, in words that fit before "left out": effects, a class as "a or b", each once."""
     said, seen = [], set()
     for effect in verdict.effects:
-        if effect.status not in ("established", "ambiguous"):
-            continue
-        members = frozenset((effect.id, *effect.alternatives))
-        if members & seen:
-            continue
-        seen |= members
-        said.append(_name(effect))
+        members = {effect.id, *effect.alternatives}
+        if effect.status in CLAIMED and not members & seen:
+            seen |= members
+            said.append(_name(effect))
     return said
 
 
@@ -77,7 +75,7 @@ def _where(verdict: Verdict, main: str) -> Tile:
     if not here:
         return Tile("Where", "Nowhere", "no error above the sensors' noise")
     channels = list(dict.fromkeys(loc.channel for loc in verdict.locations))
-    best = min(here, key=lambda loc: loc.p_value if loc.p_value is not None else 1.0)
+    best = surest_location(here)
     large = capital(channel_words(best.channel))
     others = f"; also in {len(channels) - 1} other channels" if len(channels) > 1 else ""
     return Tile("Where", large, f"{_when(best, here)}{others}")

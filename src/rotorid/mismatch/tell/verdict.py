@@ -16,6 +16,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from rotorid.io.text.writing import rounded
 from rotorid.mismatch.decision.findings import Analysis, Finding, Trace, ValueRow, one_per_class, with_status
 from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.decision.sizes import Size
@@ -36,18 +37,22 @@ from rotorid.recordings.basis import basis_of
 __all__ = ["Verdict", "main_channel", "make_verdict", "one_per_class", "spoken", "with_status"]
 
 SCHEMA_PATH = Path(__file__).parents[4] / "workflow" / "schemas" / "verdict.schema.json"
-SIGNIFICANT_DIGITS = 6
 SMALLEST_P = 1e-300
+"""Stated of a place whose p-value is smaller."""
 
 
 def _rounded(value: float | None) -> float | None:
-    """To six significant digits; what is not a finite number becomes null."""
-    if value is None or not math.isfinite(value):
-        return None
-    return float(f"{float(value):.{SIGNIFICANT_DIGITS - 1}e}")
+    """To the digits that a verdict states; what is not a finite number becomes null."""
+    return None if value is None or not math.isfinite(value) else rounded(float(value))
 
 
 Number = Annotated[float | None, BeforeValidator(_rounded)]
+
+
+def _not_zero(p_value: float | None) -> float | None:
+    return None if p_value is None else min(max(float(p_value), SMALLEST_P), 1.0)
+
+
 Probability = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_rounded)]
 Share = Annotated[float, BeforeValidator(_rounded), Field(ge=0, le=1)]
 Magnitude = Annotated[Annotated[float, Field(ge=0)] | None, BeforeValidator(_rounded)]
@@ -113,7 +118,7 @@ class Location(Part):
     channel: str
     start_s: Number
     stop_s: Number
-    p_value: Probability
+    p_value: Annotated[Probability, BeforeValidator(_not_zero)]
     energy_share: Share = Field(description="Share of the channel's mismatch energy in this run that lies here.")
     regime: Regime | None
 
@@ -304,7 +309,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
         verdict=word,
         basis=basis_of_verdict(analysis),
-        doubts=tuple(DoubtOfSet(what=d.what, sentence=d.sentence, stops=d.stops) for d in analysis.doubts),
+        doubts=tuple(DoubtOfSet.model_validate(d, from_attributes=True) for d in analysis.doubts),
         sentence=spoken(headline(contents), analysis),
         size=size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
         details=tuple(spoken(text, analysis) for text in details(contents)),
@@ -393,7 +398,7 @@ def with_missing_places(
                     channel=channel,
                     start_s=float(own[0].time_s[0]),
                     stop_s=float(own[-1].time_s[-1]),
-                    p_value=float(np.clip(p_value, SMALLEST_P, 1.0)),
+                    p_value=p_value,
                     energy_share=1.0,
                     regime=None,
                 )
@@ -407,12 +412,12 @@ def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
     for channel in dict.fromkeys(t.channel for t in analysis.traces):
         traces = [t for t in analysis.traces if t.channel == channel]
         before, after = analysis.p_values.get(channel, (None, None))
-        masks = [part(t.run, t.time_s) for t in traces]
+        signs = [part(t.run, t.time_s) for t in traces]
         found[channel] = Channel(
             unit=traces[0].unit,
             noise_floor=analysis.noise_floor.get(channel),
             rmse=SplitErrors(
-                training=_errors(traces, [m > 0 for m in masks]), held_out=_errors(traces, [m < 0 for m in masks])
+                training=_errors(traces, [s > 0 for s in signs]), held_out=_errors(traces, [s < 0 for s in signs])
             ),
             p_value=PValues(before=before, after=after),
         )
@@ -420,12 +425,8 @@ def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
 
 
 def _errors(traces: Sequence[Trace], masks: Sequence[np.ndarray]) -> Errors:
-    return Errors(
-        **{
-            stage: rms([getattr(t, stage)[mask] for t, mask in zip(traces, masks, strict=True)])
-            for stage in Errors.model_fields
-        }
-    )
+    own = list(zip(traces, masks, strict=True))
+    return Errors(**{stage: rms([getattr(t, stage)[mask] for t, mask in own]) for stage in Errors.model_fields})
 
 
 def rms(parts: Sequence[np.ndarray]) -> float:

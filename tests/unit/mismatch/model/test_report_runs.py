@@ -17,7 +17,7 @@ from rotorid.mismatch.decision.findings import Trace
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.model.absent import evidence_of
 from rotorid.mismatch.plant.split import parts_of, split_runs
-from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE, UNEXPLAINED_SHARE
+from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE
 from rotorid.mismatch.tell.ledger import ledger, text_of
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.report.deliver import verdict_of
@@ -120,7 +120,7 @@ def test_a_reader_with_a_pocket_calculator_gets_the_same_word(size_m_s2):
             "explained"
             if left <= EXPLAINED_SHARE
             else "partly_explained"
-            if left < UNEXPLAINED_SHARE
+            if left < 1.0 - EXPLAINED_SHARE
             else "unexplained"
         )
         assert told["verdict"] == word
