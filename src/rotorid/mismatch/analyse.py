@@ -17,7 +17,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import coefficients, throttle_or_thrust, wrench_findings
 from rotorid.mismatch.decision.evidence import weighed
-from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, Trace
+from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, Trace, by_channel, in_interval, not_held, rms
 from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.delivery.final import Offered, as_delivered
@@ -61,7 +61,7 @@ from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult, commanded_path
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.posterior.status import CLAIMED, Estimate
+from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import RecordingSet, Split, Vehicle
 
 UNITS = {"force": "N", "moment": "N m"}
@@ -397,8 +397,7 @@ def wind_finding(model: WrenchModel) -> Finding:
         equation="v_air = v − Rᵀ w",
         sentence="the vehicle flew through air that moves over the ground",
         parameters=tuple(
-            Estimate(f"w_{axis}", float(x), "m/s", float(x - 1.96 * s), float(x + 1.96 * s))
-            for axis, x, s in zip(("north", "east"), w, sd, strict=True)
+            in_interval(f"w_{axis}", x, "m/s", s) for axis, x, s in zip(("north", "east"), w, sd, strict=True)
         ),
         p_value=float(np.exp(-0.5 * min(1400.0, np.sum((w / sd) ** 2)))),
         channels=("force_x", "force_y"),
@@ -415,32 +414,22 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
         values = result.fit.values[where]
         least = [TIMING_FLOOR / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
         sd = np.hypot(np.sqrt(np.diag(result.fit.covariance)[where]), least)
-        parameters = tuple(
-            Estimate(p.symbol, float(v), p.unit, float(v - 1.96 * s), float(v + 1.96 * s))
-            for p, v, s in zip(form.parameters, values, sd, strict=True)
-        )
+        numbers = zip(form.parameters, values, sd, strict=True)
         alternatives = result.alternatives[key]
-        beyond = limited_windows(prepared.segments, form, values, full_speed) if form.stage == LIMIT else ()
-        out.append(
-            Finding(
-                id=key,
-                status="ambiguous" if alternatives else "established",
-                values=tuple(float(v) for v in values),
-                equation=form.equation,
-                sentence=effects[key].sentence,
-                parameters=parameters,
-                p_value=result.p_values[key],
-                channels=channels,
-                alternatives=tuple(sorted({key, *alternatives})) if alternatives else (),
-                windows=beyond,
-            )
+        found = Finding(
+            id=key,
+            status="established",
+            values=tuple(float(v) for v in values),
+            equation=form.equation,
+            sentence=effects[key].sentence,
+            parameters=tuple(in_interval(p.symbol, v, p.unit, s) for p, v, s in numbers),
+            p_value=result.p_values[key],
+            channels=channels,
+            windows=limited_windows(prepared.segments, form, values, full_speed) if form.stage == LIMIT else (),
         )
-    for key, reason in result.dropped.items():
-        if key not in {f.id for f in out}:
-            out.append(
-                Finding(id=key, status="not_established", sentence=f"{effects[key].name} did not hold: {reason}")
-            )
-    return out
+        out.append(found.or_else(alternatives) if alternatives else found)
+    stated = {f.id for f in out}
+    return out + [not_held(key, reason) for key, reason in result.dropped.items() if key not in stated]
 
 
 def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
@@ -456,12 +445,7 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     offset = next((f for f in stated if first in (f.id, *f.alternatives)), None)
     if not rules.PAYLOAD_OR_OFFSET(offset is not None and heavier):
         return findings
-    out = []
-    for f in findings:
-        if f is offset or (f.id in beside and f in stated):
-            f = replace(f, status="ambiguous", alternatives=tuple(sorted({f.id, load.id, *f.alternatives})))
-        out.append(f)
-    return out
+    return [f.or_else([load.id]) if f is offset or (f.id in beside and f in stated) else f for f in findings]
 
 
 def make_traces(
@@ -525,11 +509,11 @@ def with_noise_held_out(analysis: Analysis) -> Analysis:
     if analysis.without or analysis.wrong_values:
         return analysis
     part, floors = fitted_part(analysis), dict(analysis.noise_floor)
-    for channel in {t.channel for t in analysis.traces} - set(analysis.unexplained_channels):
-        own = [t.after[part(t.run, t.time_s) < 0] for t in analysis.traces if t.channel == channel]
-        left = np.concatenate(own) if own else np.zeros(0)
-        if len(left) and analysis.p_values.get(channel, (0.0, 0.0))[1] > NO_DEPENDENCE_P:
-            floors[channel] = max(floors.get(channel, 0.0), float(np.sqrt(np.nanmean(left**2))))
+    for channel, traces in by_channel(analysis.traces).items():
+        left = rms(t.after[part(t.run, t.time_s) < 0] for t in traces)
+        noise = analysis.p_values.get(channel, (0.0, 0.0))[1] > NO_DEPENDENCE_P
+        if noise and channel not in analysis.unexplained_channels and not np.isnan(left):
+            floors[channel] = max(floors.get(channel, 0.0), left)
     return replace(analysis, noise_floor=floors)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -12,18 +11,13 @@ from scipy.stats import t as student
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.decision.select import (
-    SMALLEST_SIZE,
-    VALUE_FLOOR,
-    Search,
-    Selection,
-)
+from rotorid.mismatch.decision.findings import Finding, not_held
+from rotorid.mismatch.decision.select import NEAR_LIMIT, SMALLEST_SIZE, VALUE_FLOOR, Search, Selection
 from rotorid.mismatch.plant.contributions import Contributions
 from rotorid.mismatch.plant.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.plant.rows import CHANNELS, Rows
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
-from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
@@ -100,11 +94,6 @@ class TermReport(NamedTuple):
     channels: tuple[str, ...]
     alternatives: Collection[str]
 
-    @property
-    def status(self) -> Status:
-        """Its status."""
-        return "ambiguous" if self.alternatives else "established"
-
 
 def findings_of(search: Search, selection: Selection, report_of: Callable[[str], TermReport]) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive.
@@ -117,28 +106,23 @@ def findings_of(search: Search, selection: Selection, report_of: Callable[[str],
         if term.effect in UNKNOWNS:
             continue
         own = report_of(key)
-        findings.append(
-            Finding(
-                id=term.effect,
-                status=own.status,
-                form=term.form,
-                values=tuple(float(v) for v in own.values),
-                equation=term.form.equation,
-                sentence=effects[term.effect].sentence,
-                parameters=own.parameters,
-                p_value=selection.p_values[key],
-                channels=own.channels,
-                alternatives=tuple(sorted({term.effect, *own.alternatives})) if own.alternatives else (),
-                windows=(term.window,) if term.window else (),
-            )
+        found = Finding(
+            id=term.effect,
+            status="established",
+            form=term.form,
+            values=tuple(float(v) for v in own.values),
+            equation=term.form.equation,
+            sentence=effects[term.effect].sentence,
+            parameters=own.parameters,
+            p_value=selection.p_values[key],
+            channels=own.channels,
+            windows=(term.window,) if term.window else (),
         )
+        findings.append(found.or_else(own.alternatives) if own.alternatives else found)
     named = {i for f in findings for i in f.alternatives}
     for effect_id, reason in selection.not_established.items():
-        if effect_id in named or effect_id in UNKNOWNS:
-            continue
-        text = f"{effects[effect_id].name} did not hold: {reason}"
-        rule = getattr(reason, "rule", "")
-        findings.append(Finding(id=effect_id, status="not_established", sentence=text, rule=rule))
+        if effect_id not in named and effect_id not in UNKNOWNS:
+            findings.append(not_held(effect_id, reason, rule=getattr(reason, "rule", "")))
     return findings
 
 
@@ -227,7 +211,7 @@ def wrong_values(
             noisy = regression.own_part([*always, *named], key, np.ones(1))[1] > MOST_ATTENUATION
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
-            pinned |= abs(change) > 0.98 * regression.limit[regression.start[key]]
+            pinned |= abs(change) > NEAR_LIMIT * regression.limit[regression.start[key]]
             if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:
@@ -256,8 +240,7 @@ def throttle_or_thrust(finding: Finding) -> Finding:
     same = catalogue()[finding.id].same_on_commands if finding.id in catalogue() else ""
     if not rules.THROTTLE_OR_THRUST(bool(same) and finding.status in CLAIMED):
         return finding
-    both = tuple(sorted({finding.id, same, *finding.alternatives}))
-    return replace(finding, status="ambiguous", alternatives=both)
+    return finding.or_else([same])
 
 
 def relative_change(key: str, coefficient: float, sd: float) -> tuple[float, float]:

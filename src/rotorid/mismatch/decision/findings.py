@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import Instrument, Loading
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
@@ -75,6 +76,21 @@ class Finding:
         """Whether it may stand in one of the files."""
         return self.status in CLAIMED and not self.withheld
 
+    def or_else(self, others: Iterable[str]) -> Finding:
+        """It, or one of some other ids, in a class with those of which the data could not distinguish it before."""
+        return replace(self, status="ambiguous", alternatives=tuple(sorted({self.id, *others, *self.alternatives})))
+
+
+def not_held(effect_id: str, reason: str, **known) -> Finding:
+    """The finding that an id was tested and did not hold."""
+    sentence = f"{catalogue()[effect_id].name} did not hold: {reason}"
+    return Finding(effect_id, "not_established", sentence=sentence, **known)
+
+
+def in_interval(symbol: str, value: float, unit: str, sd: float) -> Estimate:
+    """A number with one sigma as it is stated, with its 95 % interval."""
+    return Estimate(symbol, float(value), unit, float(value - 1.96 * sd), float(value + 1.96 * sd))
+
 
 @dataclass(frozen=True)
 class RunWind:
@@ -114,6 +130,21 @@ class Trace:
     before: np.ndarray
     refitted: np.ndarray
     after: np.ndarray
+
+
+def by_channel(traces: Iterable[Trace]) -> dict[str, list[Trace]]:
+    """Traces of each channel, in their order."""
+    out: dict[str, list[Trace]] = {}
+    for trace in traces:
+        out.setdefault(trace.channel, []).append(trace)
+    return out
+
+
+def rms(parts: Iterable[np.ndarray]) -> float:
+    """Root mean square over stretches, missing samples left out; NaN where nothing is there."""
+    values = np.concatenate([np.zeros(0), *map(np.ravel, parts)])
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decision.findings import Finding, not_held
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
 from rotorid.mismatch.posterior.status import CLAIMED
@@ -49,5 +48,4 @@ def with_probability(claim: Finding, probability: float, stated: Statement | Non
     reason = f"its probability is {100 * probability:.0f} %"
     if probability >= LIKELY:
         return replace(claim, probability=probability, status="suggested", objection=reason)
-    sentence = f"{catalogue()[claim.id].name} did not hold: {reason}"
-    return Finding(claim.id, "not_established", sentence=sentence, rule="probability", probability=probability)
+    return not_held(claim.id, reason, rule="probability", probability=probability)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
-from rotorid.mismatch.decision.findings import Analysis
+from rotorid.mismatch.decision.findings import Analysis, by_channel, rms
 from rotorid.mismatch.decision.sizes import scales
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.check import doubts_of
@@ -35,13 +33,9 @@ def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
 
 def still_off(analysis: Analysis) -> float:
     """Largest error of a channel beyond its noise, over what a pilot knows: the weight, the moment at hand."""
-    known, left = scales(analysis), {}
-    for trace in analysis.traces:
-        if trace.channel in known:
-            left.setdefault(trace.channel, []).append(trace.after)
-    off = [0.0]
-    for channel, parts in left.items():
-        square = float(np.nanmean(np.concatenate(parts) ** 2))
+    known, off = scales(analysis), [0.0]
+    for channel, traces in by_channel(t for t in analysis.traces if t.channel in known).items():
+        square = rms(t.after for t in traces) ** 2
         off.append(math.sqrt(max(square - analysis.noise_floor.get(channel, 0.0) ** 2, 0.0)) / known[channel].value)
     return max(off)
 

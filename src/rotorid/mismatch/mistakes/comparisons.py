@@ -103,26 +103,20 @@ def moving(all_signals: list[Signals]) -> Blocks | None:
     return gather(all_signals, ("position", "velocity"), KINEMATIC_BAND_HZ, make)
 
 
-def believed_angular_acceleration(signals: Signals, vehicle: Vehicle, sensor: str) -> np.ndarray:
-    """Roll and pitch acceleration that the believed thrusts give, (n, 2), rad/s²."""
-    thrust = squared_speeds(signals, vehicle, sensor)
-    at = vehicle.rotor_positions_m()
-    inertia = vehicle.inertia_kg_m2
-    return np.stack([-(thrust @ at[:, 1]) / inertia.xx, (thrust @ at[:, 0]) / inertia.yy], axis=1)
-
-
 def rolling(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
     """Y: derivative of the roll and pitch rate; X: what the believed rotors give, rad/s²; Z: the body rates."""
+    at, inertia = vehicle.rotor_positions_m(), vehicle.inertia_kg_m2
 
     def make(s: Signals):
-        rate = s.values["gyroscope"]
-        return Signal(rate[:, :2], True), Signal(believed_angular_acceleration(s, vehicle, sensor)), Signal(rate)
+        rate, thrust = s.values["gyroscope"], squared_speeds(s, vehicle, sensor)
+        turning = np.stack([-(thrust @ at[:, 1]) / inertia.xx, (thrust @ at[:, 0]) / inertia.yy], axis=1)
+        return Signal(rate[:, :2], True), Signal(turning), Signal(rate)
 
     return gather(all_signals, ("gyroscope", sensor), MOMENT_BAND_HZ, make)
 
 
 def lifting(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
-    """Y: accelerometer z; X: minus the believed thrust over the mass, m/s²; Z: vertical velocity where recorded."""
+    """Y: accelerometer z; X: minus the believed thrust over the mass, m/s²."""
 
     def make(s: Signals):
         lift = -squared_speeds(s, vehicle, sensor).sum(axis=1, keepdims=True) / vehicle.mass_kg
@@ -143,5 +137,4 @@ def following(all_signals: list[Signals], sensor: str) -> Blocks | None:
                 pick = slice(i, i + 1)
                 y, x = Signal(s.values["rotors"][:, pick]), Signal(s.values[sensor][:, pick])
                 parts.append(lagged.cut(y, x, None, s.rate_hz, limits, number))
-    parts = [p for p in parts if p is not None]
     return lagged.join(parts)

@@ -13,14 +13,14 @@ from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 
 SHORTEST_GAP_S = 0.3
+"""A held stretch counts from this length on; two that are closer are one."""
 SHORTEST_GAP_PERIODS = 12
-"""A held stretch counts from this many of the sensor's own periods on, a missing one as well."""
+"""It counts from this many of the sensor's own periods on, a missing one as well."""
 SHORTEST_EMPTY_S = 1.0
 """Empty cells say themselves that nothing was read: a link that loses half a second now and then is no lost sensor."""
 SHORTEST_FREEZE_PERIODS = 8
 SHORTEST_FREEZE_S = 0.04
 """Where all columns of a sensor stand still at once, a shorter stretch is no chance."""
-MERGE_S = 0.3
 SHORTEST_STAND_S = 0.15
 STANDING = 0.2
 """A rotor below this share of what the others turn at, relative to its own habit, stands still."""
@@ -46,7 +46,6 @@ class Dropout:
 
     run: str
     column: str
-    sensor: str
     kind: str
     """`missing`, `held` or `zero`."""
     start_s: float
@@ -58,52 +57,46 @@ class Dropout:
 def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     """The set with dropouts blanked, and the finding."""
     noisy = noisy_columns(recordings)
-    stretches_found = [s for run in recordings.runs for s in in_run(run, recordings.vehicle, noisy)]
-    if not stretches_found:
+    found = [s for run in recordings.runs for s in in_run(run, recordings.vehicle, noisy)]
+    if not found:
         return recordings, None
 
     def change(run: Run):
         columns = {}
-        for s in stretches_found:
+        for s in found:
             if s.run == run.name and s.kind != "missing":
                 columns[s.column] = columns.get(s.column, run.table[s.column]).mask(s.mask)
         return columns
 
-    windows = {(s.run, round(s.start_s, 4), round(s.stop_s, 4)) for s in stretches_found}
-    where = sorted(windows)
-    columns = tuple(dict.fromkeys(s.column for s in stretches_found))
-    kinds = " and ".join(dict.fromkeys(s.kind for s in stretches_found))
-    first = where[0]
-    more = "" if len(where) == 1 else f" and {len(where) - 1} more stretch{'es' if len(where) > 2 else ''}"
-    sentence = (
-        f"Readings of {', '.join(columns)} dropped out ({kinds}) in {first[0]} "
-        f"from {first[1]:.2f} s to {first[2]:.2f} s{more}; these samples were left out."
-    )
+    windows = sorted({(s.run, round(s.start_s, 4), round(s.stop_s, 4)) for s in found})
+    columns = tuple(dict.fromkeys(s.column for s in found))
+    kinds = " and ".join(dict.fromkeys(s.kind for s in found))
+    run, start_s, stop_s = windows[0]
+    more = "" if len(windows) == 1 else f" and {len(windows) - 1} more stretch{'es' if len(windows) > 2 else ''}"
     finding = Finding(
         id="sensor_dropout",
         status="established",
-        sentence=sentence,
-        p_value=max(s.p_value for s in stretches_found),
+        sentence=(
+            f"Readings of {', '.join(columns)} dropped out ({kinds}) in {run} from {start_s:.2f} s to {stop_s:.2f} s"
+            f"{more}; these samples were left out."
+        ),
+        p_value=max(s.p_value for s in found),
         channels=columns,
-        windows=tuple(where),
+        windows=tuple(windows),
     )
     return replace_columns(recordings, change), finding
 
 
 def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
     """Every dropout of a run, column by column; `noisy` columns are known to have noise of their own."""
-    found = []
+    found, flown = [], vehicle.kind == "flight"
     for sensor, names in sensor_columns(vehicle).items():
         present = [n for n in names if run.has(n)]
-        flown = vehicle.kind == "flight"
-        if not present or (sensor in COMMANDED and not flown):
-            continue
-        if sensor in COMMANDED:
-            if len(present) > 1:
-                found += standing_commands(run, sensor, present, noisy)
-            continue
-        if sensor == "rotors" and not flown:
+        if not present or (not flown and sensor in (*COMMANDED, "rotors")):
             continue  # on a stand rotors rest and turn evenly
+        if sensor in COMMANDED:
+            found += standing_commands(run, present, noisy) if len(present) > 1 else []
+            continue
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
         frozen = []
         if len(present) > 1 and not zero and flown:
@@ -112,18 +105,16 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
         for name in present:
             values = run.column(name)
             blank = missing(run.time_s, values)
-            if name in zero:
-                found += _as_dropouts(run, name, sensor, "zero", zero[name], 0.0)
-                blank = blank & ~zero[name]
-            found += _as_dropouts(run, name, sensor, "missing", blank, 0.0)
-            rest = np.where(zero.get(name, np.zeros(len(values), bool)), np.nan, values)
+            stands = zero.get(name, np.zeros(len(values), bool))
+            found += _as_dropouts(run, name, "zero", stands) + _as_dropouts(run, name, "missing", blank & ~stands)
+            rest = np.where(stands, np.nan, values)
             for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy), *frozen]:
                 if flown or load_went_on(run, vehicle, values, mask):
-                    found += _as_dropouts(run, name, sensor, "held", mask, p)
+                    found += _as_dropouts(run, name, "held", mask, p)
     return found
 
 
-def standing_commands(run: Run, sensor: str, names: list[str], noisy: set[str]) -> list[Dropout]:
+def standing_commands(run: Run, names: list[str], noisy: set[str]) -> list[Dropout]:
     """Stretches in which one rotor's command stands still while all others go on.
 
     A command at the end of its range may truly stand still: its motor gives all that it can. On the ground all commands
@@ -138,7 +129,7 @@ def standing_commands(run: Run, sensor: str, names: list[str], noisy: set[str]) 
         for mask, p in held(run.time_s, own[:, None], noisy=name in noisy):
             others = np.delete(moves[mask], k, axis=1).mean(axis=0)
             if own[mask][0] not in ends and others.min() > OTHERS_GO_ON:
-                found += _as_dropouts(run, name, sensor, "held", mask, p)
+                found += _as_dropouts(run, name, "held", mask, p)
     return found
 
 
@@ -168,21 +159,19 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
     return bool(max(np.ptp(expected), np.nanmedian(off)) > max(PLAIN_CHANGE * noise, PLAIN_STEPS * step))
 
 
-def _as_dropouts(run: Run, name, sensor, kind, mask, p_value) -> list[Dropout]:
-    """Masks as stretches, close ones merged."""
-    t = run.time_s
-    pieces = []
+def _as_dropouts(run: Run, name: str, kind: str, mask: np.ndarray, p_value: float = 0.0) -> list[Dropout]:
+    """A mask as stretches, close ones merged."""
+    t, pieces = run.time_s, []
     for start, stop in stretches(mask):
-        if pieces and t[start] - t[pieces[-1][1] - 1] < MERGE_S:
+        if pieces and t[start] - t[pieces[-1][1] - 1] < SHORTEST_GAP_S:
             pieces[-1] = (pieces[-1][0], stop)
         else:
             pieces.append((start, stop))
-    out = []
-    for start, stop in pieces:
-        own = np.zeros(len(t), bool)
-        own[start:stop] = True
-        out.append(Dropout(run.name, name, sensor, kind, float(t[start]), float(t[stop - 1]), own, p_value))
-    return out
+    index = np.arange(len(t))
+    return [
+        Dropout(run.name, name, kind, float(t[a]), float(t[b - 1]), (index >= a) & (index < b), p_value)
+        for a, b in pieces
+    ]
 
 
 def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -265,37 +254,34 @@ def jumps_to(values: np.ndarray, start: int) -> bool:
 
 def steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
     """Median size of the first and second differences of columns (n, k), where they move; 0 where they never do."""
-    steps = [np.abs(np.diff(part, axis=0)).max(axis=1) for part in parts if len(part) > 2]
-    bends = [np.abs(np.diff(part, n=2, axis=0)).max(axis=1) for part in parts if len(part) > 2]
-    step = np.concatenate([s[s > 0] for s in steps]) if steps else np.zeros(0)
-    bend = np.concatenate([b[s[1:] > 0] for b, s in zip(bends, steps, strict=True)]) if steps else np.zeros(0)
-    return tuple(float(np.median(x)) if len(x) else 0.0 for x in (step, bend))
+    step, bend = [np.zeros(0)], [np.zeros(0)]
+    for part in (p for p in parts if len(p) > 2):
+        first, second = (np.abs(np.diff(part, n=n, axis=0)).max(axis=1) for n in (1, 2))
+        step.append(first[first > 0])
+        bend.append(second[first[1:] > 0])
+    return tuple(float(np.median(x)) if len(x) else 0.0 for x in map(np.concatenate, (step, bend)))
 
 
 def noisy_columns(recordings: RecordingSet) -> set[str]:
     """Columns that in some run show noise of their own."""
-    found = set()
-    for names in sensor_columns(recordings.vehicle).values():
-        for run in recordings.runs:
-            for name in names:
-                if run.has(name) and name not in found:
-                    values = run.column(name)
-                    usual, bend = steps_and_bends([values[np.isfinite(values)][:, None]])
-                    if usual > 0 and bend > SMOOTH * usual:
-                        found.add(name)
-    return found
+
+    def noisy(run: Run, name: str) -> bool:
+        values = run.column(name)
+        usual, bend = steps_and_bends([values[np.isfinite(values)][:, None]])
+        return bend > SMOOTH * usual > 0
+
+    names = [n for own in sensor_columns(recordings.vehicle).values() for n in own]
+    return {n for n in names if any(run.has(n) and noisy(run, n) for run in recordings.runs)}
 
 
 def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Column to mask of samples in which a rotor reads (near) zero while the others carry the vehicle."""
     speed = run.array(names)
     out = {}
-    turning = [v[v > 0] for v in speed.T]
-    usual = np.array([np.quantile(v, 0.75) if len(v) else np.nan for v in turning])
+    usual = np.array([np.quantile(v[v > 0], 0.75) if (v > 0).any() else np.nan for v in speed.T])
     if not np.isfinite(usual).any():
         return out
-    if not np.all(np.isfinite(usual)) or np.any(usual <= 0):
-        usual = np.where(np.isfinite(usual) & (usual > 0), usual, np.nanmedian(usual))
+    usual = np.where(np.isfinite(usual), usual, np.nanmedian(usual))
     top = float(np.median(usual))
     for i, name in enumerate(names):
         others = np.delete(speed / usual, i, axis=1)
@@ -316,9 +302,7 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
             if run.time_s[stop - 1] - run.time_s[start] < SHORTEST_STAND_S:
                 continue
             # A rotor cannot stop and start within a sample or two: look at its readings just outside.
-            before = speed[max(start - 2, 0) : start, i]
-            after = speed[stop : stop + 2, i]
-            near = np.concatenate([before, after])
+            near = np.concatenate([speed[max(start - 2, 0) : start, i], speed[stop : stop + 2, i]])
             low = np.nanmax(speed[start:stop, i])
             if low == 0.0 or (len(near) and np.nanmin(near) > 3 * max(low, 1e-9)):
                 sudden[start:stop] = True
@@ -332,8 +316,6 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
 def _balanced(vehicle: Vehicle, rotor: int) -> bool:
     """Whether hovering asks of this rotor a thrust that is not far below the largest."""
     positions = vehicle.rotor_positions_m()
-    if not len(positions):
-        return False
     rows = np.stack([np.ones(len(positions)), positions[:, 0], positions[:, 1]])
     share = np.linalg.pinv(rows) @ np.array([1.0, 0.0, 0.0])
     return bool(share[rotor] > 0.8 * share.max())

@@ -14,7 +14,7 @@ from itertools import combinations, permutations
 import numpy as np
 from scipy.stats import t as student
 
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decision.findings import Finding, in_interval
 from rotorid.mismatch.decision.words import capital, listed
 from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
@@ -29,7 +29,6 @@ from rotorid.mismatch.mistakes.signals import (
     replace_columns,
     sensor_columns,
 )
-from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import Run, Vehicle
 
 LEAST_ALONE = 0.9
@@ -620,7 +619,7 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
             f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps {change} {1e3 * abs(rate):.2f} ms "
             f"every second; put on the other sensors' time."
         ),
-        parameters=(Estimate("skew", rate, "1", rate - 1.96 * sd, rate + 1.96 * sd),),
+        parameters=(in_interval("skew", rate, "1", sd),),
         p_value=min(p for p, _ in growing),
         channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in wrong),
     )
@@ -692,7 +691,7 @@ def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
                 ),
                 # A sensor whose stamps are early is seen as all others' delay: the id's parameter is a length of time.
                 late_s=amount,
-                parameters=(Estimate("T_d", abs(amount), "s", abs(amount) - 1.96 * sd, abs(amount) + 1.96 * sd),),
+                parameters=(in_interval("T_d", abs(amount), "s", sd),),
                 p_value=max(p for n, p in wrong if n in cluster),
                 channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in cluster),
             )

@@ -97,14 +97,15 @@ def turning(recordings: ReadSet) -> list[Signals]:
     if read:
         return read
     full = full_speed(recordings.runs, recordings.vehicle)
-    commanded = [c for s in everything if (c := as_commanded(s, full)) is not None]
-    if not any("accelerometer" in s.values for s in commanded):
+    commanded = [(s, speed) for s in everything if (speed := as_commanded(s, full)) is not None]
+    if not any("accelerometer" in s.values for s, _ in commanded):
         return []
-    return max(([scaled(s, scale) for s in commanded] for scale in SCALES), key=strongest_line)
+    trials = ([replace(s, values={**s.values, "rotors": x * speed}) for s, speed in commanded] for x in SCALES)
+    return max(trials, key=strongest_line)
 
 
-def as_commanded(s: Signals, full_rad_s: float | None) -> Signals | None:
-    """A run with the rotors turning as commanded, COMMAND_LAG_S late; None without commands."""
+def as_commanded(s: Signals, full_rad_s: float | None) -> np.ndarray | None:
+    """Speeds (n, k) of rotors that turn as commanded, COMMAND_LAG_S late; None without commands."""
     if "commands" in s.values:
         speed = s.values["commands"]
     elif "throttle" in s.values and full_rad_s is not None:
@@ -113,13 +114,7 @@ def as_commanded(s: Signals, full_rad_s: float | None) -> Signals | None:
         return None
     keep = np.exp(-1.0 / (s.rate_hz * COMMAND_LAG_S))
     start = np.nan_to_num(speed[:1]) * keep
-    speed = lfilter([1.0 - keep], [1.0, -keep], np.nan_to_num(speed), axis=0, zi=start)[0]
-    return replace(s, values={**s.values, "rotors": speed})
-
-
-def scaled(s: Signals, scale: float) -> Signals:
-    """A run with its rotors turning faster by a factor."""
-    return replace(s, values={**s.values, "rotors": scale * s.values["rotors"]})
+    return lfilter([1.0 - keep], [1.0, -keep], np.nan_to_num(speed), axis=0, zi=start)[0]
 
 
 def strongest_line(signals: list[Signals]) -> float:

@@ -27,14 +27,14 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import chi2, f
 
-from rotorid.mismatch.decision.findings import Analysis, Trace, with_status
+from rotorid.mismatch.decision.findings import Analysis, Trace, by_channel, rms, with_status
 from rotorid.mismatch.decision.shares import effort, segments_of, shares
 from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.plant.between_runs import apart
 from rotorid.mismatch.plant.motion import Segment, stretches
 from rotorid.mismatch.plant.regression import autoregression
 from rotorid.mismatch.posterior.status import CLAIMED
-from rotorid.mismatch.tell.verdict import Location, Regime, rms
+from rotorid.mismatch.tell.verdict import Location, Regime
 from rotorid.recordings.signal.kernels import causal
 
 FAMILY_ERROR = 0.002
@@ -169,12 +169,9 @@ def _period(trace: Trace) -> float:
     return float(np.median(np.diff(trace.time_s)))
 
 
-def _by_channel(analysis: Analysis) -> dict[str, list[Trace]]:
-    out: dict[str, list[Trace]] = {}
-    for trace in analysis.traces:
-        if len(trace.time_s) > 8:
-            out.setdefault(trace.channel, []).append(trace)
-    return out
+def _long_enough(analysis: Analysis) -> dict[str, list[Trace]]:
+    """Channels to their traces of more than a few samples."""
+    return by_channel(t for t in analysis.traces if len(t.time_s) > 8)
 
 
 def _stated(analysis: Analysis) -> list[Location]:
@@ -216,7 +213,7 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interv
     Each finding's own contribution says where it acts; for what lies between command and rotor speed all that was
     taken away from its channels does. A wrong value is wrong throughout.
     """
-    channels = _by_channel(analysis)
+    channels = _long_enough(analysis)
     causes = [{c: x for c, x in found.items() if c in channels} for found in shares(analysis, segments).values()]
     spoken_for = {channel for found in causes for channel in found}
     rest = {c: [mismatch_of(t, True) for t in ts] for c, ts in channels.items() if c not in spoken_for}
@@ -325,7 +322,7 @@ def _energy_p(values: np.ndarray, noise: float, freedom: float) -> float:
 
 def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
     """Stretches in which the residual after the effects is larger or shifted."""
-    channels = _by_channel(analysis)
+    channels = _long_enough(analysis)
     windows = sum(
         2 * len(_window_starts(len(t.after), length)) for ts in channels.values() for t in ts for length in _lengths(t)
     )

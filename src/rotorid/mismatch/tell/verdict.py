@@ -17,7 +17,16 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from rotorid.io.text.writing import rounded
-from rotorid.mismatch.decision.findings import Analysis, Finding, Trace, ValueRow, one_per_class, with_status
+from rotorid.mismatch.decision.findings import (
+    Analysis,
+    Finding,
+    Trace,
+    ValueRow,
+    by_channel,
+    one_per_class,
+    rms,
+    with_status,
+)
 from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.decision.sizes import Size
 from rotorid.mismatch.delivery.doubts import stopping
@@ -409,8 +418,7 @@ def with_missing_places(
 def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
     """Errors of every channel that the traces hold, by inverse dynamics."""
     found, part = {}, fitted_part(analysis)
-    for channel in dict.fromkeys(t.channel for t in analysis.traces):
-        traces = [t for t in analysis.traces if t.channel == channel]
+    for channel, traces in by_channel(analysis.traces).items():
         before, after = analysis.p_values.get(channel, (None, None))
         signs = [part(t.run, t.time_s) for t in traces]
         found[channel] = Channel(
@@ -427,13 +435,6 @@ def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
 def _errors(traces: Sequence[Trace], masks: Sequence[np.ndarray]) -> Errors:
     own = list(zip(traces, masks, strict=True))
     return Errors(**{stage: rms([getattr(t, stage)[mask] for t, mask in own]) for stage in Errors.model_fields})
-
-
-def rms(parts: Sequence[np.ndarray]) -> float:
-    """Root mean square over stretches, missing samples left out; NaN where nothing is there."""
-    values = np.concatenate([np.ravel(p) for p in parts]) if parts else np.zeros(0)
-    values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
 def effect_verdict(finding: Finding, share: float | None, size: Size | None = None) -> EffectVerdict:
