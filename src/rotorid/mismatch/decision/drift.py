@@ -15,6 +15,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from rotorid.mismatch.decision.findings import rms
 from rotorid.recordings import Vehicle
 
 WINDOW_S = 0.5
@@ -34,13 +35,12 @@ def drift_m(vehicle: Vehicle, channel: str, stretches: Iterable[tuple[np.ndarray
         power, scale = 3, vehicle.gravity_m_s2 / (6.0 * inertia)
     else:
         return None
-    ends = [scale * _ends(time_s, error, power) for time_s, error in stretches]
-    found = np.concatenate(ends) if ends else np.zeros(0)
-    return float(np.sqrt(np.mean(found**2))) if len(found) else None
+    found = rms(scale * _ends(time_s, error, power) for time_s, error in stretches)
+    return None if np.isnan(found) else found
 
 
 def _ends(time_s: np.ndarray, error: np.ndarray, power: int) -> np.ndarray:
-    """∫ (T − t)^power · error dt over every whole window of a stretch, by the rule of midpoints."""
+    """∫ (T − t)^power · error dt over every window of a stretch, by the rule of midpoints; NaN where any is missing."""
     if len(time_s) < 2:
         return np.zeros(0)
     step = float(np.median(np.diff(time_s)))
@@ -48,5 +48,4 @@ def _ends(time_s: np.ndarray, error: np.ndarray, power: int) -> np.ndarray:
     count = len(error) // per
     windows = error[: count * per].reshape(count, per)
     left = WINDOW_S * (1.0 - (np.arange(per) + 0.5) / per)
-    found = windows @ left**power * (WINDOW_S / per)
-    return found[np.isfinite(found)]
+    return windows @ left**power * (WINDOW_S / per)

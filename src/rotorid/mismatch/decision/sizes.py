@@ -14,13 +14,10 @@ from typing import Literal
 import numpy as np
 
 from rotorid.mismatch.decision.drift import drift_m
-from rotorid.mismatch.decision.findings import Analysis, Trace
+from rotorid.mismatch.decision.findings import Analysis, Trace, rms
 from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.decision.words import channel_words, number
 from rotorid.recordings import Vehicle
-
-FASTEST_RAD_S = 1.0
-"""A body rate against which errors between gyroscope and attitude are stated."""
 
 
 @dataclass(frozen=True)
@@ -55,16 +52,16 @@ def of_flight(vehicle: Vehicle) -> dict[str, Scale]:
             out[f"moment_{axis}"] = Scale(float(moment), f"of the available {channel_words(f'moment_{axis}')}")
     out |= {f"rotor_speed_{i + 1}": Scale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
     out |= {f"accelerometer_{axis}": Scale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
-    return out | {f"gyroscope_{axis}": Scale(FASTEST_RAD_S, "of 1 rad/s") for axis in "xyz"}
+    return out | {f"gyroscope_{axis}": Scale(1.0, "of 1 rad/s") for axis in "xyz"}
 
 
 def of_reading(analysis: Analysis) -> dict[str, Scale]:
     """The largest load of the recordings, of forces and of moments."""
     out: dict[str, Scale] = {}
-    for group, columns, unit in (("force", slice(0, 3), "force"), ("moment", slice(3, 6), "moment")):
+    for group, columns in (("force", slice(0, 3)), ("moment", slice(3, 6))):
         largest = max((float(np.abs(x.load[:, columns]).max()) for x in analysis.loadings if x.size), default=0.0)
         if largest > 0:
-            out |= {f"{group}_{axis}": Scale(largest, f"of the largest {unit}") for axis in "xyz"}
+            out |= {f"{group}_{axis}": Scale(largest, f"of the largest {group}") for axis in "xyz"}
     if analysis.believed.rotors:
         speeds = [x.motion.rotor_speed for x in analysis.loadings if x.motion.rotor_speed is not None]
         top = max((float(np.nanmax(s)) for s in speeds if s.size), default=0.0)
@@ -94,16 +91,14 @@ def effect_sizes(analysis: Analysis, held: list[np.ndarray]) -> dict[str, Size]:
     known, units = scales(analysis), {t.channel: t.unit for t in analysis.compared}
     out: dict[str, Size] = {}
     for effect_id, without in analysis.without.items():
-        squares: dict[str, list[np.ndarray]] = {}
-        for trace, left, mask in zip(analysis.compared, without, held, strict=True):
-            squares.setdefault(trace.channel, []).append((left - trace.after)[mask] ** 2)
-        rms = {c: float(np.sqrt(np.nanmean(x))) for c, parts in squares.items() if len(x := np.concatenate(parts))}
-        sizes = [
-            Size(c, r, units[c], r / known[c].value, known[c].words) for c, r in rms.items() if c in known and r > 0
-        ]
+        moved = [(t, left - t.after, mask) for t, left, mask in zip(analysis.compared, without, held, strict=True)]
+        parts: dict[str, list[np.ndarray]] = {}
+        for trace, added, mask in moved:
+            parts.setdefault(trace.channel, []).append(added[mask])
+        found = {c: rms(own) for c, own in parts.items() if c in known}
+        sizes = [Size(c, r, units[c], r / known[c].value, known[c].words) for c, r in found.items() if r > 0]
         if sizes:
             most = max(sizes, key=lambda s: s.share)
-            moved = [(t, left - t.after, mask) for t, left, mask in zip(analysis.compared, without, held, strict=True)]
             out[effect_id] = replace(most, metres=_metres(analysis, most.channel, moved))
     return out
 

@@ -27,10 +27,14 @@ ABOUT = {
 }
 
 
-class Entry(BaseModel):
-    """One finding as a file has it."""
+class Part(BaseModel):
+    """A group of keys of a file: none unknown."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Entry(Part):
+    """One finding as a file has it."""
 
     id: str
     form: str = ""
@@ -44,10 +48,8 @@ class Entry(BaseModel):
     interval_95: dict[str, tuple[float, float]] = Field(default_factory=dict)
 
 
-class Air(BaseModel):
+class Air(Part):
     """Wind of a run, straight lines between instants; outside of the condition's own the air is still."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     time_s: tuple[float, ...]
     north_m_s: tuple[float, ...]
@@ -64,10 +66,8 @@ class Condition(Entry):
     air: Air | None = None
 
 
-class Conditions(BaseModel):
+class Conditions(Part):
     """The whole of `conditions.yaml`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     set: str
     conditions: tuple[Condition, ...] = ()
@@ -93,10 +93,8 @@ class Conditions(BaseModel):
         return ((condition.run == run) & (time_s >= start) & (time_s <= stop)).astype(float)
 
 
-class Window(BaseModel):
+class Window(Part):
     """A part of a run, s on its clock."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     run: str
     start_s: float | None = None
@@ -110,10 +108,8 @@ class Fault(Entry):
     """When it was so; empty for always."""
 
 
-class Instruments(BaseModel):
+class Instruments(Part):
     """The whole of `instruments.yaml`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     set: str
     instruments: tuple[Fault, ...] = ()
@@ -123,54 +119,50 @@ def conditions_of(analysis: Analysis) -> Conditions:
     """What an analysis found of the conditions of each run."""
     found: list[Condition] = []
     for finding in delivered(analysis, "conditions"):
-        own = _entry(finding).model_dump()
-        if catalogue()[finding.id].air_moves:
-            kind = catalogue()[finding.id].air_moves
-            found += [Condition(**own, run=b.run, **_span(b), air=_air(b)) for b in analysis.winds if b.kind == kind]
+        own, kind = _entry(finding).model_dump(), catalogue()[finding.id].air_moves
+        if kind:
+            found += [Condition(**own, **_blowing(b)) for b in analysis.winds if b.kind == kind]
         else:
-            found += [Condition(**own, run=r, start_s=_known(a), stop_s=_known(b)) for r, a, b in finding.windows]
+            found += [Condition(**own, **_within(*window)) for window in finding.windows]
     return Conditions(set=analysis.recordings.name, conditions=tuple(found))
 
 
 def instruments_of(analysis: Analysis) -> Instruments:
     """What an analysis found of the instruments."""
     entries = tuple(
-        Fault(
-            **_entry(f).model_dump(),
-            windows=tuple(Window(run=run, start_s=_known(a), stop_s=_known(b)) for run, a, b in f.windows),
-        )
+        Fault(**_entry(f).model_dump(), windows=tuple(Window(**_within(*w)) for w in f.windows))
         for f in delivered(analysis, "instruments")
     )
     return Instruments(set=analysis.recordings.name, instruments=entries)
 
 
-def _span(wind: RunWind) -> dict[str, float | None]:
-    always = wind.kind == "all the time"
-    return {"start_s": None if always else float(wind.time_s[0]), "stop_s": None if always else float(wind.time_s[-1])}
+def _within(run: str, start_s: float, stop_s: float) -> dict[str, str | float | None]:
+    """Keys of a window; an end that is not finite is the run's."""
+    start, stop = (float(x) if np.isfinite(x) else None for x in (start_s, stop_s))
+    return {"run": run, "start_s": start, "stop_s": stop}
 
 
-def _air(wind: RunWind) -> Air:
-    return Air(time_s=tuple(wind.time_s), north_m_s=tuple(wind.wind_m_s[:, 0]), east_m_s=tuple(wind.wind_m_s[:, 1]))
-
-
-def _known(instant: float) -> float | None:
-    return float(instant) if np.isfinite(instant) else None
+def _blowing(wind: RunWind) -> dict:
+    """Keys of a condition in which the air moves."""
+    air = Air(time_s=tuple(wind.time_s), north_m_s=tuple(wind.wind_m_s[:, 0]), east_m_s=tuple(wind.wind_m_s[:, 1]))
+    ends = (-np.inf, np.inf) if wind.kind == "all the time" else wind.time_s[[0, -1]]
+    return {**_within(wind.run, *ends), "air": air}
 
 
 def _entry(finding: Finding) -> Entry:
     form = form_of(finding)
-    stated = {e.symbol: float(e.value) for e in finding.parameters}
-    of_form = {} if form is None else dict(zip((p.symbol for p in form.parameters), finding.values, strict=True))
     # Moving air is stated by its velocity; the force that stands for it at one drag is another parameter.
-    moving = bool(catalogue()[finding.id].air_moves)
+    formless = form is None or bool(catalogue()[finding.id].air_moves)
+    symbols = finding.parameters if formless else form.parameters
+    values = [e.value for e in finding.parameters] if formless else finding.values
     others = [i for i in finding.alternatives if i != finding.id]
     return Entry(
         id=finding.id,
-        form="" if form is None or moving else form.name,
+        form="" if formless else form.name,
         equation=finding.equation or (form.equation if form else ""),
         sentence=finding.sentence,
         one_of=(finding.id, *others) if finding.status == "ambiguous" and others else (),
-        parameters=stated if form is None or moving else {k: float(v) for k, v in of_form.items()},
+        parameters={p.symbol: float(v) for p, v in zip(symbols, values, strict=True)},
         interval_95={e.symbol: (float(e.low), float(e.high)) for e in finding.parameters},
     )
 

@@ -15,10 +15,17 @@ from rotorid.mismatch.mistakes.signals import Signals
 from rotorid.mismatch.plant.motion import rates_from_attitude
 from rotorid.recordings import Vehicle
 
-KINEMATIC_BAND_HZ = (0.3, 12.0)
-ROTATION_BAND_HZ = (0.3, 20.0)
-MOMENT_BAND_HZ = (2.0, 25.0)
-FORCE_BAND_HZ = (1.5, 15.0)
+BANDS_HZ = {
+    "turning": (0.3, 20.0),
+    "accelerating": (0.3, 12.0),
+    "sideways": (0.3, 6.0),
+    "moving": (0.3, 12.0),
+    "rolling": (2.0, 25.0),
+    "yawing": (0.7, 15.0),
+    "lifting": (1.5, 15.0),
+    "following": (0.5, 15.0),
+}
+"""Of each comparison the frequencies that are looked at."""
 NYQUIST_SHARE = 0.35
 """Highest frequency used, as a share of the slower sensor's own rate."""
 
@@ -63,7 +70,7 @@ def turning(all_signals: list[Signals]) -> Blocks | None:
         slope = np.gradient(q, 1.0 / s.rate_hz, axis=0)
         return Signal(rates_from_attitude(q, slope)), Signal(s.values["gyroscope"]), None
 
-    return gather(all_signals, ("attitude", "gyroscope"), ROTATION_BAND_HZ, make)
+    return gather(all_signals, ("attitude", "gyroscope"), BANDS_HZ["turning"], make)
 
 
 def accelerating(all_signals: list[Signals], vehicle: Vehicle, source: str) -> Blocks | None:
@@ -80,7 +87,7 @@ def accelerating(all_signals: list[Signals], vehicle: Vehicle, source: str) -> B
             body = np.stack([np.zeros_like(lift), np.zeros_like(lift), -lift], axis=1)
         return Signal(s.values["velocity"], True), Signal(np.einsum("nij,nj->ni", s.rotation(), body)), None
 
-    return gather(all_signals, ("velocity", "attitude", source), KINEMATIC_BAND_HZ, make)
+    return gather(all_signals, ("velocity", "attitude", source), BANDS_HZ["accelerating"], make)
 
 
 def sideways(all_signals: list[Signals], gravity_m_s2: float) -> Blocks | None:
@@ -91,7 +98,7 @@ def sideways(all_signals: list[Signals], gravity_m_s2: float) -> Blocks | None:
         body = np.einsum("nji,nj->ni", s.rotation(), slope - np.array([0.0, 0.0, gravity_m_s2]))
         return Signal(body[:, :2]), Signal(s.values["accelerometer"][:, :2]), None
 
-    return gather(all_signals, ("velocity", "attitude", "accelerometer"), (0.3, 6.0), make)
+    return gather(all_signals, ("velocity", "attitude", "accelerometer"), BANDS_HZ["sideways"], make)
 
 
 def moving(all_signals: list[Signals]) -> Blocks | None:
@@ -100,7 +107,7 @@ def moving(all_signals: list[Signals]) -> Blocks | None:
     def make(s: Signals):
         return Signal(s.values["position"], True), Signal(s.values["velocity"]), None
 
-    return gather(all_signals, ("position", "velocity"), KINEMATIC_BAND_HZ, make)
+    return gather(all_signals, ("position", "velocity"), BANDS_HZ["moving"], make)
 
 
 def rolling(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
@@ -112,7 +119,7 @@ def rolling(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks
         turning = np.stack([-(thrust @ at[:, 1]) / inertia.xx, (thrust @ at[:, 0]) / inertia.yy], axis=1)
         return Signal(rate[:, :2], True), Signal(turning), Signal(rate)
 
-    return gather(all_signals, ("gyroscope", sensor), MOMENT_BAND_HZ, make)
+    return gather(all_signals, ("gyroscope", sensor), BANDS_HZ["rolling"], make)
 
 
 def lifting(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
@@ -122,17 +129,17 @@ def lifting(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks
         lift = -squared_speeds(s, vehicle, sensor).sum(axis=1, keepdims=True) / vehicle.mass_kg
         return Signal(s.values["accelerometer"][:, 2:]), Signal(lift), None
 
-    return gather(all_signals, ("accelerometer", sensor), FORCE_BAND_HZ, make)
+    return gather(all_signals, ("accelerometer", sensor), BANDS_HZ["lifting"], make)
 
 
 def following(all_signals: list[Signals], sensor: str) -> Blocks | None:
     """Y: one rotor's measured speed; X: its command (or throttle), all rotors stacked as blocks."""
     parts = []
+    limits = band(all_signals, ("rotors", sensor), BANDS_HZ["following"])
+    if limits[1] < 2.5 * limits[0]:
+        return None
     for number, s in enumerate(all_signals):
         if {"rotors", sensor} <= set(s.values):
-            limits = band(all_signals, ("rotors", sensor), (0.5, 15.0))
-            if limits[1] < 2.5 * limits[0]:
-                continue
             for i in range(s.values["rotors"].shape[1]):
                 pick = slice(i, i + 1)
                 y, x = Signal(s.values["rotors"][:, pick]), Signal(s.values[sensor][:, pick])

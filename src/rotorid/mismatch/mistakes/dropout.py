@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes.signals import COMMANDED, replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import COMMANDED, P_LIMIT, replace_columns, sensor_columns
 from rotorid.mismatch.plant.motion import stretches
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
@@ -27,7 +27,6 @@ STANDING = 0.2
 IMPLAUSIBLE_THRUST = 0.45
 """A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read."""
 LARGEST_UNTOUCHED_SHARE = 0.5
-CHANCE = 1e-9
 SMOOTH = 0.3
 """Second differences of a reading without noise are this share of its first ones at most; white noise has 1.7."""
 PLAIN_CHANGE = 8.0
@@ -221,7 +220,7 @@ def held(
         habit = np.quantile(others, 0.99) if len(others) > 20 else 1
         repeat = (others - 1).sum() / len(v)
         p = float(min(1.0, len(v) * max(repeat, 1.0 / len(v)) ** (length / max(habit, 1))))
-        if p > CHANCE or length < 8 * habit or may_stand(v, a, b, noisy):
+        if p > P_LIMIT or length < 8 * habit or may_stand(v, a, b, noisy):
             continue
         mask = np.zeros(len(values), bool)
         # The first of the repeated readings is a true one, but where it is a jump (to zero) by itself.

@@ -36,10 +36,6 @@ UNDECIDED = 12.0
 """Motor lags within this log-likelihood are not distinguished."""
 
 
-OF_BLOCKS = ("y", "x", "z", "run", "time_s")
-"""What a block has of its own."""
-
-
 @dataclass(frozen=True)
 class Blocks:
     """Spectra of blocks of time."""
@@ -77,7 +73,8 @@ class Blocks:
 
     def part(self, chosen) -> Blocks:
         """Some of the blocks only."""
-        return replace(self, **{n: getattr(self, n)[chosen] for n in OF_BLOCKS})
+        own = (self.y, self.x, self.z, self.run, self.time_s)
+        return Blocks(self.frequency_hz, *(v[chosen] for v in own))
 
 
 @dataclass(frozen=True)
@@ -93,7 +90,8 @@ def join(parts: list[Blocks | None]) -> Blocks | None:
     parts = [p for p in parts if p is not None]
     if not parts:
         return None
-    return replace(parts[0], **{n: np.concatenate([getattr(p, n) for p in parts]) for n in OF_BLOCKS})
+    own = zip(*((p.y, p.x, p.z, p.run, p.time_s) for p in parts), strict=True)
+    return Blocks(parts[0].frequency_hz, *map(np.concatenate, own))
 
 
 def cut(

@@ -23,7 +23,6 @@ from rotorid.mismatch.mistakes.lagged import OVERLAP, Blocks, LaggedFit, Signal
 from rotorid.mismatch.mistakes.signals import ReadSet, Result, Signals, replace_columns, sensor_columns
 from rotorid.recordings import Run, Vehicle
 
-YAW_BAND_HZ = (0.7, 15.0)
 MOST_ROTORS_FOR_EVERY_ORDER = 6
 LEAST_LIKELIHOOD = 25.0
 """Log-likelihood that the right layout must bring over none, and over the believed one."""
@@ -267,7 +266,7 @@ def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blo
         thrust = compare.squared_speeds(s, vehicle, sensor)
         return Signal(rate[:, :2], True), Signal(thrust), Signal(rate)
 
-    return compare.gather(signals, ("gyroscope", sensor), compare.MOMENT_BAND_HZ, make)
+    return compare.gather(signals, ("gyroscope", sensor), compare.BANDS_HZ["rolling"], make)
 
 
 def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool) -> Result:
@@ -307,7 +306,7 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
         change = np.gradient(s.values[sensor], 1.0 / s.rate_hz, axis=0)
         return Signal(rate[:, 2:], True), Signal(np.concatenate([torque, change], axis=1)), Signal(rate)
 
-    blocks = compare.gather(signals, ("gyroscope", sensor), YAW_BAND_HZ, make)
+    blocks = compare.gather(signals, ("gyroscope", sensor), compare.BANDS_HZ["yawing"], make)
     sharp = roll.lag_sd < 0.005
     late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))

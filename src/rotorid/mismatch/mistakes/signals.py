@@ -16,6 +16,8 @@ from rotorid.recordings import columns as c
 
 COMMANDED = ("commands", "throttle")
 """Sensors that are what was asked of the rotors, not what was measured."""
+P_LIMIT = 1e-9
+"""p-value below which the readings of a sensor show a mistake by themselves."""
 LONGEST_BRIDGED_SAMPLES = 6
 """A hole of up to this many of a sensor's own periods is interpolated; a longer one stays missing."""
 

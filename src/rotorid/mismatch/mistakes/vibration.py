@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from scipy.stats import gamma
 
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes.signals import ReadSet, Result, Signals
+from rotorid.mismatch.mistakes.signals import P_LIMIT, ReadSet, Result, Signals
 from rotorid.mismatch.plant.motion import full_speed
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import columns as c
@@ -24,7 +24,6 @@ WINDOW_S = 0.35
 SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
 """Offsets from the order, in widths of the window, that give the level next to the line."""
 ORDERS = (1, 2)
-P_LIMIT = 1e-9
 LEAST_MEDIAN = 3.0
 """Power at the order over that next to it in half of the windows, at least."""
 LEAST_AMPLITUDE = 0.5

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rotorid.effects.contract import Contribution, Form, Motion, not_testable_reason
+from rotorid.effects.contract import Form, Motion, not_testable_reason
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.drift import WINDOW_S
 from rotorid.mismatch.decision.findings import Analysis
@@ -149,15 +149,12 @@ def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], 
             speed = commanded_path(segment, model.chain, values, 0.0, full_speed, max(voltages, default=None))
             acceleration = np.gradient(speed, motion.time_s, axis=0)
         wind = model.conditions.wind(segment.run, motion.time_s) if model.conditions else None
-        slow = [pair for pair in model.forms if remembers(pair[0], pair[1], motion, model.vehicle)]
         turning = replace(motion, rotor_speed=speed, wind=wind)
-        force, moment = _wrench_along(slow, [turning] * len(slow), model.vehicle)
-        aboard = [
-            replace(turning, on_board=model.conditions.present(condition, segment.run, motion.time_s))
-            for condition, _, _ in model.loads
-        ]
-        payload = _wrench_along([pair for _, *pair in model.loads], aboard, model.vehicle)
-        force, moment = _added(force, payload[0]), _added(moment, payload[1])
+        acting = [(form, v, turning) for form, v in model.forms if remembers(form, v, motion, model.vehicle)]
+        for condition, form, v in model.loads:
+            aboard = model.conditions.present(condition, segment.run, motion.time_s)
+            acting.append((form, v, replace(turning, on_board=aboard)))
+        force, moment = _wrench_along(acting, model.vehicle)
         inputs.append(Inputs(speed, acceleration, motion.height, motion.voltage, wind, force, moment))
         states.append(_states(segment, model))
     return inputs, states
@@ -192,18 +189,13 @@ def remembers(form: Form, values: np.ndarray, motion: Motion, vehicle: Vehicle) 
 
 
 def _wrench_along(
-    forms: Sequence[tuple[Form, np.ndarray]], motions: Sequence[Motion], vehicle: Vehicle
+    acting: Sequence[tuple[Form, np.ndarray, Motion]], vehicle: Vehicle
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Wrench of forms along the recorded flight, each with a motion of its own: (n, 3) N and N m, None for nothing."""
-    total = Contribution()
-    for (form, values), motion in zip(forms, motions, strict=True):
-        part = form.contribution(motion, vehicle, values)
-        total = Contribution(_added(total.force, part.force), _added(total.moment, part.moment))
-    return total.force, total.moment
-
-
-def _added(a: np.ndarray | None, b: np.ndarray | None) -> np.ndarray | None:
-    return b if a is None else a if b is None else a + b
+    """Wrench of forms with values, each along a motion of its own: (n, 3) N and N m, None for nothing."""
+    parts = [form.contribution(motion, vehicle, values) for form, values, motion in acting]
+    given = ([x for x in own if x is not None] for own in ([p.force for p in parts], [p.moment for p in parts]))
+    force, moment = (np.sum(own, axis=0) if own else None for own in given)
+    return force, moment
 
 
 def predict(segment: Segment, model: Model, inputs: Inputs, states: States):
