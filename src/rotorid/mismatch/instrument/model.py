@@ -13,9 +13,9 @@ from rotorid.effects.contract import Form
 from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.select import Questions, Search, Selection
-from rotorid.mismatch.instrument.columns import OFFSET, rows_of, term_columns
+from rotorid.mismatch.instrument.columns import OFFSET, rows_of
 from rotorid.mismatch.instrument.sampling import resolution
-from rotorid.mismatch.instrument.setup import Setup, averaged, pieces_of
+from rotorid.mismatch.instrument.setup import Setup
 from rotorid.mismatch.plant.comparison import LEAST_RUNS
 from rotorid.mismatch.plant.contributions import Contributions
 from rotorid.mismatch.plant.regression import (
@@ -286,32 +286,25 @@ def size_function(regression: Regression, of_columns):
     return lambda key, beta: of_columns(regression.columns([key]), beta) / resolution[key]
 
 
-def whitened(model: ReadingModel, values: list[np.ndarray]) -> list[np.ndarray]:
-    """Columns (n, 6) of every stretch's rows through the whitening filters, flattened over channels."""
-    taps = model.regression.filters
-    longest = max(len(t) for t in taps.values()) - 1
-    return [np.stack([causal(taps[c], v[:, c])[longest:] for c in taps], axis=1).ravel() for v in values]
-
-
 def refined(model: ReadingModel) -> list[Term]:
     """Terms with the nonlinear parameters of those at work fitted, all linear ones free (variable projection)."""
     setup, search = model.setup, model.search
     moving = [k for k in model.selection.active if search.terms[k].form.nonlinear]
     if not moving:
         return model.terms
-    stretches = list(model.loadings)
-    owner = [k for k, x in enumerate(stretches) for _ in pieces_of(x, setup.average)]
-    index = {}
-    for i, k in enumerate(owner):
-        index[i] = pieces_of(stretches[k], setup.average)[i - owner.index(k)]
-    channels = list(setup.instrument.channels)
     timing = [k for k in search.always if search.terms[k].kind == "nuisance"]
     always = kept_values(search, model.selection.active)
     fixed = [k for k in (*always, *model.selection.active) if k not in moving and k not in timing]
     reg = model.regression
 
+    taps = reg.filters
+    longest = max(len(t) for t in taps.values()) - 1
+
     def white(values):
-        return np.concatenate(whitened(model, values))
+        """Columns (n, 6) of every part through the whitening filters, in a row."""
+        return np.concatenate(
+            [np.stack([causal(taps[c], v[:, c])[longest:] for c in taps], axis=1).ravel() for v in values]
+        )
 
     y = white([np.nan_to_num(r.y) for r in model.rows])
     base = [white([r.x[:, :, c] for r in model.rows]) for c in reg.columns(fixed)]
@@ -329,40 +322,22 @@ def refined(model: ReadingModel) -> list[Term]:
             out[k][i] = value
         return {k: replace(search.terms[k], values=tuple(v)) for k, v in out.items()}
 
-    def columns_of(term, whole_forms=()):
-        whole: dict[int, list[np.ndarray]] = {}
-        parts = []
-        for i in range(len(model.rows)):
-            k = owner[i]
-            if k not in whole:
-                columns = term_columns(term, stretches[k], setup.vehicle, whole_forms)
-                whole[k] = [averaged(x, setup.average) for x in columns]
-            block = []
-            for column in whole[k]:
-                full = np.zeros((len(index[i]), 6))
-                full[:, channels] = column[index[i]][:, channels]
-                block.append(full)
-            parts.append(block)
-        return [white([p[k] for p in parts]) for k in range(len(parts[0]))]
-
     def residual(theta):
         target, free = y, list(base)
         weights, limits = list(prior), [np.inf] * len(base)
         moved = list(with_values(theta).values())
-        whole = whole_reading(moved, moving)
-        for term in [*(search.terms[k] for k in timing), *moved]:
-            own = columns_of(term, whole)
-            if term.kind == "nuisance":
-                free += own
-                weights += [1.0 / term.prior_sd[0] ** 2]
-                limits += [MOST_OFFSET / setup.instrument.rate_hz]
-                continue
-            if term.form.linear:
-                free += own
-                weights += [0.0] * len(own)
-                limits += [np.inf] * len(own)
-            else:
+        terms = [*(search.terms[k] for k in timing), *moved]
+        rows = rows_of(setup, terms, model.loadings, whole_reading(moved, moving))
+        at = 0
+        for term in terms:
+            own = [white([r.x[:, :, c] for r in rows]) for c in range(at, at + term.size)]
+            at += term.size
+            if term.kind == "effect" and not term.form.linear:
                 target = target - own[0]
+                continue
+            free += own
+            weights += [1.0 / sd**2 for sd in term.prior_sd]
+            limits += [MOST_OFFSET / setup.instrument.rate_hz if term.kind == "nuisance" else np.inf] * len(own)
         if not free:
             return target
         x = np.stack(free, axis=1)
