@@ -251,7 +251,7 @@ def offered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, 
         final, refitted = gated.settled, gated.refitted
         kept, shorter = with_terms(fewer, list(final.offer.active)), chain
         for key in gone:
-            shorter = without_id(choice.setup, shorter, key)
+            shorter = without_id(shorter, key)
         stated = {k: v for k, v in choice.stated.items() if k in final.offer.values}
         own = replace(choice, model=kept, chain=shorter, values=final.offer.values, stated=stated, findings=findings)
         every, changed = replace(seen, selection=kept.selection), {**refitted.moved, **refitted.offer.values}
@@ -296,7 +296,7 @@ def without_each(
             fewer = settled(model, values, [k for k in active if model.search.terms[k].effect != effect])[0]
             out[effect] = on_traces(traces, seen.rows, residuals_of(seen, fewer))
     for key in [] if chain is None else [k for k, _ in chain.fit.chain if k in names and k not in out]:
-        own = speed_traces(seen.setup, without_id(seen.setup, chain, key))
+        own = speed_traces(seen.setup, without_id(chain, key))
         left = {(t.run, t.channel, first_s(t.time_s)): t.after for t in own}
         out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
     return out

@@ -22,16 +22,15 @@ from rotorid.mismatch.decision.findings import Finding, Trace
 from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces_of, with_speed
 from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
+from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings.signal.kernels import causal
 
-ENTER_P = 1e-5
-COST_PER_PARAMETER = 10.0
-SMALLEST_SIZE = 0.15
 MOST_SAMPLES = 12_000
 RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
-QUICK_FIT = 6
+QUICK_FIT, MOST_STEPS = 6, 30
+"""Evaluations of the Jacobian at most of a first trial, and of a fit."""
 MOST_TRIED = 4
 MOST_FORMS = 4
 MOST_DOUBT = 3.0
@@ -64,10 +63,35 @@ class ChainFit:
     chain: Chain
     theta: np.ndarray
     cost: float
-    inflation: float = 1.0
+    scaled: bool
+    """Whether the full speed is free."""
 
-    def values(self, scaled: bool) -> np.ndarray:
-        return self.theta[1:] if scaled else self.theta
+    @property
+    def full(self) -> np.ndarray:
+        """The full speed where it is free, rad/s, else nothing."""
+        return self.theta[: int(self.scaled)]
+
+    @property
+    def values(self) -> np.ndarray:
+        """All but the full speed."""
+        return self.theta[int(self.scaled) :]
+
+    def place(self, key: str) -> slice:
+        """Where the parameters of an id stand in theta."""
+        at = int(self.scaled)
+        for own, form in self.chain:
+            if own == key:
+                return slice(at, at + len(form.parameters))
+            at += len(form.parameters)
+        raise KeyError(key)
+
+    def beside(self, key: str) -> Chain:
+        """The chain without an id."""
+        return tuple((k, f) for k, f in self.chain if k != key)
+
+    def exchanged(self, key: str, pair: tuple[str, SpeedForm]) -> Chain:
+        """The chain with another form in the place of an id."""
+        return ordered(tuple(pair if k == key else (k, f) for k, f in self.chain))
 
 
 @dataclass
@@ -276,12 +300,12 @@ class Problem:
         reach = MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
-    def fit(self, chain: Chain, start: np.ndarray, most: int = 30) -> ChainFit:
+    def fit(self, chain: Chain, start: np.ndarray, most: int = MOST_STEPS) -> ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
         low, high = self.bounds(chain)
         if not len(start):
             w = self.white(chain, start)
-            return ChainFit(chain, start, float(w @ w))
+            return ChainFit(chain, start, float(w @ w), self.scaled)
         span = np.where(np.isfinite(high - low), high - low, np.maximum(np.abs(start), 1.0))
         start = np.clip(start, low + 1e-9 * span, high - 1e-9 * span)
         scale = np.maximum(np.abs(start), 0.02 * span)
@@ -293,7 +317,7 @@ class Problem:
             diff_step=1e-4,
             max_nfev=most,
         )
-        return ChainFit(chain, found.x, float(2 * found.cost))
+        return ChainFit(chain, found.x, float(2 * found.cost), self.scaled)
 
     def fit_if_near(self, chain: Chain, start: np.ndarray, cost: float) -> ChainFit:
         """As `fit`, but left after a few steps where these end far above a cost that is to be reached."""
@@ -396,28 +420,23 @@ def ordered(chain: Chain) -> Chain:
     return tuple(sorted(chain, key=lambda pair: pair[1].stage))
 
 
-def start_of(chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm], values, scaled: bool) -> np.ndarray:
-    """Start of a chain from the fit of another that lacks one form."""
-    theta = [fit.theta[0]] if scaled else []
-    at = 1 if scaled else 0
-    known = {}
-    for key, form in fit.chain:
-        known[key] = fit.theta[at : at + len(form.parameters)]
-        at += len(form.parameters)
-    for key, form in chain:
-        theta += list(values if key == new[0] else known.get(key, form.neutral))
-    return np.array(theta, float)
+def start_of(problem: Problem, chain: Chain, fit: ChainFit, new: str = "", values=()) -> np.ndarray:
+    """Start of a chain from the fit of another that may lack one form, nothing having happened between its samples."""
+    known = {key: fit.theta[fit.place(key)] for key, _ in fit.chain}
+    theta = [values if key == new else known.get(key, form.neutral) for key, form in chain]
+    return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def with_unknown(problem: Problem, chain: Chain, theta: np.ndarray) -> np.ndarray:
-    """Full speed and parameters of a chain, and nothing that happened between its samples."""
-    return np.concatenate([theta, np.zeros(len(problem.unknown(chain)))])
+def fitted_with(
+    problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm], most: int | None = None
+) -> ChainFit:
+    """A chain with a new form fitted from what is known of the others, from that start which already explains most.
 
-
-def best_start(problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
-    """Of a new form's starting values those that already explain most."""
-    options = [with_unknown(problem, chain, start_of(chain, fit, new, v, problem.scaled)) for v in starts(new[1])]
-    return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
+    `most` evaluations of the Jacobian at most; None where a fit that ends far above the known one need not be ended.
+    """
+    options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
+    start = min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
+    return problem.fit_if_near(chain, start, fit.cost) if most is None else problem.fit(chain, start, most)
 
 
 def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
@@ -459,12 +478,10 @@ def without_mere_scale(problem: Problem, best: ChainFit, dropped: dict[str, str]
         for key, form in best.chain:
             if form.stage not in (CURVE, SUPPLY):
                 continue
-            rest = tuple((k, f) for k, f in best.chain if k != key)
-            kept = [best.theta[place_of(best.chain, k, False)] for k, _ in rest]
-            start = with_unknown(scaled, rest, np.concatenate([[problem.first_full], *kept]))
-            fit = scaled.fit(rest, start)
+            rest = best.beside(key)
+            fit = scaled.fit(rest, np.concatenate([[problem.first_full], start_of(problem, rest, best)]))
             if fit.cost < best.cost + COST_PER_PARAMETER * (len(form.parameters) - 1):
-                found = key, ChainFit(rest, fit.theta[1:], fit.cost)
+                found = key, ChainFit(rest, fit.values, fit.cost, False)
         if found is None:
             return best
         dropped[found[0]] = "another thrust coefficient explains as much"
@@ -501,7 +518,7 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
             if pair[0] in {k for k, _ in best.chain} or pair[0] in dropped:
                 continue
             chain = ordered((*best.chain, pair))
-            fit = problem.fit(chain, best_start(problem, chain, best, pair), QUICK_FIT)
+            fit = fitted_with(problem, chain, best, pair, QUICK_FIT)
             tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
         tried.sort(key=lambda t: -t[0])
         entered = False
@@ -527,8 +544,7 @@ def exchanged(problem: Problem, best: ChainFit, forms) -> ChainFit:
         for pair in forms:
             if pair[0] in taken:
                 continue
-            chain = ordered(tuple(pair if k == key else (k, f) for k, f in best.chain))
-            fit = problem.fit(chain, best_start(problem, chain, best, pair), QUICK_FIT)
+            fit = fitted_with(problem, best.exchanged(key, pair), best, pair, QUICK_FIT)
             more = COST_PER_PARAMETER * max(0, len(pair[1].parameters) - len(current.parameters))
             tried.append((fit.cost + more, fit))
     cost, quick = min(tried, key=lambda t: t[0], default=(np.inf, best))
@@ -542,7 +558,7 @@ def exchanged(problem: Problem, best: ChainFit, forms) -> ChainFit:
 def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | None:
     """Why a form does not enter; None if it does."""
     inner = richer(problem, fit)
-    where = place_of(inner.chain, pair[0], problem.scaled)
+    where = inner.place(pair[0])
     covariance, count = problem.covariance(inner)
     p = p_value(inner.theta[where] - np.array(pair[1].neutral), covariance[where, where], count)
     if p > ENTER_P:
@@ -561,7 +577,7 @@ def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFi
         covariance, count = problem.covariance(best)
         doubtful = {}
         for key, form in best.chain:
-            where = place_of(best.chain, key, problem.scaled)
+            where = best.place(key)
             p = p_value(best.theta[where] - np.array(form.neutral), covariance[where, where], count)
             if p > ENTER_P:
                 doubtful[key] = p
@@ -569,11 +585,8 @@ def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFi
             return best
         worst = max(doubtful, key=doubtful.get)
         dropped.setdefault(worst, f"p = {doubtful[worst]:.2g} given the others")
-        kept = [(k, f) for k, f in best.chain if k != worst]
-        theta = [best.theta[:1]] if problem.scaled else []
-        theta += [best.theta[place_of(best.chain, k, problem.scaled)] for k, _ in kept]
-        start = with_unknown(problem, tuple(kept), np.concatenate(theta) if theta else np.zeros(0))
-        best = richer(problem, ChainFit(tuple(kept), start, best.cost))
+        kept = best.beside(worst)
+        best = richer(problem, replace(best, chain=kept, theta=start_of(problem, kept, best)))
     return best
 
 
@@ -599,22 +612,12 @@ def better_forms(problem: Problem, best: ChainFit, forms) -> ChainFit:
         for pair in forms:
             if pair[0] != key or pair[1] is current:
                 continue
-            chain = ordered(tuple(pair if k == key else (k, f) for k, f in best.chain))
-            fit = problem.fit(chain, best_start(problem, chain, best, pair))
+            fit = fitted_with(problem, best.exchanged(key, pair), best, pair, MOST_STEPS)
             score = -COST_PER_PARAMETER * len(pair[1].parameters) - fit.cost
             if score > top:
                 top, found = score, fit
         best = found
     return best
-
-
-def place_of(chain: Chain, key: str, scaled: bool) -> slice:
-    at = 1 if scaled else 0
-    for own, form in chain:
-        if own == key:
-            return slice(at, at + len(form.parameters))
-        at += len(form.parameters)
-    raise KeyError(key)
 
 
 def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
@@ -628,7 +631,7 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
     findings = []
     dt_s = 1.0 / setup.instrument.rate_hz
     for key, form in best.chain:
-        where = place_of(best.chain, key, problem.scaled)
+        where = best.place(key)
         if form.stage == DELAY and abs(best.theta[where][0]) <= SUB_SAMPLE * dt_s:
             continue  # less than a sample: no finding
         values, deviation = best.theta[where], sd[where]
@@ -663,14 +666,13 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
 def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]:
     """Ids that in a form's place explain as well."""
     out = []
-    rest = tuple((k, f) for k, f in best.chain if k != key)
+    rest = best.beside(key)
     taken = {k for k, _ in rest}
     size = len(next(f for k, f in best.chain if k == key).parameters)
     for pair in forms:
         if pair[0] == key or pair[0] in taken or pair[0] in out or len(pair[1].parameters) > size + 1:
             continue
-        chain = ordered((*rest, pair))
-        fit = problem.fit_if_near(chain, best_start(problem, chain, best, pair), best.cost)
+        fit = fitted_with(problem, ordered((*rest, pair)), best, pair)
         if fit.cost < best.cost + ALIKE:
             out.append(pair[0])
     out += [k for k in rest_in_other_forms(problem, best, rest, forms) if k not in out]
@@ -692,7 +694,7 @@ def rest_in_other_forms(problem: Problem, best: ChainFit, rest: Chain, forms) ->
             chain = ordered(tuple(pair if k == key else (k, f) for k, f in rest))
             if sum(len(f.parameters) for _, f in chain) > most:
                 continue
-            fit = problem.fit_if_near(chain, best_start(problem, chain, best, pair), best.cost)
+            fit = fitted_with(problem, chain, best, pair)
             if fit.cost < best.cost + ALIKE:
                 out.append(key)
     return out
@@ -713,14 +715,7 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
                     finally:
                         problem.others = others
 
-                start = np.concatenate(
-                    [
-                        [p],
-                        [t for t in best.theta[:1]] if problem.scaled else [],
-                        *[best.theta[place_of(best.chain, k, problem.scaled)] for k, _ in rest],
-                        np.zeros(len(problem.unknown(rest))),
-                    ]
-                )
+                start = np.concatenate([[p], start_of(problem, rest, best)])
                 low, high = problem.bounds(rest)
                 low, high = np.append(form.parameters[0].low, low), np.append(form.parameters[0].high, high)
                 found = least_squares(
@@ -739,7 +734,7 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
 def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
     """Loadings with the speeds that the chain makes of the commands (where none are measured)."""
     problem = Problem(setup)
-    values = result.fit.values(problem.scaled)
+    values = result.fit.values
     out = []
     for x in setup.loadings:
         chain = result.fit.chain
@@ -750,13 +745,12 @@ def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
     return tuple(out)
 
 
-def without_id(setup: Setup, result: ChainResult, key: str) -> ChainResult:
+def without_id(result: ChainResult, key: str) -> ChainResult:
     """The result with one id less between command and speed, the numbers of the others as they are."""
-    problem, fit = Problem(setup, holds=result.holds), result.fit
-    rest = tuple((k, f) for k, f in fit.chain if k != key)
-    known = int(problem.scaled) + sum(len(f.parameters) for _, f in fit.chain)
-    theta = np.delete(np.asarray(fit.theta)[:known], np.arange(known)[place_of(fit.chain, key, problem.scaled)])
-    return replace(result, fit=replace(fit, chain=rest, theta=theta))
+    fit = result.fit
+    known = int(fit.scaled) + sum(len(f.parameters) for _, f in fit.chain)
+    theta = np.delete(fit.theta[:known], np.arange(known)[fit.place(key)])
+    return replace(result, fit=replace(fit, chain=fit.beside(key), theta=theta))
 
 
 def speed_traces(setup: Setup, result: ChainResult) -> tuple[Trace, ...]:
