@@ -197,7 +197,7 @@ def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarra
 
 
 def stretches_of_commands(reference: Reference, new: RecordingSet, joint: Joint) -> Sequence[Segment]:
-    """Stretches of the second set from which its chain is told: corrected, or as recorded.
+    """Stretches of the second set from which its chain is estimated: corrected, or as recorded.
 
     Where the clock of the rotor speeds was late and is corrected, commands that it stamped, too, would seem early.
     """
