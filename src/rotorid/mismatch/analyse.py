@@ -441,11 +441,11 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in CLAIMED]
     load = next(e for e in catalogue().values() if e.like_on_heavier)
-    first, *beside = load.like_on_heavier
+    first, *others = load.like_on_heavier
     offset = next((f for f in stated if first in (f.id, *f.alternatives)), None)
     if not rules.PAYLOAD_OR_OFFSET(offset is not None and heavier):
         return findings
-    return [f.or_else([load.id]) if f is offset or (f.id in beside and f in stated) else f for f in findings]
+    return [f.or_else([load.id]) if f is offset or (f.id in others and f in stated) else f for f in findings]
 
 
 def make_traces(

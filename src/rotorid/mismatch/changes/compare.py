@@ -26,7 +26,6 @@ from rotorid.mismatch.changes.joint import (
     evidence_at,
     joined_at,
     joints_of,
-    recorded_stretches,
     reference_of,
 )
 from rotorid.mismatch.changes.notes import command_notes, notes_of
@@ -118,7 +117,7 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
         )
     if isinstance(reference, Reference):
         joint, options = most_alike(reference, new, prior)
-        stretches = reference.recorded, stretches_of_commands(reference, new, joint)
+        stretches = reference.recorded, stretches_of_commands(reference, joint)
         found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
         stated, notes = changes_in(options, prior), command_notes(*stretches, base.name, new.name)
     else:
@@ -196,15 +195,14 @@ def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarra
     return np.hypot(usual, spread_of_flights(runs, decide))
 
 
-def stretches_of_commands(reference: Reference, new: RecordingSet, joint: Joint) -> Sequence[Segment]:
+def stretches_of_commands(reference: Reference, joint: Joint) -> Sequence[Segment]:
     """Stretches of the second set from which its chain is estimated: corrected, or as recorded.
 
     Where the clock of the rotor speeds was late and is corrected, commands that it stamped, too, would seem early.
     """
-    if not joint.mistakes_of_new or reference.chain is None or reference.found.commanded:
+    if not joint.uncorrected or reference.chain is None or reference.found.commanded:
         return joint.recorded
-    as_it_is, _ = recorded_stretches(reference.found, replace(new, held_out=()))
-    return most_like(reference.found, reference.chain, (joint.recorded, as_it_is))
+    return most_like(reference.found, reference.chain, (joint.recorded, joint.uncorrected))
 
 
 def most_like(found: Fitted, chain: ChainTerms, variants: Sequence[Sequence[Segment]]) -> Sequence[Segment]:

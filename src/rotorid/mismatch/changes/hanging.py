@@ -54,4 +54,4 @@ def carrying(reference: Reference, joint: Joint) -> tuple[Reference, Joint, floa
     both = joined_at(other, joint.recordings, recorded, other.chain, joint.mistakes_of_new, own)
     keys = {t.key for t in swings}
     alone = tuple(replace(t, alone=t.key in keys) for t in both.new.terms)
-    return other, replace(both, new=replace(both.new, terms=alone)), 0.5 * price(hung)
+    return other, replace(both, new=replace(both.new, terms=alone), uncorrected=joint.uncorrected), 0.5 * price(hung)

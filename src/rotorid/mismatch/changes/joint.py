@@ -73,6 +73,8 @@ class Joint:
     squares: dict[str, np.ndarray]
     """To the key of each effect and believed value what its columns amount to in the second set
     (`absent.squares_of`)."""
+    uncorrected: tuple[Segment, ...] = ()
+    """The stretches before its mistakes were corrected; none where nothing was that the first set has not as well."""
     segments_of_new: tuple[Segment, ...] = ()
     """Its stretches of flight with the rotors turning; none of an instrument."""
     own_effects: Effects = ()
@@ -131,8 +133,10 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     if of_chain:
         usual[-len(chain.values) :] = chain.spread
     again = rows_of(found, terms, chain, noisy)[1] if noisy else []
-    noise = noise_of(found, rows, again, [*terms, *of_chain], block_s)
-    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, known, block_s, noise)
+    alike = [len(r.y) for r in rows] == [len(r.y) for r in again]
+    regression = regression_of(rows, [*terms, *of_chain], model, block_s, again if alike else None)
+    noise = noise_of_a_block(regression)
+    evidence, runs = evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
     return Reference(
         recordings=base,
         found=found,
@@ -155,8 +159,10 @@ def on_terms(reference: Reference, terms: Sequence[Term]) -> Reference:
     """The first set with the nonlinear parameters of its columns at other values."""
     found, chain = reference.found, reference.chain
     _, rows = rows_of(found, terms, chain, reference.recorded)
-    given = reference.known, reference.block_s, reference.noise
-    evidence, runs = evidence_of_rows(found, terms, chain, chain, rows, *given)
+    of_chain = chain.terms if found.commanded else []
+    regression = regression_of(rows, [*terms, *of_chain], found.model, reference.block_s)
+    chains = (chain, chain) if of_chain else ()
+    evidence, runs = evidence_of(regression, reference.noise, reference.known, *chains)
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
 
 
@@ -164,35 +170,29 @@ def evidence_at(reference: Reference, chain: ChainTerms) -> Evidence:
     """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
     found, first = reference.found, reference.chain
     _, rows = rows_of(found, reference.terms, chain, reference.recorded, first)
-    given = reference.known, reference.block_s, reference.noise
-    return evidence_of_rows(found, reference.terms, chain, first, rows, *given)[0]
+    regression = regression_of(rows, [*reference.terms, *chain.terms], found.model, reference.block_s)
+    return evidence_of(regression, reference.noise, reference.known, chain, first)[0]
 
 
-def evidence_of_rows(
-    found: Fitted,
-    terms: Sequence[Term],
-    chain: ChainTerms | None,
-    first: ChainTerms | None,
-    rows: list[Rows],
-    known: np.ndarray,
-    block_s: float,
+def evidence_of(
+    regression: Regression,
     noise: np.ndarray,
+    known: np.ndarray,
+    chain: ChainTerms | None = None,
+    first: ChainTerms | None = None,
 ) -> tuple[Evidence, tuple[Evidence, ...]]:
-    """Evidence of the first set's rows, and the same run by run; parameters as of `rows_of` and Reference."""
-    of_chain = chain.terms if found.commanded else []
-    regression = regression_of(rows, [*terms, *of_chain], found.model, block_s)
+    """Evidence of the first set's rows, and the same run by run; `noise` and `known` as of Reference.
+
+    `chain` is the one at which columns are taken, `first` the first set's; None where it has no columns.
+    """
     evidence = with_known_effects(noisy_evidence(regression, noise), known)
-    evidence = chain.named(evidence, first) if of_chain else evidence
+    evidence = evidence if chain is None else chain.named(evidence, first)
     return evidence, by_run(evidence, regression)
 
 
-def noise_of(found: Fitted, rows: list[Rows], noisy: list[Rows], terms: Sequence[Term], block_s: float) -> np.ndarray:
-    """What the sensors' noise adds to the products in a block, (C, K, K); `noisy` are the rows with it added once more.
-
-    None is added where the two are not of the same stretches.
-    """
-    alike = [len(r.y) for r in rows] == [len(r.y) for r in noisy]
-    evidence = evidence_from(regression_of(rows, terms, found.model, block_s, noisy if alike else None))
+def noise_of_a_block(regression: Regression) -> np.ndarray:
+    """What the sensors' noise adds to the products in a block, (C, K, K); nothing of rows without noisy ones."""
+    evidence = evidence_from(regression)
     return evidence.bias_gram / evidence.blocks.sum()
 
 
@@ -228,7 +228,8 @@ def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
             f"set {new.name}: no stretch has all that {reference.recordings.name} was fitted by; "
             "expected the same columns in both"
         )
-    return joints
+    as_it_is = stretches[-1][1] if len(stretches) > 1 else ()
+    return [replace(joint, uncorrected=tuple(as_it_is)) for joint in joints]
 
 
 def joined_at(
@@ -301,7 +302,9 @@ def rows_of(
     segments = as_flown(list(recorded), turned)
     # What lasts of the residual moment is what lasts of the rotors' own. Free coefficients of a column with that part
     # (arm) and of one without (inertia) would together explain it, whatever it is of.
-    rows = assemble_rows(model.prepared, list(terms), segments, [*(model.effects or []), *own_effects], lasting=True)
+    rows = assemble_rows(
+        model.prepared, list(terms), segments, [*(model.effects or []), *own_effects], low_frequencies=True
+    )
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
     rows = as_seen(against_own(rows, model, segments, vehicle), model, [t.key for t in terms])
     if columns is not None:

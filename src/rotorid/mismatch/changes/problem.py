@@ -216,8 +216,8 @@ def products_of_changes(
     usual = in_units(spread, spectra[1].unit) ** 2
     turn = np.linalg.inv(np.eye(len(cross)) + gram * usual)
     bias = turn @ noise_of_difference(base, new, free) @ turn.T
-    gram, cross = turn @ gram, turn @ cross
-    return 0.5 * (gram + gram.T), cross, bias, -bias @ (usual * (np.linalg.solve(turn, cross)))
+    turned = turn @ gram
+    return 0.5 * (turned + turned.T), turn @ cross, bias, -bias @ (usual * cross)
 
 
 def free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:

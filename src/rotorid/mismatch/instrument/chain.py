@@ -85,7 +85,7 @@ class ChainFit:
             at += len(form.parameters)
         raise KeyError(key)
 
-    def beside(self, key: str) -> Chain:
+    def chain_without(self, key: str) -> Chain:
         """The chain without an id."""
         return tuple((k, f) for k, f in self.chain if k != key)
 
@@ -478,7 +478,7 @@ def without_mere_scale(problem: Problem, best: ChainFit, dropped: dict[str, str]
         for key, form in best.chain:
             if form.stage not in (CURVE, SUPPLY):
                 continue
-            rest = best.beside(key)
+            rest = best.chain_without(key)
             fit = scaled.fit(rest, np.concatenate([[problem.first_full], start_of(problem, rest, best)]))
             if fit.cost < best.cost + COST_PER_PARAMETER * (len(form.parameters) - 1):
                 found = key, ChainFit(rest, fit.values, fit.cost, False)
@@ -585,7 +585,7 @@ def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFi
             return best
         worst = max(doubtful, key=doubtful.get)
         dropped.setdefault(worst, f"p = {doubtful[worst]:.2g} given the others")
-        kept = best.beside(worst)
+        kept = best.chain_without(worst)
         best = richer(problem, replace(best, chain=kept, theta=start_of(problem, kept, best)))
     return best
 
@@ -666,7 +666,7 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
 def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]:
     """Ids that in a form's place explain as well."""
     out = []
-    rest = best.beside(key)
+    rest = best.chain_without(key)
     taken = {k for k, _ in rest}
     size = len(next(f for k, f in best.chain if k == key).parameters)
     for pair in forms:
@@ -750,7 +750,7 @@ def without_id(result: ChainResult, key: str) -> ChainResult:
     fit = result.fit
     known = int(fit.scaled) + sum(len(f.parameters) for _, f in fit.chain)
     theta = np.delete(fit.theta[:known], np.arange(known)[fit.place(key)])
-    return replace(result, fit=replace(fit, chain=fit.beside(key), theta=theta))
+    return replace(result, fit=replace(fit, chain=fit.chain_without(key), theta=theta))
 
 
 def speed_traces(setup: Setup, result: ChainResult) -> tuple[Trace, ...]:

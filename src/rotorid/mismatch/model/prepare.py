@@ -35,8 +35,8 @@ from rotorid.mismatch.plant.rows import (
     assemble,
     baseline_wrench,
     form_columns,
+    high_passed,
     offset_columns,
-    passing,
     project,
     residual,
     slope_column,
@@ -324,7 +324,7 @@ def with_predictions(segment: Segment, prepared: Prepared, effects: list[tuple[F
         if motion.angular_acceleration is not None:
             inertia, rate = vehicle.inertia_kg_m2.matrix(), motion.angular_velocity
             turning = known["moment"] - np.cross(rate, rate @ inertia)
-            changed["angular_acceleration"] = passing(turning @ np.linalg.inv(inertia), segment.rate_hz)
+            changed["angular_acceleration"] = high_passed(turning @ np.linalg.inv(inertia), segment.rate_hz)
         return changed
 
     given = (vehicle, groups, *((form, *values) for form, values in effects))
@@ -363,16 +363,18 @@ def assemble_rows(
     segments: list[Segment] | None = None,
     effects: list[tuple[Form, np.ndarray]] | None = None,
     measured_moment: bool = False,
-    lasting: bool = False,
+    low_frequencies: bool = False,
 ) -> list[Rows]:
     """Rows of every segment for the given terms; `effects` only shape the accelerations in regressors.
 
-    `measured_moment` puts the measured moments into the value columns in place of the predicted ones, `lasting` keeps
-    in them what lasts of predicted angular accelerations.
+    `measured_moment` puts the measured moments into the value columns in place of the predicted ones, and
+    with `low_frequencies` those of predicted angular accelerations stay in them.
     """
 
     def rows_of(segment: Segment) -> Rows:
-        blocks = chain.from_iterable(columns_of(segment, prepared, terms, effects or [], measured_moment, lasting))
+        blocks = chain.from_iterable(
+            columns_of(segment, prepared, terms, effects or [], measured_moment, low_frequencies)
+        )
         return assemble(segment, prepared.vehicle, prepared.thinner, list(blocks))
 
     return [rows_of(s) for s in segments or prepared.segments]
@@ -384,7 +386,7 @@ def columns_of(
     terms: list[Term],
     effects: list[tuple[Form, np.ndarray]],
     measured_moment: bool,
-    lasting: bool,
+    low_frequencies: bool,
 ) -> Iterator[list[Block]]:
     """Columns of every term in a segment, thinned.
 
@@ -406,7 +408,7 @@ def columns_of(
         at = replace(flown, motion=motion)
         model = model_wrench(at, vehicle, [])
         reverse = moment_of(at, vehicle) if measured_moment and "moment" in groups else None
-        return thinned([value_columns(term.key, at, vehicle, groups, model, reverse, lasting)])
+        return thinned([value_columns(term.key, at, vehicle, groups, model, reverse, low_frequencies)])
 
     for term in terms:
         if term.run and term.run != segment.run:
@@ -422,7 +424,7 @@ def columns_of(
             given = (*same, term.form, term.values)
             yield made((term.key,), given, segment.motion, partial(of_effect, term))
         elif term.kind == "value":
-            yield made((term.key,), (*same, measured_moment, lasting), flown.motion, partial(of_value, term))
+            yield made((term.key,), (*same, measured_moment, low_frequencies), flown.motion, partial(of_value, term))
         else:
             yield thinned([offset_columns(term.key, segment, vehicle, groups)])
 

@@ -225,8 +225,8 @@ def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:
     return segment.motion.angular_acceleration @ inertia + np.cross(rate, rate @ inertia)
 
 
-def passing(angular_acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
-    """A predicted angular acceleration (n, k) without what lasts.
+def high_passed(angular_acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
+    """A predicted angular acceleration (n, k) without its low frequencies.
 
     Body rates stay bounded: a lasting predicted acceleration is the mark of something left out. (Neither a mean over a
     window, which makes a fifth too much of what turns a little faster than it lasts, nor ends that are held: one wild
@@ -242,14 +242,14 @@ def value_columns(
     groups,
     model: dict[str, np.ndarray],
     reverse: np.ndarray | None = None,
-    lasting: bool = False,
+    low_frequencies: bool = False,
 ):
     """Column of a relative change of one believed value, as channel contributions.
 
     Accelerations on the left side are replaced by what the current model predicts (`model`: force N and moment
     N m, native rate), because a regression on a noisy derivative of the body rate would be biased. `reverse`
-    (the measured moment, (n, 3), N m) takes the predicted moments' place for a check from the other side. `lasting`
-    keeps what lasts of a predicted angular acceleration (`passing`).
+    (the measured moment, (n, 3), N m) takes the predicted moments' place for a check from the other side. With
+    `low_frequencies` those of a predicted angular acceleration stay (`high_passed`).
     """
     motion = segment.motion
     force, arm, torque = baseline_wrench(motion, vehicle)
@@ -271,7 +271,7 @@ def value_columns(
         inertia = vehicle.inertia_kg_m2.matrix()
         rate = motion.angular_velocity
         predicted = (model["moment"] - np.cross(rate, rate @ inertia)) @ np.linalg.inv(inertia)
-        predicted = predicted[:, [axis]] if lasting else passing(predicted[:, [axis]], segment.rate_hz)
+        predicted = predicted[:, [axis]] if low_frequencies else high_passed(predicted[:, [axis]], segment.rate_hz)
         part = np.zeros((3, 3))
         part[axis, axis] = inertia[axis, axis]
         out = {"moment": -(predicted * part[axis] + np.cross(rate, rate @ part))}

@@ -176,7 +176,7 @@ def test_an_inertia_shows_in_what_turns_slowly_and_not_in_what_never_ends(freque
     column = value_columns("inertia_zz", flown, vehicle, ("moment",), {"moment": turning + lasting})["moment"]
     np.testing.assert_allclose(column[3000:-3000, 2], -turning[3000:-3000, 2], atol=2e-5)
     made = {"moment": turning + lasting}
-    whole = value_columns("inertia_zz", flown, vehicle, ("moment",), made, lasting=True)["moment"]
+    whole = value_columns("inertia_zz", flown, vehicle, ("moment",), made, low_frequencies=True)["moment"]
     np.testing.assert_allclose(whole[:, 2], -(turning + lasting)[:, 2], atol=1e-9)
 
 
