@@ -137,3 +137,21 @@ def test_an_offset_in_time_must_be_three_standard_errors_from_none():
     )
     model = SimpleNamespace(regression=regression)
     assert WrenchModel.delivered_with(model, ["rotor_drag"], {}) == ["offset:surely", "rotor_drag"]
+
+
+def sagging_run(name: str, seed: int) -> Run:
+    """Throttle in steps of a second, ω = 2000 u (V/16)^0.8 at once, a voltmeter with 0.05 V of noise."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(0.2, 1.0, 40), 50)
+    time_s = np.arange(len(u)) / 50
+    volts = 16.0 - 0.01 * time_s - 0.8 * u**3
+    thrust = C_F * (FULL_RAD_S * u * (volts / 16.0) ** 0.8) ** 2
+    table = {"time_s": time_s, "throttle_1": u, "battery_voltage_v": volts + 0.05 * rng.standard_normal(len(u))}
+    return Run(name, pd.DataFrame(table | {"force_z_n": -thrust + 0.02 * rng.standard_normal(len(u))}))
+
+
+def test_noise_of_a_voltmeter_beside_a_sag_is_no_other_effect():
+    made = one_rotor([sagging_run(n, k) for k, n in enumerate("abc")], ["c"])
+    limits = {"rotor_speed_limits_rad_s": (0.0, FULL_RAD_S), "torque_coefficient_n_m_s2": 1.9e-8}
+    recordings = RecordingSet(made.name, made.vehicle.model_copy(update=limits), made.runs, made.held_out)
+    assert claimed(analyse_instrument(recordings)) == {"battery_sag"}

@@ -8,7 +8,9 @@ from scipy.signal import lfilter
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import Loading
+from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.tachometer import WIDTHS, noise_of, quieter, without_noise
+from tests.unit.mismatch.instrument.test_approximate import named, stand_set
 
 RATE_HZ = 200.0
 TIME_S = np.arange(6000) / RATE_HZ
@@ -76,3 +78,15 @@ def test_the_size_of_a_counters_noise():
     assert np.median(found) == pytest.approx(3.0, rel=0.1)
     vibration = 20.0 * np.sin(2 * np.pi * 60.0 * TIME_S)
     assert not noise_of((stepping() + vibration)[:, None], RATE_HZ).any()
+
+
+@pytest.mark.parametrize("share", [0.005, 0.01])
+def test_noise_of_counters_is_no_effect_and_no_wrong_value(share):
+    """Four rotors whose counters read 0.5 or 1 % of noise: as it was read the load would be filtered, late or wrong."""
+
+    def counted(speed, wrench, t):
+        speed *= 1.0 + share * np.random.default_rng(len(t)).standard_normal(speed.shape)
+        return wrench
+
+    analysis = analyse_instrument(stand_set(counted))
+    assert not named(analysis) and not analysis.values
