@@ -6,7 +6,7 @@ of the rotors moved to the sensor, and the weight where the reading was not zero
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -30,10 +30,12 @@ GAP_STEPS = 4.0
 UNEVEN = 0.3
 """Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
 SHORTEST = 4
+SHORT = 60
+"""Stretches of fewer samples or rows are blocks: too short to learn the colour of their noise from."""
 MOST_VALUES = 45_000
 """Samples times channels that are analysed; longer sets are averaged over several samples first."""
-LOADED_SHARE = 0.05
-BACK_SHARE = 0.05
+LEAST_SHARE = 0.05
+"""Share of the largest load from which a channel is loaded, or a sample is, and of the samples that come back."""
 LEAST_WARMTH_K = 0.1
 """A temperature that changes by less says nothing."""
 STEADY_HZ = 5.0
@@ -54,6 +56,23 @@ class Session:
     """Whether one clock ran on through all runs, pauses and all."""
     first_temperature_c: Mapping[str, float]
     """Temperature at the start of every run that has one, °C."""
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """How runs become stretches: the same for all runs of a set."""
+
+    vehicle: Vehicle
+    channels: tuple[int, ...]
+    dt_s: float
+    full_speed: float | None
+    session: Session
+    distance: str
+    """Name of the column of a distance to a wall or fixture; empty where there is none."""
+
+    def stretches(self, recordings: RecordingSet) -> list[Loading]:
+        """The stretches of all runs with their loads predicted."""
+        return [loaded_by(x, self.vehicle) for run in recordings.runs for x in stretches_of(run, self)]
 
 
 @dataclass(frozen=True)
@@ -154,10 +173,9 @@ def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
 
-def stretches_of(
-    run: Run, vehicle: Vehicle, channels: tuple[int, ...], dt_s: float, full_speed: float | None, session: Session
-):
+def stretches_of(run: Run, how: Preparation) -> list[Loading]:
     """Loadings of one run, load still empty."""
+    vehicle, channels, dt_s, session = how.vehicle, how.channels, how.dt_s, how.session
     names = c.FORCE + c.MOMENT
     read = np.full((len(run.time_s), 6), np.nan)
     for k in channels:
@@ -172,7 +190,7 @@ def stretches_of(
     speeds = _several(run, c.rotor_columns("rotor_speed", count)) if count else None
     command, throttle = commands(run, count) if count else (None, False)
     if command is not None and throttle:
-        command = command * full_speed if full_speed else None
+        command = command * how.full_speed if how.full_speed else None
     attitude = _several(run, c.MOUNT)
     others = {
         name: _filled(run, name)
@@ -232,6 +250,7 @@ def stretches_of(
                 temperature_c=temperature,
                 command=ordered,
                 measured=speed is not None,
+                distance=own.get(how.distance),
                 keep=_within(time_s, stamps[good], GAP_STEPS * dt_s),
                 extra={k: v for k, v in own.items() if k not in (c.BATTERY_VOLTAGE, c.TEMPERATURE, c.HEIGHT)},
             )
@@ -239,22 +258,18 @@ def stretches_of(
     return out
 
 
-def smoothed(loading: Loading) -> Loading:
-    """The loading with measured rotor speeds less their white noise."""
-    if not loading.measured or loading.motion.rotor_speed is None:
-        return loading
+def turned(loading: Loading, change: Callable[[np.ndarray, float], np.ndarray]) -> Loading:
+    """The loading with what `change` makes of measured rotor speeds and their rate; the speeds read are kept too."""
     read = loading.motion.rotor_speed
-    speed = without_noise(read, 1.0 / loading.dt_s)
-    return replace(loading, motion=with_speed(loading.motion, speed), speed_read=read)
+    if not loading.measured or read is None:
+        return loading
+    return replace(loading, motion=with_speed(loading.motion, change(read, 1.0 / loading.dt_s)), speed_read=read)
 
 
-def noised(loading: Loading) -> Loading:
-    """The loading with as much white noise of its measured rotor speeds once more."""
-    if not loading.measured or loading.motion.rotor_speed is None:
-        return loading
-    read = loading.motion.rotor_speed
-    draws = np.random.default_rng(1).standard_normal(read.shape)
-    return replace(loading, motion=with_speed(loading.motion, read + noise_of(read, 1.0 / loading.dt_s) * draws))
+def noised(speed: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Speeds with as much white noise as they have once more, less the noise of both."""
+    draws = np.random.default_rng(1).standard_normal(speed.shape)
+    return without_noise(speed + noise_of(speed, rate_hz) * draws, rate_hz)
 
 
 def without_voltmeter_noise(loadings: list[Loading]) -> list[Loading]:
@@ -326,14 +341,13 @@ def first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> flo
     """Speed at full throttle that explains the thrust read best, rad/s, a constant left free in each run."""
     vehicle = recordings.vehicle
     thrusts, reads = [], []
-    axis = 2
-    if axis not in channels:
+    if 2 not in channels:
         raise InputError(f"{recordings.name}: throttle without rotor_speed_limits_rad_s needs force_z_n")
     for run in recordings.runs:
         u, _ = commands(run, vehicle.rotor_count)
         thrust = -(u**2) @ vehicle.thrust_coefficients_n_s2()
-        good = np.isfinite(run.column(c.FORCE[axis]))
-        read = run.column(c.FORCE[axis])[good]
+        good = np.isfinite(run.column(c.FORCE[2]))
+        read = run.column(c.FORCE[2])[good]
         thrusts.append(thrust[good] - thrust[good].mean())
         reads.append(read - read.mean())
     x, y = np.concatenate(thrusts), np.concatenate(reads)
@@ -374,22 +388,22 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Setup
     channels, session = compared_channels(whole), session_of(whole)
     dt_s = float(np.median(np.concatenate([np.diff(r.time_s) for r in recordings.runs])))
     full, estimated = full_speed_of(recordings, channels)
-    loadings = stretches(recordings, channels, dt_s, full, session)
-    noisier = None
+    how, noisier = Preparation(vehicle, channels, dt_s, full, session, distance_column(recordings)), None
+    loadings = how.stretches(recordings)
     if vehicle.kind == "stand" and loadings:
         loadings = without_voltmeter_noise(loadings)
-        calm = [loaded_by(smoothed(x), vehicle) for x in loadings]
+        calm = [loaded_by(turned(x, without_noise), vehicle) for x in loadings]
         if quieter(loadings, calm) is calm:
-            noisier = tuple(distanced(loaded_by(smoothed(noised(x)), vehicle), recordings) for x in loadings)
+            noisier = tuple(loaded_by(turned(x, noised), vehicle) for x in loadings)
             loadings = calm
     if not loadings:
         raise InputError(f"{recordings.name}: no run has {SHORTEST} samples in a row with every channel")
-    instrument = instrument_of(recordings, vehicle, channels, tuple(loadings), dt_s, session)
+    instrument = instrument_of(recordings, how, loadings)
     wait_s = 0.0
     if instrument.bench and 1 / dt_s > STEADY_HZ:
-        wait_s = settling_s(tuple(loadings), instrument.loaded, instrument.largest, dt_s)
+        wait_s = settling_s(loadings, instrument.loaded, instrument.largest, dt_s)
         if wait_s:
-            loadings = without_settling(tuple(loadings), instrument.loaded, instrument.largest, wait_s)
+            loadings = without_settling(loadings, instrument.loaded, instrument.largest, wait_s)
             instrument = replace(instrument, by_hand=True)
     total = sum(x.size for x in loadings) * len(channels)
     average = max(1, int(np.ceil(total / MOST_VALUES)))
@@ -398,7 +412,7 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Setup
         vehicle=vehicle,
         split=split_runs(whole),
         instrument=instrument,
-        loadings=tuple(distanced(x, recordings) for x in loadings),
+        loadings=tuple(loadings),
         average=average if 1 / dt_s / average > STEADY_HZ else 1,
         full_speed=full,
         estimated_full_speed=estimated,
@@ -421,15 +435,15 @@ def with_unseen(setup: Setup, unseen: RecordingSet) -> Setup:
     commanded = all(x.command is not None for x in setup.loadings)
     runs = [r for r in unseen.runs if r.has(*needed)]
     runs = [r for r in runs if not commanded or commands(r, vehicle.rotor_count)[0] is not None]
-    known = replace(unseen, runs=tuple(runs))
-    own = stretches(known, instrument.channels, 1.0 / instrument.rate_hz, setup.full_speed, setup.session)
+    dt_s = 1.0 / instrument.rate_hz
+    how = Preparation(unseen.vehicle, instrument.channels, dt_s, setup.full_speed, setup.session, instrument.distance)
+    own = how.stretches(replace(unseen, runs=tuple(runs)))
     if own and any(x.voltage_read is not None for x in setup.loadings):
         own = with_expected_voltages(own)
     if setup.noisier is not None:
-        own = [loaded_by(smoothed(x), vehicle) for x in own]
+        own = [loaded_by(turned(x, without_noise), vehicle) for x in own]
     if setup.settling_s:
-        own = list(without_settling(tuple(own), instrument.loaded, instrument.largest, setup.settling_s))
-    own = [replace(x, distance=x.extra.get(instrument.distance)) if instrument.distance else x for x in own]
+        own = list(without_settling(own, instrument.loaded, instrument.largest, setup.settling_s))
     every = replace(unseen, runs=(*setup.recordings.runs, *runs))
     return replace(setup, recordings=every, loadings=(*setup.loadings, *own))
 
@@ -439,18 +453,6 @@ def full_voltage_of(loadings: Sequence[Loading]) -> float | None:
     read = [x.motion.voltage if x.voltage_read is None else x.voltage_read for x in loadings]
     known = [float(np.max(v)) for v in read if v is not None]
     return max(known, default=None)
-
-
-def stretches(
-    recordings: RecordingSet, channels: tuple[int, ...], dt_s: float, full_speed: float | None, session: Session
-) -> list[Loading]:
-    """The stretches of all runs with their loads predicted."""
-    vehicle = recordings.vehicle
-    return [
-        loaded_by(x, vehicle)
-        for run in recordings.runs
-        for x in stretches_of(run, vehicle, channels, dt_s, full_speed, session)
-    ]
 
 
 def full_speed_of(recordings: RecordingSet, channels: tuple[int, ...]) -> tuple[float | None, bool]:
@@ -482,11 +484,6 @@ def measured_full_speed(recordings: RecordingSet) -> float:
     return float(np.median(np.concatenate(ratios))) if ratios else 1000.0
 
 
-def distanced(loading: Loading, recordings: RecordingSet) -> Loading:
-    name = distance_column(recordings)
-    return replace(loading, distance=loading.extra.get(name)) if name else loading
-
-
 def distance_column(recordings: RecordingSet) -> str:
     """Unknown column that is a distance to a wall or fixture and differs between runs or within one."""
     for name in recordings.runs[0].unknown_columns:
@@ -497,15 +494,16 @@ def distance_column(recordings: RecordingSet) -> str:
     return ""
 
 
-def instrument_of(recordings, vehicle, channels, loadings, dt_s, session: Session) -> Instrument:
+def instrument_of(recordings: RecordingSet, how: Preparation, loadings: Sequence[Loading]) -> Instrument:
     """What the forms of effects need to know beforehand."""
+    channels, session = how.channels, how.session
     load = np.concatenate([x.load for x in loadings])
     spread = np.concatenate([x.load - x.rest for x in loadings]).std(axis=0)
     still = load.std(axis=0) < 1e-9
     loaded = []
     for group in ((0, 1, 2), (3, 4, 5)):
         top = max(spread[list(group)].max(), 1e-12)
-        loaded += [k for k in group if spread[k] > LOADED_SHARE * top and not still[k] and k in channels]
+        loaded += [k for k in group if spread[k] > LEAST_SHARE * top and not still[k] and k in channels]
     if not any(k < 3 for k in loaded) and spread[:3].max() > 1e-9:
         loaded.insert(0, int(np.argmax(spread[:3])))
     largest = np.maximum(np.abs(np.concatenate([x.load - x.rest for x in loadings])).max(axis=0), 1e-9)
@@ -513,10 +511,10 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s, session: Sessio
     known = [x.temperature_c for x in loadings if x.temperature_c is not None]
     warmth = np.concatenate(known) if len(known) == len(loadings) else np.zeros(1)
     return Instrument(
-        vehicle=vehicle,
+        vehicle=how.vehicle,
         channels=channels,
         loaded=tuple(loaded),
-        rate_hz=1.0 / dt_s,
+        rate_hz=1.0 / how.dt_s,
         duration_s=float(max(x.time_s[-1] - x.time_s[0] for x in loadings)),
         runs=tuple(r.name for r in recordings.runs),
         run_s=float(max(r.time_s[-1] - r.time_s[0] for r in recordings.runs)),
@@ -530,11 +528,11 @@ def instrument_of(recordings, vehicle, channels, loadings, dt_s, session: Sessio
         zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > LEAST_WARMTH_K else None,
         session_s=session.length_s,
         session_clock=session.clock,
-        distance=distance_column(recordings),
+        distance=how.distance,
     )
 
 
-def zero_temperature(loadings: tuple[Loading, ...], channels: tuple[int, ...]) -> float | None:
+def zero_temperature(loadings: Sequence[Loading], channels: tuple[int, ...]) -> float | None:
     """Temperature, °C, at which all readings less loads would be nothing if they went with it; None if none do.
 
     From a line y = b T + z + g F in every channel: T_0 = −Σ w b z / Σ w b², w one over the squares left.
@@ -552,17 +550,17 @@ def zero_temperature(loadings: tuple[Loading, ...], channels: tuple[int, ...]) -
     return float(warmth.mean() - above / below) if below > 0 else None
 
 
-def comes_back(loadings: tuple[Loading, ...], channel: int, largest: float) -> bool:
+def comes_back(loadings: Sequence[Loading], channel: int, largest: float) -> bool:
     """Whether a load is met from above as well as from below at values other than none."""
     falling = total = 0
     for x in loadings:
         load = x.load[:, channel] - x.rest[channel]
         width = NARROW * largest
         branch = (load - play(load, width)) / width * np.sign(load)
-        at_work = np.abs(load) > BACK_SHARE * largest
+        at_work = np.abs(load) > LEAST_SHARE * largest
         falling += int(np.sum(at_work & (branch < -0.5)))
         total += int(np.sum(at_work))
-    return falling > BACK_SHARE * max(total, 1)
+    return falling > LEAST_SHARE * max(total, 1)
 
 
 def pieces_of(loading: Loading, count: int) -> list[np.ndarray]:

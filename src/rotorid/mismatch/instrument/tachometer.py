@@ -25,8 +25,6 @@ BAND = (0.5, 0.75, 1.0)
 """Shares of the highest frequency in which the noise must be white, in two halves."""
 LEVEL = 2.0
 """Ratio of the power in the two halves beyond which there is signal up there, and nothing is done."""
-PIECE = 256
-"""Samples of a piece whose spectrum is taken; shorter stretches stay as they are."""
 SMALLER, LARGER = 0.98, 1.01
 """Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none."""
 LOCAL_S = 1.0
@@ -34,15 +32,15 @@ LOCAL_S = 1.0
 
 
 def without_noise(speed: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Rotor speeds (n, k), rad/s, at even instants, less their white noise."""
-    if len(speed) < max(PIECE, 2 * WIDTHS[-1]):
+    """Rotor speeds (n, k), rad/s, at even instants, less their white noise; a short stretch as it is."""
+    if len(speed) < 2 * WIDTHS[-1]:
         return speed
     return np.stack([_smoothed(x, rate_hz) if _noisy(x) else x for x in speed.T], axis=1)
 
 
 def noise_of(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     """One-sigma of the white noise of rotor speeds (n, k), rad/s, at every instant; 0 where it is no noise."""
-    if len(speed) < max(PIECE, 2 * WIDTHS[-1]):
+    if len(speed) < 2 * WIDTHS[-1]:
         return np.zeros_like(speed)
     return np.stack([_spread(x, rate_hz) if _noisy(x) else np.zeros(len(x)) for x in speed.T], axis=1)
 
@@ -65,7 +63,7 @@ def _steps(loadings: list[Loading]) -> np.ndarray:
 
 def _noisy(speed: np.ndarray) -> bool:
     """Whether the upper end of the spectrum is white."""
-    frequency, power = welch(speed, nperseg=PIECE, detrend="linear")
+    frequency, power = welch(speed, nperseg=WIDTHS[-1] - 1, detrend="linear")
     share = frequency / frequency[-1]
     lower, upper = (float(np.median(power[(share >= a) & (share < b)])) for a, b in zip(BAND, BAND[1:], strict=False))
     return upper > 0 and 1 / LEVEL < lower / upper < LEVEL
