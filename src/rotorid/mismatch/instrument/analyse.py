@@ -6,9 +6,8 @@ on the load or on its reading, with the believed values free, 4. nonlinear param
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -113,8 +112,10 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     measured = all(x.measured for x in setup.loadings)
     model, chain, loadings = first_model(setup, terms)
 
-    def values_in(model: ReadingModel, selection: Selection, refused: Collection[str] = ()) -> Values:
-        size = sizes_of_values(model)
+    def values_of(selection: Selection, refused: Collection[str] = ()) -> Values:
+        def size(key: str, change: float) -> float:
+            return float(model.search.ask.sizes_of(key, np.array([change])).max())
+
         return wrong_values(model.regression, selection, size, moving=False, refused=refused)
 
     def among(model: ReadingModel, terms: list[Term]) -> ReadingModel:
@@ -123,7 +124,6 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         return fitted_model(setup, terms, active, loadings, model.search.refused)
 
     model = with_plainer_forms(model, among)
-    values_of = partial(values_in, model)
     if chain is None:
         reasons.update(
             {k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in before_the_rotors()}
@@ -176,7 +176,10 @@ class Choice:
 
     def vehicle(self, changed: Values) -> Vehicle:
         """The believed vehicle with values changed, and with a full speed that nobody stated."""
-        return with_full_speed(improved(self.setup.vehicle, changed), self.setup, self.chain)
+        vehicle = improved(self.setup.vehicle, changed)
+        if self.chain is None or not self.setup.estimated_full_speed:
+            return vehicle
+        return vehicle.model_copy(update={"rotor_speed_limits_rad_s": (0.0, self.chain.full_speed)})
 
 
 def account(
@@ -310,18 +313,6 @@ def speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> f
     floor = (chain.noise_rad_s or 0.0) ** 2 * sum(len(t.before) for t in own)
     start, left = (sum(float(x @ x) for x in stage) for stage in ([t.before for t in own], [t.after for t in own]))
     return float(np.clip((left - floor) / max(start - floor, 1e-9), 0.0, 1.0)) if left > floor else 0.0
-
-
-def sizes_of_values(model: ReadingModel) -> Callable[[str, float], float]:
-    """Size of a relative change of a believed value in units of the noise."""
-    return lambda key, change: float(model.search.ask.sizes_of(key, np.array([change])).max())
-
-
-def with_full_speed(vehicle: Vehicle, setup: Setup, chain: ChainResult | None) -> Vehicle:
-    """The vehicle with the speed at full throttle where that was estimated."""
-    if chain is None or not setup.estimated_full_speed:
-        return vehicle
-    return vehicle.model_copy(update={"rotor_speed_limits_rad_s": (0.0, chain.full_speed)})
 
 
 def full_speed_value(setup: Setup, chain: ChainResult | None) -> dict[str, tuple[float, float, float, float]]:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
-from rotorid.effects.contract import Effect, Form, not_testable_reason
-from rotorid.effects.loading import NO_ROTORS, Instrument, Loading, forms_of, weight
+from rotorid.effects.contract import Form, not_testable_reason
+from rotorid.effects.loading import NO_ROTORS, Loading, forms_of, weight
 from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
 from rotorid.mismatch.model.prepare import form_terms
 from rotorid.mismatch.plant.readings import form_reading
@@ -53,14 +53,11 @@ def value_keys(setup: Setup) -> list[str]:
     return keys
 
 
-def trust_of(key: str, vehicle: Vehicle) -> float:
-    """Relative one-sigma of a believed value."""
-    return max(vehicle.trust.get(VALUE_NAMES[key], DEFAULT_TRUST[key.split("_")[0]]), 1e-6)
-
-
 def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
-    terms = [Term(key, "value", prior_sd=(trust_of(key, setup.vehicle),)) for key in value_keys(setup)]
+    trust = setup.vehicle.trust
+    sd = {k: max(trust.get(VALUE_NAMES[k], DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in value_keys(setup)}
+    terms = [Term(key, "value", prior_sd=(relative,)) for key, relative in sd.items()]
     reasons: dict[str, str] = {}
     if not setup.steady_points and not setup.instrument.by_hand:
         terms.append(Term(OFFSET, "nuisance", prior_sd=(0.5 / setup.instrument.rate_hz,)))
@@ -87,7 +84,8 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
             found += form_terms(effect.id, form)
         terms += found
         if not found and effect.id not in UNKNOWNS:
-            reasons[effect.id] = why or nothing_to_test(effect, setup.instrument)
+            of_kind = NO_ROTORS if setup.instrument.bench else STILL
+            reasons[effect.id] = why or (of_kind if effect.lack_on is None else effect.lack_on(setup.instrument))
     return terms, reasons
 
 
@@ -95,15 +93,7 @@ def lacks(form: Form, setup: Setup) -> str | None:
     """Why a form for a flight cannot be tested on this stand."""
     if any(name in DISPLACED for name in form.requires):
         return STILL
-    reason = next((r for x in setup.loadings if (r := not_testable_reason(form, x.motion, setup.vehicle))), None)
-    return reason
-
-
-def nothing_to_test(effect: Effect, instrument: Instrument) -> str:
-    """Why an instrument's recordings have no form of an effect to test."""
-    if effect.lack_on is not None:
-        return effect.lack_on(instrument)
-    return NO_ROTORS if instrument.bench else STILL
+    return next((r for x in setup.loadings if (r := not_testable_reason(form, x.motion, setup.vehicle))), None)
 
 
 def value_column(key: str, loading: Loading, vehicle: Vehicle) -> np.ndarray:

@@ -56,7 +56,8 @@ def slopes(setup: Setup) -> list[Slope]:
             across = [] if k < 3 else [axis for axis in range(3) if axis != k - 3]
             beside = np.column_stack([np.ones(len(loads)), loads[:, across]])
             load, read = (rest_beside(beside, x[:, k]) for x in (loads, reads))
-            if load.std() < 0.2 * largest_spread(setup, k) or read.std() == 0:
+            largest = max(float(x.load[:, k].std()) for x in setup.loadings) + 1e-12
+            if load.std() < 0.2 * largest or read.std() == 0:
                 continue
             r = float(load @ read / np.sqrt((load @ load) * (read @ read)))
             out.append(Slope(run, k, float(load @ read / (load @ load)), r))
@@ -66,10 +67,6 @@ def slopes(setup: Setup) -> list[Slope]:
 def rest_beside(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
     """What a regression of values (n,) on columns (n, m) leaves."""
     return values - columns @ np.linalg.lstsq(columns, values, rcond=1e-9)[0]
-
-
-def largest_spread(setup: Setup, channel: int) -> float:
-    return max(float((x.load[:, channel]).std()) for x in setup.loadings) + 1e-12
 
 
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list[str]]:
@@ -159,6 +156,11 @@ def flipped(recordings: RecordingSet, setup: Setup):
     return with_runs(recordings, runs), _finding("axis_sign", text, channels, -1.0, others, windows), text + "."
 
 
+def nearest(slope: float, units: dict[str, float]) -> str | None:
+    """The unit whose factor a slope is near; None if it is near to none."""
+    return next((name for name, factor in units.items() if abs(slope / factor - 1) < NEAR_UNIT), None)
+
+
 def other_unit(recordings: RecordingSet, setup: Setup):
     """Forces, moments or rotor speeds in another unit, in every run."""
     found = [s for s in slopes(setup) if s.correlation > CERTAIN]
@@ -166,7 +168,7 @@ def other_unit(recordings: RecordingSet, setup: Setup):
     moments = [s.slope for s in found if s.channel >= 3]
     speed_known = bool(setup.loadings) and setup.loadings[0].measured and recordings.vehicle.kind == "stand"
     both = forces + moments
-    if speed_known and both and (unit := _nearest(np.median(both), SPEED_UNITS)):
+    if speed_known and both and (unit := nearest(np.median(both), SPEED_UNITS)):
         names = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
         factor = float(np.sqrt(SPEED_UNITS[unit]))
         return _converted(recordings, names, unit, factor, "rad/s", ("force_z",))
@@ -174,16 +176,9 @@ def other_unit(recordings: RecordingSet, setup: Setup):
         (forces, FORCE_UNITS, c.FORCE, "N"),
         (moments, MOMENT_UNITS, c.MOMENT, "N m"),
     ):
-        if slope and (unit := _nearest(np.median(slope), units)):
+        if slope and (unit := nearest(np.median(slope), units)):
             channels = [n for n, label in zip(CHANNELS, NAMES, strict=True) if label in names]
             return _converted(recordings, names, unit, 1.0 / units[unit], wanted, channels)
-    return None
-
-
-def _nearest(slope: float, units: dict[str, float]) -> str | None:
-    for name, factor in units.items():
-        if abs(slope / factor - 1) < NEAR_UNIT:
-            return name
     return None
 
 
@@ -203,7 +198,17 @@ def wrong_rotors(recordings: RecordingSet, setup: Setup):
     if not moments:
         return None
     stated = tuple(range(vehicle.rotor_count))
-    energy = {order: _energy(setup, order, moments) for order in permutations(stated)}
+
+    def energy_of(order) -> float:
+        """Energy of the moments that another order of the rotors' speeds leaves, a constant free in each run."""
+        total = 0.0
+        for x in setup.loadings:
+            motion = with_speed(x.motion, x.motion.rotor_speed[:, list(order)])
+            left = (x.reading - loaded_by(replace(x, motion=motion), setup.vehicle).load)[:, moments]
+            total += float(((left - left.mean(axis=0)) ** 2).sum())
+        return total
+
+    energy = {order: energy_of(order) for order in permutations(stated)}
     best = min(energy, key=energy.get)
     if best != stated and energy[best] * BETTER < energy[stated]:
         moved = [i + 1 for i in stated if best[i] != i]
@@ -217,15 +222,3 @@ def wrong_rotors(recordings: RecordingSet, setup: Setup):
             runs.append(replace(run, table=table))
         return with_runs(recordings, runs), _finding("rotor_order", text, ("moment_x", "moment_y")), text + "."
     return None
-
-
-def _energy(setup: Setup, order, channels) -> float:
-    """Energy of the moments that another order of the rotors' speeds leaves, a constant free in each run."""
-    total = 0.0
-    for x in setup.loadings:
-        load = loaded_by(
-            replace(x, motion=with_speed(x.motion, x.motion.rotor_speed[:, list(order)])), setup.vehicle
-        ).load
-        left = (x.reading - load)[:, channels]
-        total += float(((left - left.mean(axis=0)) ** 2).sum())
-    return total

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import Form, SpeedForm
+from rotorid.effects.contract import Form
 from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Analysis
@@ -29,7 +29,7 @@ def entries(vehicle: Vehicle, instrument: Instrument) -> tuple[list[tuple[Form, 
         effect = catalogue().get(entry.get("id"))
         if effect is None:
             raise InputError(f"{where} has id {entry.get('id')!r}, expected one of the catalogue")
-        if any(f.name == entry.get("form") for f in effect.speed_forms if isinstance(f, SpeedForm)):
+        if is_chain(entry):
             chain = True
             continue
         forms = {f.name: f for f in forms_of(effect, instrument)}
