@@ -9,8 +9,6 @@ from rotorid.mismatch.instrument.model import MEMORY, ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, pieces_of
 from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
 
-CROSS_S = 10.0
-"""Blocks of a run by which every other is judged."""
 LEAST_CHANGE = 0.02
 """Spread of a load in one run, by its spread over all, from which the run says what depends on it."""
 
@@ -74,13 +72,10 @@ def _changing(model: ReadingModel, names: list[str], inputs: list[np.ndarray]) -
     """The inputs with, on a bench, every load times what a gain may change with: time and temperature."""
     if not model.setup.instrument.bench:
         return names, inputs
-    at = {n: i for i, n in enumerate(names)}
     loads = [n for n in names if n.startswith("load_") and not n.endswith("_squared")]
-    pairs = [(load, other) for load in loads for other in ("time_s", "temperature_c") if other in at]
-    added = [np.stack([z[:, at[a]] * z[:, at[b]] for a, b in pairs], axis=1) for z in inputs] if pairs else None
-    if added is None:
-        return names, inputs
-    return names + [b for _, b in pairs], [np.hstack([z, x]) for z, x in zip(inputs, added, strict=True)]
+    pairs = [(load, other) for load in loads for other in ("time_s", "temperature_c") if other in names]
+    first, second = ([names.index(pair[i]) for pair in pairs] for i in (0, 1))
+    return names + [b for _, b in pairs], [np.hstack([z, z[:, first] * z[:, second]]) for z in inputs]
 
 
 def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.ndarray]):
@@ -105,18 +100,19 @@ def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.nda
     return first, last, list(depends)
 
 
-def _loads(model: ReadingModel) -> dict[str, tuple[list[int], list[np.ndarray]]]:
-    """Run to its rows' numbers and their loads, (n, k) each, of a bench; a stand's loads are not known so well."""
+def _runs(model: ReadingModel) -> list[tuple[list[int], list[np.ndarray]]]:
+    """Of every run the numbers of its rows and the loads that change in it, (n, k) each; a bench alone knows them."""
     if not model.setup.instrument.bench:
-        return {}
+        return []
     names, inputs = _inputs(model)
     columns = [i for i, n in enumerate(names) if n.startswith("load_") and not n.endswith("_squared")]
-    runs: dict[str, tuple[list[int], list[np.ndarray]]] = {}
-    for k, (rows, z) in enumerate(zip(model.rows, inputs, strict=True)):
-        numbers, loads = runs.setdefault(rows.run, ([], []))
-        numbers.append(k)
-        loads.append(z[:, columns])
-    return runs
+    out = []
+    for run in dict.fromkeys(r.run for r in model.rows):
+        numbers = [k for k, r in enumerate(model.rows) if r.run == run]
+        loads = [inputs[k][:, columns] for k in numbers]
+        keep = np.concatenate(loads).std(axis=0) > LEAST_CHANGE
+        out.append((numbers, [z[:, keep] for z in loads]))
+    return out
 
 
 def in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) -> float:
@@ -124,40 +120,23 @@ def in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) -> 
 
     What changes from run to run (a clamp that slips, a gain that is set anew) cancels over all of them.
     """
-    taps, rate_hz, runs = model.regression.filters[channel], model.setup.rate_hz, _loads(model)
+    taps, rate_hz = model.regression.filters[channel], model.setup.rate_hz
     found = [
         _wald([residuals[k][:, channel] for k in numbers], z, taps, rate_hz, memory=MEMORY)[0]
-        for numbers, loads in runs.values()
-        if (z := _varying(loads))[0].shape[1]
+        for numbers, z in _runs(model)
+        if z[0].shape[1]
     ]
     return min(1.0, len(found) * min(found)) if found else 1.0
 
 
-def _varying(loads: list[np.ndarray]) -> list[np.ndarray]:
-    """Loads of one run less those that do not change in it."""
-    keep = np.concatenate(loads).std(axis=0) > LEAST_CHANGE
-    return [z[:, keep] for z in loads]
-
-
 def explained_in_runs(model: ReadingModel, after: list[np.ndarray], channel: int) -> np.ndarray:
-    """Energy of residuals (n, 6) that each run's own dependence on the loads explains, by part of the rows, (k,).
-
-    Judged crosswise: every other block of a run by what the blocks between them say.
-    """
+    """Energy of residuals (n, 6) that each run's own dependence on the loads explains, by part of the rows, (k,)."""
     out = np.zeros(len(after))
-    for numbers, loads in _loads(model).values():
-        z = [np.hstack([np.ones((len(x), 1)), x]) for x in _varying(loads)]
-        count = np.cumsum([0, *(len(x) for x in z)])
-        every, y = np.concatenate(z), np.concatenate([after[k][:, channel] for k in numbers])
-        block = np.arange(len(y)) // max(1, int(CROSS_S * model.setup.rate_hz)) % 2
-        left = y.copy()
-        for half in (0, 1):
-            fitted, judged = block == half, block != half
-            if fitted.any():
-                left[judged] -= every[judged] @ np.linalg.lstsq(every[fitted], y[fitted], rcond=1e-6)[0]
-        for i, k in enumerate(numbers):
-            part = slice(count[i], count[i + 1])
-            out[k] = y[part] @ y[part] - left[part] @ left[part]
+    for numbers, loads in _runs(model):
+        z = [np.hstack([np.ones((len(x), 1)), x]) for x in loads]
+        y = [after[k][:, channel] for k in numbers]
+        beta = np.linalg.lstsq(np.concatenate(z), np.concatenate(y), rcond=1e-6)[0]
+        out[numbers] = [part @ part - (part - x @ beta) @ (part - x @ beta) for part, x in zip(y, z, strict=True)]
     return out
 
 
