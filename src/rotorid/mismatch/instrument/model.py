@@ -14,8 +14,7 @@ from rotorid.effects.loading import Loading, forms_of
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.select import Questions, Search, Selection
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of
-from rotorid.mismatch.instrument.sampling import resolution
-from rotorid.mismatch.instrument.setup import Setup
+from rotorid.mismatch.instrument.setup import SHORT, Setup
 from rotorid.mismatch.plant.comparison import LEAST_RUNS
 from rotorid.mismatch.plant.contributions import Contributions
 from rotorid.mismatch.plant.regression import (
@@ -32,8 +31,6 @@ from rotorid.mismatch.posterior.chosen import posterior_at
 from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings.signal.kernels import causal
 
-SHORT = 60
-"""Stretches of fewer rows are too short to learn the colour of their noise from: they are taken as blocks."""
 MOST_BLOCKS = 150
 LEAST_BLOCKS = 40
 BLOCK_S = 2.0
@@ -234,7 +231,7 @@ def reading_model(
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, everything, per / setup.rate_hz, setup.rate_hz, noisy)
     restrain(regression, setup)
-    joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1, resolution(setup))
+    joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1)
     sizes = size_function(regression, joint_sizes)
     search = ReadingSearch(regression, Questions(sizes, joint_sizes), refused)
     selection = search.run(active)
@@ -259,11 +256,8 @@ def restrain(regression: Regression, setup: Setup) -> None:
             regression.limit[regression.columns([key])] = UNMOVED
 
 
-def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
-    """Size of columns with coefficients: rms over the strongest tenth of the seconds, in units of the noise, (6,).
-
-    What stays below `least`, (6,), own unit, in a channel is within its resolution there: size 0.
-    """
+def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int):
+    """Size of columns with coefficients: rms over the strongest tenth of the seconds, in units of the noise, (6,)."""
     unit_noise = np.where(np.isfinite(noise), noise, np.inf)
 
     def sizes(cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
@@ -274,8 +268,7 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int, least=0.0):
             whole = len(square) // count * count
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
         every = np.sort(np.concatenate(energies), axis=0)
-        strongest = np.sqrt(every[int(STRONGEST * len(every)) :].mean(axis=0))
-        return np.where(strongest > least, strongest, 0.0) / unit_noise
+        return np.sqrt(every[int(STRONGEST * len(every)) :].mean(axis=0)) / unit_noise
 
     return sizes
 

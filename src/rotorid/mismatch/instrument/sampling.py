@@ -69,22 +69,6 @@ def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
     )
 
 
-def resolution(setup) -> np.ndarray:
-    """What rounding may make of a held load in each channel, (6,), own unit; 0.0 where the noise takes that away.
-
-    Of a load that rests half a step is lost at worst. Noise of one sigma σ before rounding to steps of q is a dither:
-    the mean error's first harmonic shrinks by exp(−2π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008), so
-    with noise of half a step nothing of it is left.
-    """
-    out = np.zeros(6)
-    for k in setup.instrument.channels:
-        step = step_of(np.concatenate([r.column((c.FORCE + c.MOMENT)[k]) for r in setup.recordings.runs]))
-        if step:
-            before = max(noise_of_samples(setup.loadings, k) ** 2 - step**2 / 12, 0.0)
-            out[k] = 0.5 * step * np.exp(-2 * np.pi**2 * before / step**2)
-    return out
-
-
 def noise_of_samples(loadings, channel: int) -> float:
     """One sigma of a sample's noise by second differences of reading less load, robust against sudden changes."""
     parts = [np.diff((x.reading - x.load)[:, channel], 2) for x in loadings if x.size > 4]

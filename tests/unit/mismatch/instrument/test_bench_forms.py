@@ -13,7 +13,6 @@ from rotorid.effects.loading import Instrument, Loading, forms_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import make_terms
 from rotorid.mismatch.instrument.model import kept_values, reading_model
-from rotorid.mismatch.instrument.sampling import resolution
 from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
 from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
@@ -250,13 +249,6 @@ def test_a_wrong_gain_stays_wrong_beside_a_curve():
     )
     assert named(analysis) == {"load_nonlinearity"}
     assert analysis.values["reading_gain"][2] < 1.035 < analysis.values["reading_gain"][3]
-
-
-def test_a_coarse_reading_resolves_half_a_step_and_noise_of_half_a_step_all():
-    quiet = set_up(recorded(lambda load, run, warmth: load, noise_n=1e-6, step_n=0.4))
-    assert resolution(quiet)[:3] == pytest.approx([0.2] * 3, rel=0.2)
-    loud = set_up(recorded(lambda load, run, warmth: load, noise_n=0.4, step_n=0.4))
-    assert (resolution(loud)[:3] < 1e-3).all()
 
 
 @pytest.mark.slow
