@@ -18,8 +18,9 @@ from scipy.stats import f as f_distribution
 from rotorid.effects.catalogue import catalogue, ids_of
 from rotorid.effects.contract import CURVE, DELAY, SUPPLY, SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
+from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Finding, Trace
-from rotorid.mismatch.instrument.setup import Setup, averaged, loaded_by, pieces_of, with_speed
+from rotorid.mismatch.instrument.setup import SHORT, Setup, averaged, loaded_by, pieces_of, with_speed
 from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
 from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE
@@ -29,10 +30,9 @@ from rotorid.recordings.signal.kernels import causal
 MOST_SAMPLES = 12_000
 RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
-QUICK_FIT, MOST_STEPS = 6, 30
-"""Evaluations of the Jacobian at most of a first trial, and of a fit."""
-MOST_TRIED = 4
-MOST_FORMS = 4
+QUICK_FIT = 6
+MOST = 4
+"""Forms of a chain, forms that are fitted to the end before the next one enters, and starts of each, at most."""
 MOST_DOUBT = 3.0
 """Standard deviations by which a command may differ from the curve through its samples."""
 SUB_SAMPLE = 1.2
@@ -43,13 +43,11 @@ BLOCK_S = 1.0
 LEAST_BLOCKS = 12
 MOST_BLOCKS = 400
 STEADY_BLOCKS = 40
-SHORT = 60
-ROUNDS = 2
 FINER = 4
 """Steps of a chain that takes time to one sample."""
 FAR = 0.05
 """Share of a cost by which a fit is still above it after a few steps when it will not come down to it."""
-ALIKE = 12.0
+ALIKE = rules.ELSEWHERE["squares"]
 """Whitened squares within which another form explains as well."""
 
 
@@ -88,10 +86,6 @@ class ChainFit:
     def chain_without(self, key: str) -> Chain:
         """The chain without an id."""
         return tuple((k, f) for k, f in self.chain if k != key)
-
-    def exchanged(self, key: str, pair: tuple[str, SpeedForm]) -> Chain:
-        """The chain with another form in the place of an id."""
-        return ordered(tuple(pair if k == key else (k, f) for k, f in self.chain))
 
 
 @dataclass
@@ -205,7 +199,7 @@ class Problem:
         """
         self.setup = setup
         self.holds = holds
-        self.first_full = setup.full_speed or largest_command(setup)
+        self.first_full = setup.full_speed or max(float(np.max(x.command)) for x in setup.loadings)
         self.scaled = setup.estimated_full_speed
         self.volts = setup.full_voltage
         self.measured = all(x.measured for x in setup.loadings)
@@ -216,15 +210,10 @@ class Problem:
         self.average = 1 if self.measured else min(setup.average, finest)
         self.channels = list(setup.instrument.channels)
         # Of steady points the colour is what the curve leaves, not noise: blocks alone allow for it.
-        self.plain = np.median([x.size for x in self.fitted]) < SHORT or (self.measured and setup.steady_points)
         self.short = np.median([x.size for x in self.fitted]) < SHORT
+        self.plain = self.short or (self.measured and setup.steady_points)
         self.taps: list[np.ndarray] = []
         self._starts: dict[tuple[int, int, bool], Commanded] = {}
-
-    @property
-    def accelerating(self) -> bool:
-        """Whether anything at work takes the rotors' acceleration."""
-        return any("rotor_acceleration" in form.requires for form, _ in self.others)
 
     def start_of(self, loading: Loading, chain: Chain) -> Commanded:
         """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
@@ -236,6 +225,7 @@ class Problem:
     def raw(self, chain: Chain, theta, loadings=None) -> list[np.ndarray]:
         """Measured minus modelled response of every stretch, (rows, channels or rotors), not whitened."""
         full, values = (theta[0], theta[1:]) if self.scaled else (self.first_full, theta)
+        accelerating = any("rotor_acceleration" in form.requires for form, _ in self.others)
         out = []
         for x in self.fitted if loadings is None else loadings:
             speed = applied(self.start_of(x, chain), chain, values, full, self.first_full, self.volts, self.holds)
@@ -243,7 +233,7 @@ class Problem:
                 read = x.motion.rotor_speed if x.speed_read is None else x.speed_read
                 out.append(read - speed)
                 continue
-            motion = with_speed(x.motion, speed) if self.accelerating else replace(x.motion, rotor_speed=speed)
+            motion = with_speed(x.motion, speed) if accelerating else replace(x.motion, rotor_speed=speed)
             moved = loaded_by(replace(x, motion=motion), self.setup.vehicle)
             left = moved.reading - moved.load
             for form, given in self.others:
@@ -283,11 +273,6 @@ class Problem:
     def unknown(self, chain: Chain) -> np.ndarray:
         return unknown_courses(chain, 1.0 / self.setup.instrument.rate_hz)
 
-    def doubts(self, chain: Chain, theta: np.ndarray) -> np.ndarray:
-        """What is not known between samples, in its one-sigmas: joins the residuals."""
-        unknown = self.unknown(chain)
-        return theta[len(theta) - len(unknown) :] / unknown
-
     def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
@@ -300,7 +285,7 @@ class Problem:
         reach = MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
-    def fit(self, chain: Chain, start: np.ndarray, most: int = MOST_STEPS) -> ChainFit:
+    def fit(self, chain: Chain, start: np.ndarray, most: int = 30) -> ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
         low, high = self.bounds(chain)
         if not len(start):
@@ -308,12 +293,14 @@ class Problem:
             return ChainFit(chain, start, float(w @ w), self.scaled)
         span = np.where(np.isfinite(high - low), high - low, np.maximum(np.abs(start), 1.0))
         start = np.clip(start, low + 1e-9 * span, high - 1e-9 * span)
-        scale = np.maximum(np.abs(start), 0.02 * span)
+        unknown = self.unknown(chain)
+        known = len(start) - len(unknown)
         found = least_squares(
-            lambda theta: np.concatenate([self.white(chain, theta), self.doubts(chain, theta)]),
+            # What is not known between samples joins the residuals in its one-sigmas.
+            lambda theta: np.concatenate([self.white(chain, theta), theta[known:] / unknown]),
             start,
             bounds=(low, high),
-            x_scale=scale,
+            x_scale=np.maximum(np.abs(start), 0.02 * span),
             diff_step=1e-4,
             max_nfev=most,
         )
@@ -358,24 +345,15 @@ class Problem:
         return [b for b in np.array_split(np.arange(size), count) if len(b)]
 
 
-def volts_of(loadings) -> np.ndarray:
-    """Battery voltages of stretches, V, the lowest and highest hundredth of the samples left out."""
-    known = [x.motion.voltage for x in loadings if x.motion.voltage is not None]
-    if not known:
-        return np.zeros(0)
-    values = np.concatenate(known)
-    return values[(values >= np.quantile(values, 0.01)) & (values <= np.quantile(values, 0.99))]
-
-
 def supply_reason(setup: Setup) -> str | None:
     """Why the sag of the battery cannot be tested on the runs that are fitted; None if it can."""
-    problem = Problem(setup)
-    volts = volts_of(problem.fitted)
-    if len(volts) and np.ptp(volts) < LEAST_SPAN * volts.mean():
-        return (
-            f"the supply voltage hardly varies in the runs that are fitted ({volts.min():.1f} to {volts.max():.1f} V)"
-        )
-    return None
+    known = [x.motion.voltage for x in thinned(list(setup.loadings)) if x.motion.voltage is not None]
+    # The lowest and highest hundredth of the samples left out.
+    volts = np.concatenate(known) if known else np.ones(1)
+    volts = volts[(volts >= np.quantile(volts, 0.01)) & (volts <= np.quantile(volts, 0.99))]
+    if not known or np.ptp(volts) >= LEAST_SPAN * volts.mean():
+        return None
+    return f"the supply voltage hardly varies in the runs that are fitted ({volts.min():.1f} to {volts.max():.1f} V)"
 
 
 def thinned(loadings: list[Loading]) -> list[Loading]:
@@ -383,11 +361,6 @@ def thinned(loadings: list[Loading]) -> list[Loading]:
     total = sum(x.size for x in loadings)
     step = max(1, int(np.ceil(total / MOST_SAMPLES)))
     return loadings[::step] if len(loadings) >= 4 * step else loadings
-
-
-def largest_command(setup: Setup) -> float:
-    """Largest command of a set, rad/s."""
-    return max(float(np.max(x.command)) for x in setup.loadings)
 
 
 def candidates(setup: Setup) -> list[tuple[str, SpeedForm]]:
@@ -413,7 +386,7 @@ def starts(form: SpeedForm) -> list[np.ndarray]:
     options = [neutral + 0.01 * np.array([min(p.high - p.low, 1.0) for p in form.parameters])]
     for values in zip(*[p.starts or (n,) for p, n in zip(form.parameters, neutral, strict=True)], strict=False):
         options.append(np.array(values, float))
-    return options[:4]
+    return options[:MOST]
 
 
 def ordered(chain: Chain) -> Chain:
@@ -451,17 +424,8 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
     problem.learn((), problem.neutral(), coloured=False)
     best = problem.fit((), problem.neutral())
     dropped: dict[str, str] = {}
-    for _ in range(ROUNDS):
-        best = holding_or_not(problem, grown(problem, best, forms, dropped))
-        best = richer(problem, best)
-        names = {key for key, _ in best.chain}
-        best = exchanged(problem, best, forms)
-        new = {key for key, _ in best.chain} - names
-        if not new:
-            break
-        # What came in another's place is whitened by its own residual, and given it others may be needed.
-        dropped = {key: reason for key, reason in dropped.items() if key not in new}
-    best = pruned(problem, better_forms(problem, best, forms), dropped)
+    best = richer(problem, holding_or_not(problem, grown(problem, best, forms, dropped)))
+    best = pruned(problem, best, dropped)
     return worded(problem, without_mere_scale(problem, best, dropped), forms, dropped)
 
 
@@ -509,7 +473,7 @@ def holding_or_not(problem: Problem, best: ChainFit) -> ChainFit:
 
 def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainFit:
     """The chain with forms added one by one as long as they explain more; why others did not enter in `dropped`."""
-    for _ in range(MOST_FORMS):
+    for _ in range(MOST):
         # Whitening by the residual of the richest chain seen: by a poor one's, everything would look like noise.
         problem.learn(best.chain, best.theta, coloured=bool(best.chain))
         best = problem.fit(best.chain, best.theta)
@@ -522,7 +486,7 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
             tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
         tried.sort(key=lambda t: -t[0])
         entered = False
-        for score, pair, fit in tried[:MOST_TRIED]:
+        for score, pair, fit in tried[:MOST]:
             if score <= 0:
                 break
             fit = problem.fit(fit.chain, fit.theta)
@@ -534,25 +498,6 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
         if not entered:
             break
     return best
-
-
-def exchanged(problem: Problem, best: ChainFit, forms) -> ChainFit:
-    """The chain with an id in another's place where that explains clearly more: what entered first need not be true."""
-    taken = {key for key, _ in best.chain}
-    tried = []
-    for key, current in best.chain:
-        for pair in forms:
-            if pair[0] in taken:
-                continue
-            fit = fitted_with(problem, best.exchanged(key, pair), best, pair, QUICK_FIT)
-            more = COST_PER_PARAMETER * max(0, len(pair[1].parameters) - len(current.parameters))
-            tried.append((fit.cost + more, fit))
-    cost, quick = min(tried, key=lambda t: t[0], default=(np.inf, best))
-    if cost >= best.cost - ALIKE:
-        return best
-    # Another form of what is there may do as well.
-    own = better_forms(problem, best, forms)
-    return problem.fit(quick.chain, quick.theta) if cost < own.cost - ALIKE else own
 
 
 def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | None:
@@ -605,21 +550,6 @@ def richer(problem: Problem, fit: ChainFit) -> ChainFit:
     return problem.fit(fit.chain, fit.theta)
 
 
-def better_forms(problem: Problem, best: ChainFit, forms) -> ChainFit:
-    """Forms of the ids in the chain exchanged where another explains more for its parameters."""
-    for key, current in list(best.chain):
-        top, found = -COST_PER_PARAMETER * len(current.parameters) - best.cost, best
-        for pair in forms:
-            if pair[0] != key or pair[1] is current:
-                continue
-            fit = fitted_with(problem, best.exchanged(key, pair), best, pair, MOST_STEPS)
-            score = -COST_PER_PARAMETER * len(pair[1].parameters) - fit.cost
-            if score > top:
-                top, found = score, fit
-        best = found
-    return best
-
-
 def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
     """Findings of a chain with intervals, p-values and alternatives."""
     covariance, count = problem.covariance(best) if len(best.theta) else (np.zeros((0, 0)), 2)
@@ -658,9 +588,9 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
         if key not in names:
             text = f"{effects[key].name} did not hold: {reason}"
             findings.append(Finding(id=key, status="not_established", sentence=text))
-    full = float(best.theta[0]) if problem.scaled else problem.first_full
+    full, doubt = (float(best.theta[0]), float(sd[0])) if problem.scaled else (problem.first_full, 0.0)
     noise = float(np.sqrt(np.mean(problem.noise**2))) if problem.measured else None
-    return ChainResult(best, full, float(sd[0]) if problem.scaled else 0.0, findings, noise, problem.holds)
+    return ChainResult(best, full, doubt, findings, noise, problem.holds)
 
 
 def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]:
@@ -675,53 +605,29 @@ def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]
         fit = fitted_with(problem, ordered((*rest, pair)), best, pair)
         if fit.cost < best.cost + ALIKE:
             out.append(pair[0])
-    out += [k for k in rest_in_other_forms(problem, best, rest, forms) if k not in out]
     if not problem.measured:
         out += reading_alternatives(problem, best, rest, key)
-    return out
-
-
-def rest_in_other_forms(problem: Problem, best: ChainFit, rest: Chain, forms) -> list[str]:
-    """Ids of a chain that lacks one form which explain as well without it, if one of them takes another form.
-
-    A curve of the throttle that is not quite of the right form leaves what another effect then explains.
-    """
-    most, out = sum(len(f.parameters) for _, f in best.chain), []
-    for key, current in rest:
-        for pair in forms:
-            if pair[0] != key or pair[1] is current or key in out:
-                continue
-            chain = ordered(tuple(pair if k == key else (k, f) for k, f in rest))
-            if sum(len(f.parameters) for _, f in chain) > most:
-                continue
-            fit = fitted_with(problem, chain, best, pair)
-            if fit.cost < best.cost + ALIKE:
-                out.append(key)
     return out
 
 
 def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
+    known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
     for name in catalogue()[key].like_of_reading:
         for form in forms_of(catalogue()[name], problem.setup.instrument):
-            for p in form.parameters[0].starts:
-                others = problem.others
+            first, beside = form.parameters[0], copy(problem)
 
-                def white(theta, form=form, others=others):
-                    problem.others = [*others, (form, theta[:1])]
-                    try:
-                        return problem.white(rest, theta[1:])
-                    finally:
-                        problem.others = others
+            def white(theta, form=form, beside=beside):
+                beside.others = [*problem.others, (form, theta[:1])]
+                return beside.white(rest, theta[1:])
 
-                start = np.concatenate([[p], start_of(problem, rest, best)])
-                low, high = problem.bounds(rest)
-                low, high = np.append(form.parameters[0].low, low), np.append(form.parameters[0].high, high)
+            for p in first.starts:
+                start, bounds = np.append(p, known), (np.append(first.low, low), np.append(first.high, high))
                 found = least_squares(
                     white,
-                    np.clip(start, low, high),
-                    bounds=(low, high),
+                    np.clip(start, *bounds),
+                    bounds=bounds,
                     x_scale=np.maximum(np.abs(start), 1e-3),
                     diff_step=1e-4,
                     max_nfev=15,
