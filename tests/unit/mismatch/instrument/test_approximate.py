@@ -11,7 +11,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import forms_of, rotation_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.approximate import hats, later
+from rotorid.mismatch.instrument.approximate import hats
 from rotorid.mismatch.instrument.columns import OFFSET, make_terms
 from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model
 from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
@@ -219,11 +219,6 @@ def test_an_effect_of_its_own_stays_beside_a_strong_one() -> None:
 def test_hats_add_up_to_one() -> None:
     np.testing.assert_allclose(hats(np.array([0.0, 1 / 6, 0.5, 1.0])).sum(axis=1), 1.0)
     np.testing.assert_allclose(hats(np.array([1 / 6]))[0], [0.5, 0.5, 0, 0])
-
-
-def test_rows_later_hold_the_first() -> None:
-    assert later(np.array([1.0, 2.0, 3.0, 4.0]), 2).tolist() == [1.0, 1.0, 1.0, 2.0]
-    assert later(np.array([1.0, 2.0]), 8).tolist() == [1.0, 1.0]
 
 
 def test_noise_of_a_voltmeter_is_told_from_a_supply_in_steps() -> None:
