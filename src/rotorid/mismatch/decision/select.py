@@ -287,15 +287,10 @@ class Search:
                 for other, worth in zip(others, worths, strict=True)
                 if worth > least
             ]
-        trials = sorted(trials, key=lambda t: -t[0])
-        return next(
-            (
-                trial
-                for _, new, trial in trials[:MOST_TRIALS]
-                if self._all_physical(trial) and self.failing(new, trial)[0] is None
-            ),
-            None,
-        )
+        for _, new, trial in sorted(trials, key=lambda t: -t[0])[:MOST_TRIALS]:
+            if all(self.judge(key, trial).physical for key in trial) and self.failing(new, trial)[0] is None:
+                return trial
+        return None
 
     def beside(self, active: list[str]) -> Fit | None:
         """The model with the strongest further effect that explains more than it costs and is still not stated.
@@ -305,9 +300,6 @@ class Search:
         """
         found = next((c for c in self.candidates(active) if c.score > 0 and c.physical), None)
         return None if found is None else self.regression.fit([*self.always, *active, found.key])
-
-    def _all_physical(self, active: list[str]) -> bool:
-        return all(self.judge(key, active).physical for key in active)
 
     def failing(self, key: str, active: list[str]) -> tuple[str | None, float]:
         """Why a term of the model does not hold given the others (None where it does), and its score; remembered."""
@@ -382,9 +374,7 @@ class Search:
             return None
         for candidate in self.candidates(active, dropped, named_first):
             effect = self.terms[candidate.key].once
-            if candidate.score <= 0:
-                continue
-            if candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
+            if candidate.score <= 0 or candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
                 continue
             size = self.weight(candidate.key, candidate.beta, active)
             if not rules.SIZE(size < SMALLEST_SIZE):
@@ -457,11 +447,9 @@ class Search:
             seen = self.regression.compare(self.always + active, self.always + [k for k in active if k != key])
             if seen.promised.sum() <= LEAST_PROMISE or not seen.votes.any():
                 continue
-            kept = (
-                seen.transfer
-                if seen.won >= rules.TRANSFER["won"] * seen.expected_won
-                else min(seen.transfer, LEAST_TRANSFER - 1e-9)
-            )
+            kept = seen.transfer
+            if seen.won < rules.TRANSFER["won"] * seen.expected_won:
+                kept = min(kept, LEAST_TRANSFER - 1e-9)
             if kept < worst:
                 worst, found = kept, key
         return found
@@ -488,14 +476,11 @@ class Search:
         rest = [k for k in active if k != key]
         taken = {self.terms[k].effect for k in rest}
         own = self.judge(key, rest)
-        found = []
+        no_rivals = {*taken, *UNKNOWNS, self.terms[key].effect}
+        found: list[str] = []
         for term in self.terms.values():
-            if term.kind != "effect" or term.effect in taken or term.effect == self.terms[key].effect:
-                continue
-            if term.effect in found or term.effect in UNKNOWNS:
-                continue
-            if self._replaces(term.key, own, rest):
-                found.append(term.effect)
+            if term.kind == "effect" and term.effect not in no_rivals and term.effect not in found:
+                found += [term.effect] if self._replaces(term.key, own, rest) else []
         return found
 
     def _replaces(self, other: str, own: Candidate, rest: list[str]) -> bool:

@@ -14,7 +14,6 @@ from rotorid.mismatch.delivery.gate import Settled
 from rotorid.mismatch.model.delivered import FittedModel
 from rotorid.mismatch.model.values import believed_value
 from rotorid.mismatch.model.within_trust import all_free
-from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 from rotorid.recordings import Vehicle
 
 ONLY_A_RATIO = 0.9
@@ -49,7 +48,7 @@ def value_rows(
     settled: Settled,
     improved: Vehicle,
     believed: Vehicle,
-    names: Mapping[str, str] = PARAMETER_NAMES,
+    names: Mapping[str, str],
 ) -> tuple[ValueRow, ...]:
     """Every believed value before and after: estimated jointly with the delivered effects, all free, and delivered."""
     fit = all_free(model, settled.offer.values, list(settled.offer.active))[1]
@@ -79,9 +78,7 @@ def delivered_value(improved: Vehicle, believed: Vehicle, key: str) -> float:
     return believed_value(improved, key)
 
 
-def value_correlations(
-    model: FittedModel, settled: Settled, names: Mapping[str, str] = PARAMETER_NAMES
-) -> dict[tuple[str, str], float]:
+def value_correlations(model: FittedModel, settled: Settled, names: Mapping[str, str]) -> dict[tuple[str, str], float]:
     """Correlations of two values' estimates from ONLY_A_RATIO on, trust left out: what the recordings alone know."""
     keys = model.values_beside(settled.offer.active)
     loose = dict.fromkeys(keys, 1.0)

@@ -58,8 +58,7 @@ class Turn:
     def undo(self, values: np.ndarray) -> np.ndarray:
         """Recorded values (n, 3) in true axes."""
         out = np.empty_like(values)
-        for i, (source, sign) in enumerate(zip(self.source, self.sign, strict=True)):
-            out[:, source] = sign * values[:, i]
+        out[:, self.source] = values * self.sign
         return out
 
     def text(self) -> str:

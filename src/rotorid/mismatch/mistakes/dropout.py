@@ -229,7 +229,7 @@ def held(
     return out
 
 
-def may_stand(values: np.ndarray, start: int, stop: int, noisy: bool = False) -> bool:
+def may_stand(values: np.ndarray, start: int, stop: int, noisy: bool) -> bool:
     """Whether columns (n, k) that repeat one reading from `start` to `stop` may truly have stood still.
 
     A sensor's own noise never does; `noisy` says that other runs show it. A simulator without noise hovers, or flies in

@@ -13,6 +13,7 @@ from itertools import combinations, permutations, product
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.sparse.csgraph import connected_components
 from scipy.stats import t as student
 
 from rotorid.mismatch.decision.findings import Finding
@@ -115,14 +116,7 @@ def orders_to_try(count: int) -> np.ndarray:
 
 def moves(order: np.ndarray) -> int:
     """How many exchanges of two columns an order takes."""
-    seen, cycles = set(), 0
-    for start in range(len(order)):
-        if start not in seen:
-            cycles += 1
-            at = start
-            while at not in seen:
-                seen.add(at)
-                at = int(order[at])
+    cycles, _ = connected_components(np.eye(len(order))[order])
     return len(order) - cycles
 
 

@@ -118,6 +118,10 @@ class Difference:
     bias_s: float
     """The most that disturbances, which the rotors answer in a closed loop, can feign of lateness."""
 
+    def value(self, key: int) -> float:
+        """Lateness (key 0), s, or growth (1)."""
+        return self.growth if key else self.start_s
+
     def sd(self, key: int) -> float:
         """One sigma of lateness (key 0) or growth (1)."""
         return float(np.sqrt(max(self.covariance[key, key], 1e-16)))
@@ -348,7 +352,7 @@ def across(differences: Sequence[Difference], wrong: Sequence[str], key: int) ->
     for d in differences:
         part = d.of.part(wrong)
         if abs(part) > LEAST_SHARE:
-            values.append((d.growth if key else d.start_s) / part)
+            values.append(d.value(key) / part)
             weights.append(part**2 / (d.sd(key) ** 2 + d.bound(key) ** 2))
     return float(np.average(values, weights=weights)), float(1.0 / np.sqrt(np.sum(weights)))
 
@@ -396,8 +400,7 @@ def _peak(lags: np.ndarray, curves: np.ndarray, time_s: np.ndarray, guess: float
     def best(starts, growths):
         """The pair with the highest sum, linear between the grid's lags."""
         at = np.clip(starts[:, None] + growths[:, None] * time_s, lags[0], lags[-1] - LAG_STEP_S)
-        low = ((at - lags[0]) / LAG_STEP_S).astype(int)
-        low = np.minimum(low, len(lags) - 2)
+        low = np.minimum(((at - lags[0]) / LAG_STEP_S).astype(int), len(lags) - 2)
         share = (at - lags[low]) / LAG_STEP_S
         totals = (curves[rows, low] * (1 - share) + curves[rows, low + 1] * share).sum(axis=1)
         k = int(np.argmax(totals))
@@ -405,8 +408,8 @@ def _peak(lags: np.ndarray, curves: np.ndarray, time_s: np.ndarray, guess: float
 
     start, growth, wide_start, wide_growth = guess, 0.0, 0.004, 0.0
     if drifting:
-        rates, asides = np.meshgrid(np.arange(-LARGEST_SKEW, LARGEST_SKEW + 1e-9, 2e-4), np.arange(-0.06, 0.061, 0.005))
-        rates, asides = rates.ravel(), asides.ravel()
+        grid = np.meshgrid(np.arange(-LARGEST_SKEW, LARGEST_SKEW + 1e-9, 2e-4), np.arange(-0.06, 0.061, 0.005))
+        rates, asides = (g.ravel() for g in grid)
         start, growth = best(guess + asides - rates * float(time_s.mean()), rates)
         wide_start, wide_growth = 0.005, 2e-4
     steps = np.array([-1, -0.5, 0, 0.5, 1])
@@ -446,8 +449,7 @@ def lateness(differences: list[Difference], key: int) -> Lateness:
     """Lateness (key 0) or growth (key 1) of every sensor by weighted least squares."""
     names = sorted({n for d in differences for n in d.of.sensors})
     rows = np.array([[d.of.part([n]) for n in names] for d in differences])
-    target = np.array([d.growth if key else d.start_s for d in differences])
-    sd, bound = (np.array([f(key) for f in fs]) for fs in zip(*((d.sd, d.bound) for d in differences), strict=True))
+    target, sd, bound = np.array([(d.value(key), d.sd(key), d.bound(key)) for d in differences]).T
     scale = 1.0 / np.hypot(sd, bound)
     operator = np.linalg.pinv(rows * scale[:, None]) * scale
     return Lateness(names, operator @ target, operator, sd, bound, _connected(names, differences))

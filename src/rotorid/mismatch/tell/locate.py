@@ -301,9 +301,9 @@ def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
     return out
 
 
-def _freedom_per_sample(traces: Sequence[Trace], longest_s: float = 1.0) -> float:
-    """Degrees of freedom that a sample's square adds in coloured noise: 1 / Σ ρ² over lags (Bartlett)."""
-    count = int(longest_s / _period(traces[0]))
+def _freedom_per_sample(traces: Sequence[Trace]) -> float:
+    """Degrees of freedom that a sample's square adds in coloured noise: 1 / Σ ρ² over lags of up to 1 s (Bartlett)."""
+    count = int(1.0 / _period(traces[0]))
     covariance = np.zeros(count + 1)
     for trace in traces:
         a = np.nan_to_num(trace.after - np.nanmean(trace.after))

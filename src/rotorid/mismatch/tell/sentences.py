@@ -216,7 +216,7 @@ def _corrected_mistakes(stated: Sequence[Finding]) -> str:
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
 
 
-def off_words(main: str, channels: Mapping[str, Channel], size: Size | None = None, how: SizeWords = "both") -> str:
+def off_words(main: str, channels: Mapping[str, Channel], size: Size | None, how: SizeWords) -> str:
     """How much a channel is off, in words; with its size, as far as asked."""
     if not main:
         return "the model and the recordings differ"
@@ -357,14 +357,14 @@ def _parameters(finding: Finding) -> str:
     return listed(shown)
 
 
-def surest(parameters: Sequence[Estimate], most: int = 3) -> list[Estimate]:
-    """The parameters that are furthest from zero relative to their intervals, in their order."""
+def surest(parameters: Sequence[Estimate]) -> list[Estimate]:
+    """The three parameters that are furthest from zero relative to their intervals, in their order."""
 
     def beyond(e: Estimate) -> float:
         width = e.high - e.low
         return abs(e.value) / max(width, 1e-12 * abs(e.value), 1e-300) if np.isfinite(width) else 0.0
 
-    kept = sorted(parameters, key=beyond, reverse=True)[:most]
+    kept = sorted(parameters, key=beyond, reverse=True)[:3]
     return [e for e in parameters if e in kept]
 
 
@@ -410,7 +410,7 @@ def _wrong(name: str, values: tuple[float, float, float, float], instead: Sequen
     return f"The {words} is {value}{space}, not the {number(believed, 4)}{space} believed{other}."
 
 
-def _better(main: str, channels: Mapping[str, Channel], corrected: Sequence[str] = ()) -> str:
+def _better(main: str, channels: Mapping[str, Channel], corrected: Sequence[str]) -> str:
     if not main:
         return ""
     channel = channels[main]

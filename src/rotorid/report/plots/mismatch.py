@@ -18,6 +18,7 @@ STRIP_CELL_S = 0.5
 LARGEST = 10.0
 """Size relative to the noise at which the heat strip's colour ends."""
 SHADE = "#f3e6d8"
+STAGES = {"before": "as believed", "refitted": "values refitted", "after": "improved"}
 
 
 def svg(fig: Figure) -> str:
@@ -133,9 +134,9 @@ def gains(labels: Sequence[str], before, refitted, after) -> Figure:
     rows = np.arange(len(labels))
     before, refitted, after = (np.asarray(v, float) for v in (before, refitted, after))
     ax.hlines(rows, np.minimum(before, after), np.maximum(before, after), color="#cccccc", lw=1.5, zorder=1)
-    ax.plot(before, rows, "o", color=style.COLOUR["before"], label="as believed")
-    ax.plot(refitted, rows, "o", color=style.COLOUR["refitted"], ms=3.5, label="values refitted")
-    ax.plot(after, rows, "o", color=style.COLOUR["after"], label="improved")
+    for (stage, label), values in zip(STAGES.items(), (before, refitted, after), strict=True):
+        size = 3.5 if stage == "refitted" else None
+        ax.plot(values, rows, "o", color=style.COLOUR[stage], ms=size, label=label)
     ax.axvline(1, color=style.GREY, ls="--", lw=1)
     ax.set_xscale("log")
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
@@ -173,8 +174,8 @@ def errors_over_time(traces: pd.DataFrame, channels: Sequence[str], located: pd.
         here = located[(located["channel"] == channel) & located["run"].isin(part["run"])]
         for row in here.itertuples():
             axis.axvspan(row.start_s, row.stop_s, color=SHADE, lw=0, zorder=0)
-        axis.plot(part["time_s"], part["before"], color=style.COLOUR["before"], lw=0.8, label="as believed")
-        axis.plot(part["time_s"], part["after"], color=style.COLOUR["after"], lw=0.8, label="improved")
+        for stage in ("before", "after"):
+            axis.plot(part["time_s"], part[stage], color=style.COLOUR[stage], lw=0.8, label=STAGES[stage])
         label, unit = CHANNELS[channel]
         axis.set_ylabel(f"{label} ({unit})")
     axes[-1, 0].set_xlabel("time (s)")
@@ -189,19 +190,9 @@ def errors_by_channel(channels: pd.DataFrame) -> Figure:
     """
     fig, axis = style.figure(2.6)
     places = np.arange(len(channels))
-    for shift, stage, name in (
-        (-0.2, "before", "as believed"),
-        (0.0, "refitted", "values refitted"),
-        (0.2, "after", "improved"),
-    ):
-        axis.plot(
-            places + shift,
-            channels[stage] / channels["noise_floor"],
-            "o",
-            color=style.COLOUR[stage],
-            label=name,
-            markersize=5,
-        )
+    for shift, (stage, name) in zip((-0.2, 0.0, 0.2), STAGES.items(), strict=True):
+        error = channels[stage] / channels["noise_floor"]
+        axis.plot(places + shift, error, "o", color=style.COLOUR[stage], label=name, markersize=5)
     axis.axhline(1, color=style.COLOUR["noise"], lw=1, ls="--")
     axis.text(len(channels) - 0.45, 1.0, "noise", color=style.COLOUR["noise"], va="bottom", ha="right", fontsize=8.5)
     axis.set_yscale("log")
