@@ -12,7 +12,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from rotorid_proof.decisions import truths
-from rotorid_proof.decisions.decisions import DECISIONS, Said
+from rotorid_proof.decisions.decisions import DECISIONS, Said, ideal_observer
 from rotorid_proof.decisions.score import Scored, score_drawn, score_planted, score_real
 from rotorid_proof.decisions.store import Kept, newest, read_all, read_evidence, read_truth
 from rotorid_proof.decisions.table import Row, markdown, sets, table
@@ -20,17 +20,19 @@ from rotorid_proof.decisions.table import Row, markdown, sets, table
 LOG = logging.getLogger(__name__)
 ENGINE = "engine"
 """The one decision that stands and benches have."""
+IDEAL = "ideal observer"
+"""Knows the truth, and says what these data could tell of it."""
 
 
 def decided(folder: Path, kept: Kept) -> dict[str, Said]:
-    """What every decision says of a set; of a stand or bench the engine alone."""
+    """What each decision says of a flight, and the ideal observer; of a stand or bench the engine alone."""
     whole = read_evidence(folder, kept)
+    if kept.label.plant != "flight":
+        return {ENGINE: DECISIONS[ENGINE](whole)}
+    answer = read_truth(folder, kept).get("answer")
     with threadpool_limits(1):
-        return {
-            name: decision(whole)
-            for name, decision in DECISIONS.items()
-            if name == ENGINE or kept.label.plant == "flight"
-        }
+        out = {name: decision(whole) for name, decision in DECISIONS.items()}
+        return out if answer is None else {**out, IDEAL: ideal_observer(whole, answer)}
 
 
 def scored(folder: Path, kept: Kept, said: Said, untouched: Said | None) -> Scored | None:

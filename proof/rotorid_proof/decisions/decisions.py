@@ -6,18 +6,23 @@ verdicts score it. Each effect may carry a `probability`, that one of its class 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.search import decide
+from rotorid.mismatch.posterior.problem import Problem
+from rotorid.mismatch.posterior.search import Found, decide, joint, ranked
 from rotorid.mismatch.posterior.statements import Statement, statements_of
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid_proof.decisions.store import Kept
 
+MOST_RANKED, MOST_STARTS = 200, 4
+"""True models that are ranked, and from which an ideal observer starts, at most."""
 Said = Mapping[str, Any]
 """`effects`, `parameters` and `verdict` of a verdict, or `{"failed": reason}`."""
 Decision = Callable[[Kept], Said]
@@ -41,12 +46,37 @@ def selection(kept: Kept) -> Said:
 
 def posterior(kept: Kept) -> Said:
     """Effects of force, moment and sensors by the posterior; the rest, and values, by the engine's selection."""
+    return kept.verdict if kept.evidence is None else stated(kept, decide(kept.evidence, Prior(), kept.evidence.active))
+
+
+def ideal_observer(kept: Kept, answer: Mapping[str, Any]) -> Said:
+    """The posterior that also starts at the truth: what it does not name, no search for its best model can.
+
+    Wrong believed values and what has no column are the engine's. Columns are linearised where the engine's search
+    ended, not at the truth.
+    """
     if kept.evidence is None:
         return kept.verdict
-    found = statements_of(decide(kept.evidence, Prior(), kept.evidence.active))
+    found = decide(kept.evidence, Prior(), kept.evidence.active)
+    spectrum, truth = spectrum_of(kept.evidence), frozenset(effect["id"] for effect in answer["effects"])
+    ends = [found, *(decide(kept.evidence, Prior(), keys) for keys in starts(found.problem, truth))]
+    return stated(kept, max(ends, key=lambda end: joint(spectrum, end)))
+
+
+def starts(problem: Problem, truth: frozenset[str]) -> list[tuple[str, ...]]:
+    """Models of the ids that are true, each in one of its forms; the most probable with no other id first."""
+    forms = [[key for key, t in problem.terms.items() if t.kind == "effect" and t.effect == one] for one in truth]
+    models = itertools.islice(itertools.product(*(own for own in forms if own)), MOST_RANKED)
+    best = sorted(models, key=lambda model: -ranked(problem, tuple(sorted(model))))
+    return [tuple(sorted(model)) for model in best[:MOST_STARTS] if model]
+
+
+def stated(kept: Kept, found: Found) -> Said:
+    """What a posterior states, next to what it does not decide."""
     # What is unlikely, or too small to matter, is not stated.
-    stated = [as_effect(s, kept.selection["commanded"]) for s in found if s.status != "not_established"]
-    return said([*kept.selection["outside"], *stated], kept.selection["parameters"])
+    likely = [s for s in statements_of(found) if s.status != "not_established"]
+    effects = [as_effect(s, kept.selection["commanded"]) for s in likely]
+    return said([*kept.selection["outside"], *effects], kept.selection["parameters"])
 
 
 DECISIONS: Mapping[str, Decision] = {"engine": engine, "selection": selection, "posterior": posterior}

@@ -1,6 +1,7 @@
 """The bench for decisions: what is counted of a decision on a set, and in which order sets are kept."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from rotorid_proof.decisions import truths
 from rotorid_proof.decisions.bench import rows_of
 from rotorid_proof.decisions.collect import Made, collect
-from rotorid_proof.decisions.decisions import posterior, selection
+from rotorid_proof.decisions.decisions import ideal_observer, posterior, selection
 from rotorid_proof.decisions.label import Label
 from rotorid_proof.decisions.plan import Item, drawn, in_order
 from rotorid_proof.decisions.score import Counts, score_drawn, score_planted, score_real, statements
@@ -16,6 +17,8 @@ from rotorid_proof.decisions.store import Kept, read_all, write
 from rotorid_proof.decisions.table import markdown, sets, table
 from rotorid_proof.plan import Entry
 from rotorid_proof.plantings.kinds import Ratio, Size, named
+from tests.unit.mismatch.posterior.test_posterior import effect as term
+from tests.unit.mismatch.posterior.test_posterior import flight
 
 ANSWER = {
     "set": "set-1",
@@ -194,7 +197,8 @@ def test_every_decision_is_scored_on_everything_that_is_kept(tmp_path):
         tmp_path, kept("drawn/stand/clean/000", "clean", [], "stand"), None, {"answer": {**CLEAN, "case": "stand/x/0"}}
     )
     rows = rows_of(tmp_path, "later", cores=1)
-    assert len(rows) == 3 * 3 + 1
+    # Three decisions on each flight, on the drawn one the ideal observer too, the engine's on the stand.
+    assert len(rows) == 3 * 3 + 1 + 1
     found = table(rows).set_index(["name", "decision"])
     assert found.loc[("flight planted", "engine"), "named"] == 0
     assert found.loc[("flight planted", "selection"), "named"] == 1
@@ -210,6 +214,20 @@ def test_every_decision_is_scored_on_everything_that_is_kept(tmp_path):
 def test_without_evidence_the_posterior_says_what_the_verdict_says():
     stopped = Kept(Label("drawn/x", "flight", "a", "b"), "k", "s", "e", 1.0, 1.0, {"failed": "no"}, None)
     assert posterior(stopped) == selection(stopped) == {"failed": "no"}
+
+
+def test_the_ideal_observer_names_what_a_search_from_nothing_cannot_find():
+    # Two columns that are nearly the same, and act against each other: by itself neither explains anything.
+    terms = (term("drag/plain"), term("lift/plain"))
+    seen = flight([0.0, 0.0], terms, alike=30.0)
+    made = replace(seen, y=seen.y + 0.3 * (seen.x[:, :, 0] - seen.x[:, :, 1])).evidence()
+    own = replace(kept("drawn/x/0", "x", []), evidence=made)
+    answer = {**CLEAN, "effects": [{"id": "drag"}, {"id": "lift"}]}
+    assert [e["id"] for e in posterior(own)["effects"]] == []
+    assert {e["id"] for e in ideal_observer(own, answer)["effects"]} == {"drag", "lift"}
+    # It is told where to start, not what to say.
+    nothing = replace(own, evidence=seen.evidence())
+    assert ideal_observer(nothing, answer)["effects"] == []
 
 
 def test_selection_is_said_with_a_word_of_its_own():
