@@ -8,10 +8,20 @@ from rotorid.effects.loading import NO_ROTORS, weight
 
 def moment_only(motion, vehicle, values):
     """M = -r_c × F_thrust: the rotors' arms are r_i - r_c; moments about the true centre of mass."""
-    offset = np.array([values[0], values[1], 0.0])
-    thrust = np.zeros((motion.size, 3))
-    thrust[:, 2] = -(vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2).sum(axis=1)
-    return Contribution(moment=-np.cross(offset, thrust))
+    return along_the_axis(values, (vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2).sum(axis=1))
+
+
+def of_all_forces(motion, vehicle, values):
+    """M = -r_c × F: what drag and inflow do to the rotors' forces acts on that arm, too; F = m a, a the specific force.
+
+    Of F the part along the rotors' axis, as of the thrust.
+    """
+    return along_the_axis(values, -vehicle.mass_kg * motion.specific_force[:, 2])
+
+
+def along_the_axis(values, upward_n):
+    """Moment (n, 3) of a force along the rotors' axis, (n,), about a centre of mass at (x, y)."""
+    return Contribution(moment=np.stack([values[1] * upward_n, -values[0] * upward_n, 0.0 * upward_n], axis=1))
 
 
 def with_lever_arm(motion, vehicle, values):
@@ -20,7 +30,7 @@ def with_lever_arm(motion, vehicle, values):
     offset[: len(values)] = values
     rate = motion.angular_velocity
     shift = np.cross(motion.angular_acceleration, -offset) + np.cross(rate, np.cross(rate, -offset))
-    return Contribution(moment=moment_only(motion, vehicle, values).moment, specific_force=shift)
+    return Contribution(moment=of_all_forces(motion, vehicle, values).moment, specific_force=shift)
 
 
 def kernel(m, v, p, w):
@@ -31,22 +41,30 @@ def kernel(m, v, p, w):
     w.moment[1] -= p[0] * thrust
 
 
+def kernel_of_all_forces(m, v, p, w):
+    upward = -v.mass * m.specific_force[2]
+    w.moment[0] += p[1] * upward
+    w.moment[1] -= p[0] * upward
+
+
 def forms(vehicle):
     space = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xyz")
-    plane, text = space[:2], "M = −r_c × F_thrust"
+    plane, text = space[:2], "M = −r_c × m a"
     read_too = text + ", a_m = a + dΩ × (−r_c) + Ω × (Ω × (−r_c))"
-    needs = ("rotor_speed", "angular_velocity", "angular_acceleration", "accelerometer")
+    known = ("rotor_speed", "angular_velocity")
+    needs = (*known, "angular_acceleration", "specific_force", "accelerometer")
     return (
+        Form("moment", "M = −r_c × F_thrust", plane, moment_only, known, excited_by=("rotor_speed",), kernel=kernel),
         Form(
-            "moment",
+            "moment of all forces",
             text,
             plane,
-            moment_only,
-            ("rotor_speed", "angular_velocity"),
-            excited_by=("rotor_speed",),
-            kernel=kernel,
+            of_all_forces,
+            (*known, "specific_force"),
+            excited_by=("specific_force",),
+            kernel=kernel_of_all_forces,
         ),
-        Form("moment and accelerometer", read_too, plane, with_lever_arm, needs, kernel=kernel),
+        Form("moment and accelerometer", read_too, plane, with_lever_arm, needs, kernel=kernel_of_all_forces),
         Form(
             "moment and accelerometer, in space",
             read_too,
@@ -54,7 +72,7 @@ def forms(vehicle):
             with_lever_arm,
             needs,
             must_show=(0, 1),
-            kernel=kernel,
+            kernel=kernel_of_all_forces,
         ),
     )
 
@@ -94,7 +112,7 @@ EFFECT = Effect(
         "offsets in the rotor plane; a vertical one shows in the accelerometer alone, as the moment of side forces is "
         "left out, and so is the change of inertia (m r², below 1 % for r under 5 mm)"
     ),
-    excited_by=("rotor_speed", "angular_velocity", "angular_acceleration"),
+    excited_by=("specific_force", "angular_velocity", "angular_acceleration"),
     reading_forms=reading_forms,
     confusers=("unequal_rotors", "thrust_tilt"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets",

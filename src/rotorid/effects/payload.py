@@ -65,37 +65,45 @@ def aboard(motion):
 
 
 def rigid(motion, vehicle, values):
-    """F = -m_p a, M = -(m_p r) × a: added mass m_p at (x, y) that moves with the body; a the specific force."""
-    mass_kg, moment_x, moment_y = values
-    lever = np.array([moment_x, moment_y, 0.0])
-    moved = aboard(motion) * motion.specific_force
-    return Contribution(force=-mass_kg * moved, moment=-np.cross(lever, moved))
+    """A mass m_p at r that moves with the body: F = -m_p (a + dΩ × r + Ω × (Ω × r)), M = -m_p r × a.
+
+    a is the specific force at the believed centre of mass; `values` are m_p (kg) and m_p r (kg m).
+    """
+    lever = np.asarray(values[1:4])
+    on_board, force = aboard(motion), -values[0] * motion.specific_force
+    if motion.angular_acceleration is not None:
+        rate = motion.angular_velocity
+        force = force - np.cross(motion.angular_acceleration, lever) - np.cross(rate, np.cross(rate, lever))
+    return Contribution(force=on_board * force, moment=-np.cross(lever, on_board * motion.specific_force))
 
 
 def rigid_with_inertia(motion, vehicle, values):
     """The rigid payload and the products of inertia that it brings (its moments of inertia count as values)."""
     extra = np.zeros((3, 3))
-    extra[0, 1], extra[0, 2], extra[1, 2] = values[3:]
+    extra[0, 1], extra[0, 2], extra[1, 2] = values[4:]
     extra += extra.T
     rate = motion.angular_velocity
     turning = aboard(motion) * (motion.angular_acceleration @ extra + np.cross(rate, rate @ extra))
-    attached = rigid(motion, vehicle, values[:3])
+    attached = rigid(motion, vehicle, values[:4])
     return Contribution(force=attached.force, moment=attached.moment - turning)
 
 
 def kernel_rigid(m, v, p, w):
-    """A rigid payload; `p` is m_p, m_p x, m_p y, J_xy, J_xz, J_yz."""
+    """A rigid payload; `p` is m_p, m_p x, m_p y, m_p z, J_xy, J_xz, J_yz."""
     s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
-    x, y, z = p[3] * o[1] + p[4] * o[2], p[3] * o[0] + p[5] * o[2], p[4] * o[0] + p[5] * o[1]
-    for j in range(3):
-        w.force[j] -= p[0] * s[j]
-    w.moment[0] -= p[2] * s[2] + p[3] * a[1] + p[4] * a[2] + o[1] * z - o[2] * y
-    w.moment[1] -= -p[1] * s[2] + p[3] * a[0] + p[5] * a[2] + o[2] * x - o[0] * z
-    w.moment[2] -= p[1] * s[1] - p[2] * s[0] + p[4] * a[0] + p[5] * a[1] + o[0] * y - o[1] * x
+    x, y, z = p[4] * o[1] + p[5] * o[2], p[4] * o[0] + p[6] * o[2], p[5] * o[0] + p[6] * o[1]
+    # Ω × m_p r, and of that Ω × once more.
+    i, j, k = o[1] * p[3] - o[2] * p[2], o[2] * p[1] - o[0] * p[3], o[0] * p[2] - o[1] * p[1]
+    w.force[0] -= p[0] * s[0] + a[1] * p[3] - a[2] * p[2] + o[1] * k - o[2] * j
+    w.force[1] -= p[0] * s[1] + a[2] * p[1] - a[0] * p[3] + o[2] * i - o[0] * k
+    w.force[2] -= p[0] * s[2] + a[0] * p[2] - a[1] * p[1] + o[0] * j - o[1] * i
+    w.moment[0] -= p[2] * s[2] - p[3] * s[1] + p[4] * a[1] + p[5] * a[2] + o[1] * z - o[2] * y
+    w.moment[1] -= p[3] * s[0] - p[1] * s[2] + p[4] * a[0] + p[6] * a[2] + o[2] * x - o[0] * z
+    w.moment[2] -= p[1] * s[1] - p[2] * s[0] + p[5] * a[0] + p[6] * a[1] + o[0] * y - o[1] * x
 
 
 def _without_products(values):
-    """m_p, m_p x, m_p y as the kernel's values."""
+    """m_p and m_p r as the kernel's values."""
     return (*values, 0.0, 0.0, 0.0)
 
 
@@ -103,19 +111,15 @@ def forms(vehicle):
     size = scale(vehicle)
     mass, bound = size.mass_kg, size.inertia_kg_m2
     m_p = Parameter("m_p", "kg", 0.0, 2 * mass, meaning="mass of the payload")
+    reach = mass * size.arm_m
     places = (
-        Parameter("m_p x", "kg m", -mass, mass, meaning="its mass times its place forward"),
-        Parameter("m_p y", "kg m", -mass, mass, meaning="its mass times its place to the right"),
+        Parameter("m_p x", "kg m", -reach, reach, meaning="its mass times its place forward"),
+        Parameter("m_p y", "kg m", -reach, reach, meaning="its mass times its place to the right"),
+        Parameter("m_p z", "kg m", -reach, reach, meaning="its mass times its place downward"),
     )
     cable = (
         m_p,
-        Parameter(
-            "m_p z",
-            "kg m",
-            -mass * size.arm_m,
-            mass * size.arm_m,
-            meaning="its mass times how far below the centre its hook is",
-        ),
+        Parameter("m_p z", "kg m", -reach, reach, meaning="its mass times how far below the centre its hook is"),
         Parameter("L", "m", *LENGTHS_M, True, (0.3, 0.6, 1.2, 2.4), "length of the cable"),
         Parameter("ζ", "1", 0.002, 0.3, True, (DAMPING_RATIO,), "damping of its swing, share of the critical"),
     )
@@ -126,7 +130,7 @@ def forms(vehicle):
     return (
         Form(
             "rigid with its products of inertia",
-            "F = −m_p a, M = −m_p r × a − (E dΩ/dt + Ω × E Ω)",
+            "F = −m_p (a + dΩ/dt × r + Ω × (Ω × r)), M = −m_p r × a − (E dΩ/dt + Ω × E Ω)",
             (m_p, *places, *products),
             rigid_with_inertia,
             ("specific_force", "angular_velocity", "angular_acceleration"),
@@ -136,7 +140,7 @@ def forms(vehicle):
         ),
         Form(
             "rigid",
-            "F = −m_p a, M = −m_p r × a",
+            "F = −m_p (a + dΩ/dt × r + Ω × (Ω × r)), M = −m_p r × a",
             (m_p, *places),
             rigid,
             ("specific_force",),
@@ -176,9 +180,9 @@ EFFECT = Effect(
     sentence="the vehicle is heavier than believed, off its centre, or carries a pendulum",
     forms=forms,
     source=("rigid-body mechanics; Sreenath, Lee and Kumar, CDC 2013 (suspended load); recording contract"),
-    sign="positive m_p pulls down; (x, y) is where it hangs from the believed centre of mass",
+    sign="positive m_p pulls down; r is where it sits from the believed centre of mass",
     validity=(
-        "rigid: a point mass in the rotor plane, its own inertia left out. Slung: any angle, cable taut, hung at "
+        "rigid: a point mass, whose moments of inertia count as values. Slung: any angle, cable taut, hung at "
         "the centre of mass and at rest when the recording starts, damped in proportion to its swing or to its speed"
         " through the air"
     ),

@@ -38,6 +38,11 @@ FORCE_AND_MOMENT = [
     # 1 cm forward: the nose drops
     ("com_offset", "moment", [0.01, 0.0], {}, None, (0, -0.04 * T, 0)),
     ("com_offset", "moment", [0.0, 0.01], {}, None, (0.04 * T, 0, 0)),
+    # pulled down as if it weighed 7 m/s2 times its mass, whatever the rotors do
+    (
+        *("com_offset", "moment of all forces", [0.01, 0.0], dict(specific_force=row(2, 0, -7))),
+        *(None, (0, -0.01 * 7 * thesis_vehicle().mass_kg, 0)),
+    ),
     # the nose rises in forward flight: 1e-6 · 4000 · 5
     ("flapping_moment", "at the hubs", [1e-6], dict(velocity=row(5, 0, 0)), None, (0, 0.02, 0)),
     ("flapping_moment", "independent of rotor speed", [0.01], dict(velocity=row(0, 5, 0)), None, (-0.05, 0, 0)),
@@ -50,9 +55,25 @@ FORCE_AND_MOMENT = [
     ("inertia_products", "products", [0, 1e-4, 0], dict(angular_velocity=row(2, 0, 0)), None, (0, 4e-4, 0)),
     # 0.1 kg, 5 cm forward, at rest: pulls down, the nose with it
     (
-        *("payload", "rigid", [0.1, 0.005, 0.0], dict(specific_force=row(0, 0, -G))),
+        *("payload", "rigid", [0.1, 0.005, 0.0, 0.0], dict(specific_force=row(0, 0, -G))),
         *((0, 0, 0.1 * G), (0, -0.005 * G, 0)),
     ),
+    # 0.1 kg 10 cm below: rolled at 20 rad/s2 it is thrown to the left and holds back; at 3 rad/s it pulls away from
+    # the axis. Pushed forward at 2 m/s2 it stays behind, and the nose drops.
+    (
+        *(
+            "payload",
+            "rigid",
+            [0.1, 0.0, 0.0, 0.01],
+            dict(specific_force=row(0, 0, 0), angular_acceleration=row(20, 0, 0)),
+        ),
+        *((0, 0.2, 0), None),
+    ),
+    (
+        *("payload", "rigid", [0.1, 0.0, 0.0, 0.01], dict(specific_force=row(0, 0, 0), angular_velocity=row(3, 0, 0))),
+        *((0, 0, 0.09), None),
+    ),
+    ("payload", "rigid", [0.1, 0.0, 0.0, 0.01], dict(specific_force=row(2, 0, 0)), (-0.2, 0, 0), (0, -0.02, 0)),
     ("payload", "slung", [0.1, 0.01, 0.5, 0.05], dict(specific_force=row(0, 0, -G)), (0, 0, 0.1 * G), None),
     # Hung along what holds it, (1, 0, G) here: on a hook 10 cm below it turns the nose up, ẑ × F = (−F_y, F_x, 0).
     (

@@ -300,6 +300,9 @@ def rows(effect, form) -> list:
         if effect.kind == "sensor":
             own = residual(segment(motion), vehicle)
             left = {group: rest - own.get(group, 0.0) for group, rest in left.items()}
+        else:
+            # Columns read the acceleration that a model predicts: that of the centre of mass.
+            one = replace(one, motion=replace(one.motion, specific_force=motion.specific_force))
         out.append((one, left))
     return out
 

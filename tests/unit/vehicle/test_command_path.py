@@ -147,7 +147,7 @@ def test_a_path_flies_the_same_compiled_and_by_array_code():
     effects = (
         {"id": "rotor_acceleration_torque", "form": "reaction", "parameters": {"J_r": 2e-5}},
         {"id": "gust", "form": "0.10 s to 0.50 s, 2 knots", "parameters": gust},
-        {"id": "payload", "form": "rigid", "parameters": {"m_p": 0.05, "m_p x": 1e-4, "m_p y": 2e-4}},
+        {"id": "payload", "form": "rigid", "parameters": {"m_p": 0.05, "m_p x": 1e-4, "m_p y": 2e-4, "m_p z": 0.0}},
     )
     vehicle = stated(*CHAIN, *effects)
     fast, slow = flown(vehicle), flown(vehicle, compiled=False)

@@ -251,7 +251,7 @@ def test_windows_are_those_of_the_array_code(known, step_s):
 
 def test_a_load_as_heavy_as_the_vehicle_is_solved_for_where_repetition_would_not_settle():
     form = next(form for name, form in WRENCHES if name == "payload" and form.name == "rigid")
-    heavy = simulate(VEHICLE, commands(), 0.1, 0.004, start(), effects=[(form, [0.9, 0.0, 0.0])])
+    heavy = simulate(VEHICLE, commands(), 0.1, 0.004, start(), effects=[(form, [0.9, 0.0, 0.0, 0.0])])
     thrust = (VEHICLE.thrust_coefficients_n_s2() * heavy.rotor_speed**2).sum(axis=2)
     np.testing.assert_allclose(heavy.specific_force[..., 2], -thrust / (0.652 + 0.9), rtol=1e-9)
 

@@ -34,7 +34,7 @@ def test_a_curve_and_a_payload_by_hand():
     curved = found(stated(("throttle_curve", "affine", {"a_0": 0.0, "a_1": 0.1})))
     assert curved.thrust_n == pytest.approx(WEIGHT / 1.21) and curved.gain == pytest.approx(1.21)
     # 0.1 kg at 20 mm ahead: (m + m_p) g is wanted, and m_p g r nose down is balanced nose up.
-    loaded = found(stated(("payload", "rigid", {"m_p": 0.1, "m_p x": 0.002, "m_p y": 0.0})))
+    loaded = found(stated(("payload", "rigid", {"m_p": 0.1, "m_p x": 0.002, "m_p y": 0.0, "m_p z": 0.0})))
     assert loaded.thrust_n == pytest.approx(0.752 * 9.81)
     np.testing.assert_allclose(loaded.moments_n_m, [0.0, 0.002 * 9.81, 0.0], atol=1e-8)
     slung = found(stated(("payload", "slung", {"m_p": 0.1, "m_p z": 0.0, "L": 0.5, "ζ": 0.05})))

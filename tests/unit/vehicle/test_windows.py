@@ -113,7 +113,7 @@ def test_added_mass_converges_through_the_fixed_point():
     vehicle = thesis_vehicle()
     payload = form("payload", "rigid", vehicle)
     found = simulate_windows(
-        vehicle, [(payload, [0.1, 0, 0])], np.arange(51) / 100, Inputs(np.full((51, 4), HOVER)), rest(51)
+        vehicle, [(payload, [0.1, 0, 0, 0])], np.arange(51) / 100, Inputs(np.full((51, 4), HOVER)), rest(51)
     )
     expected = (9.81 - 0.652 * 9.81 / 0.752) * 0.5
     np.testing.assert_allclose(found.predicted.velocity[0, -1, 2], expected, rtol=1e-3)
