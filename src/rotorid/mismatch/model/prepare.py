@@ -313,10 +313,16 @@ def with_predictions(segment: Segment, prepared: Prepared, effects: list[tuple[F
     vehicle, groups = prepared.vehicle, prepared.groups
 
     def predicted(motion: Motion) -> dict[str, np.ndarray]:
+        model = model_wrench(replace(segment, motion=motion), vehicle, [])
+        changed = accelerations(motion, model, model)
+        if not effects:
+            return changed
+        # Effects that read accelerations are given predicted ones, too.
+        at = replace(segment, motion=replace(motion, **changed))
+        return accelerations(motion, model_wrench(at, vehicle, effects), model)
+
+    def accelerations(motion: Motion, known: dict[str, np.ndarray], model: dict[str, np.ndarray]):
         changed = {}
-        at = replace(segment, motion=motion)
-        model = model_wrench(at, vehicle, [])
-        known = model_wrench(at, vehicle, effects) if effects else model
         if motion.specific_force is not None:
             changed["specific_force"] = known["force"] / vehicle.mass_kg
             if motion.accelerometer is not None:

@@ -19,6 +19,7 @@ from rotorid.mismatch.model.prepare import (
     sensor_noise,
     split_runs,
     white_level,
+    with_predictions,
 )
 from rotorid.mismatch.plant.split import GAP_S, training_rule
 from rotorid.recordings import RecordingSet, Run, Split
@@ -158,3 +159,18 @@ def test_a_long_recording_is_represented_by_pieces_of_all_its_runs(monkeypatch):
         for name, values in vars(cut).items():
             if isinstance(values, np.ndarray) and name != "wind":
                 np.testing.assert_array_equal(values, getattr(whole, name)[100:300])
+
+
+def test_predicted_accelerations_hold_no_measured_ones():
+    """A payload reads accelerations: what it does to the predicted ones is found from predicted ones."""
+    prepared = prepare(recorded(1, 2))
+    rigid = next(f for f in catalogue()["payload"].forms(prepared.vehicle) if f.name == "rigid")
+    effects = [(rigid, np.array([0.1 * prepared.vehicle.mass_kg, 0.0, 0.0, 0.0]))]
+    own = prepared.segments[0]
+    noisy = replace(own, motion=replace(own.motion, specific_force=own.motion.specific_force + 5.0))
+    alone, loaded, again = (
+        with_predictions(s, prepared, known).motion.specific_force
+        for s, known in ((own, []), (own, effects), (noisy, effects))
+    )
+    np.testing.assert_allclose(loaded, 0.9 * alone)
+    np.testing.assert_allclose(again, loaded)
