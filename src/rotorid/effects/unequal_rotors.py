@@ -165,6 +165,7 @@ EFFECT = Effect(
     sign="positive d_i: rotor i gives more than the coefficient believed",
     validity="the same share over all speeds; equal shares of all rotors are a wrong coefficient (under parameters)",
     excited_by=("rotor_speed",),
+    between_flights={"1": 0.005},  # half of what a rotor's coefficient differs by in other air
     confusers=("com_offset", "thrust_tilt"),
     separating_manoeuvre="swap two propellers and repeat the hover, or excite roll, pitch and yaw",
     shows_in_moments=True,

@@ -21,11 +21,13 @@ from rotorid.mismatch.changes.chain import (
 )
 from rotorid.mismatch.changes.hanging import carrying
 from rotorid.mismatch.changes.joint import (
+    Effects,
     Joint,
     Reference,
     evidence_at,
     joined_at,
     joints_of,
+    moved_by,
     reference_of,
 )
 from rotorid.mismatch.changes.notes import command_notes, notes_of
@@ -151,7 +153,8 @@ def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[J
     """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
 
     A mistake is one change more: corrected for it the two sets must be alike by more than it costs. So must they be
-    with a payload that swings in the second set.
+    with a payload that swings in the second set. What changed is then known well enough to predict the accelerations
+    in the columns with it.
     """
     both = [(joint, flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
     joint, options = max(both, key=lambda b: b[1][0].log_posterior - prior.effect_nats * len(b[0].mistakes_of_new))
@@ -159,8 +162,23 @@ def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[J
         other, with_it, nats = swinging
         own = flight_options(other, with_it, prior)
         if own[0].log_posterior - nats > options[0].log_posterior:
-            return with_it, own
+            reference, joint, options = other, with_it, own
+    if changed := changed_effects(reference, options[0].found):
+        joint = moved_by(reference, joint, changed)
+        options = flight_options(reference, joint, prior)
     return joint, options
+
+
+def changed_effects(reference: Reference, found: Found) -> Effects:
+    """Effects that changed, by as much as they did, without those that swing: how that hangs is known before."""
+    forms = {t.key: t for t in reference.terms if t.kind == "effect" and not t.form.swings}
+    change, out = change_of(found) * found.problem.unit, []
+    for key in found.model:
+        if key in forms:
+            values = np.array(forms[key].values, float)
+            values[list(forms[key].form.linear)] = change[found.problem.columns_of[key]]
+            out.append((forms[key].form, values))
+    return out
 
 
 def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:

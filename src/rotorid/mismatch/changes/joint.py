@@ -27,7 +27,7 @@ from rotorid.mismatch.model.absent import squares_of
 from rotorid.mismatch.model.fitted import Fitted, fitted
 from rotorid.mismatch.model.prepare import Prepared, assemble_rows, prepare, prepare_like
 from rotorid.mismatch.model.report_runs import as_flown, comparable
-from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, model_filters
+from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, chosen, model_filters
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regime import regime_variables
 from rotorid.mismatch.plant.regression import NEVER_EXCITED, Regression, build
@@ -243,6 +243,7 @@ def joined_at(
     """Two sets on the same columns, those of the second taken at a chain of its own; `own_effects` as `rows_of`."""
     found, model = reference.found, reference.found.model
     segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
+    rows = as_seen(rows, reference)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     of_new = regression_of(rows, terms, model, reference.block_s)
     evidence = with_known_effects(noisy_evidence(of_new, reference.noise), reference.known)
@@ -268,6 +269,13 @@ def joined_at(
             replace(model, rows=rows, regression=of_new), [t for t in terms if t.kind in ("effect", "value")]
         ),
     )
+
+
+def moved_by(reference: Reference, joint: Joint, effects: Effects) -> Joint:
+    """Two sets of which the second has some effects more, for the accelerations in its columns."""
+    own = (*joint.own_effects, *effects)
+    again = joined_at(reference, joint.recordings, joint.recorded, reference.chain, joint.mistakes_of_new, own)
+    return replace(again, uncorrected=joint.uncorrected)
 
 
 def rows_of(
@@ -303,10 +311,10 @@ def rows_of(
     # What lasts of the residual moment is what lasts of the rotors' own. Free coefficients of a column with that part
     # (arm) and of one without (inertia) would together explain it, whatever it is of.
     rows = assemble_rows(
-        model.prepared, list(terms), segments, [*(model.effects or []), *own_effects], low_frequencies=True
+        model.prepared, list(terms), segments, [*lasting_effects(model), *own_effects], low_frequencies=True
     )
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
-    rows = as_seen(against_own(rows, model, segments, vehicle), model, [t.key for t in terms])
+    rows = against_own(rows, model, segments, vehicle)
     if columns is not None:
         away = chain.values - (first or chain).values
         rows = [
@@ -314,6 +322,13 @@ def rows_of(
             for r, x in zip(rows, columns, strict=True)
         ]
     return segments, rows
+
+
+def lasting_effects(model: WrenchModel) -> Effects:
+    """Effects of a model that act in every run, for the accelerations in columns: what a mass or a lever arm does is
+    proportional to all of an acceleration, not to the part that the believed vehicle predicts."""
+    known = zip(model.selection.active, chosen(model), strict=True)
+    return [effect for key, effect in known if not model.search.terms[key].run]
 
 
 def how_far(segments: Sequence[Segment], prepared: Prepared) -> dict[str, float]:
@@ -400,10 +415,9 @@ def recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[Se
     return as_it_is, noisy
 
 
-def as_seen(rows: list[Rows], model: WrenchModel, keys: list[str]) -> list[Rows]:
-    """Rows in which a column says something only in channels where it does in the model's own rows."""
-    columns = model.regression.columns(keys)
-    seen = np.any([np.any(r.x[:, :, columns] != 0.0, axis=0) for r in model.rows], axis=0)
+def as_seen(rows: list[Rows], reference: Reference) -> list[Rows]:
+    """Rows in which a column says something only in channels where it does in the first set."""
+    seen = np.any([np.any(r.x != 0.0, axis=0) for r in reference.rows], axis=0)
     return [replace(r, x=r.x * seen) for r in rows]
 
 

@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -45,15 +46,18 @@ def usual_spread(
     """
     hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
     out = form_spread(base, known, form_sd)
+    forms = Counter((t.effect, p.symbol) for t in base.terms for p in t.linear)
     for term in base.terms:
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
             out[at] = np.hypot(SAME_SD if term.key in OF_THE_AIR else SAME_BODY_SD, hidden[at])
         elif term.effect in catalogue() and term.linear:
             effect = catalogue()[term.effect]
-            out[at] = np.hypot(out[at], [effect.between_flights.get(p.unit, 0.0) for p in term.linear])
+            usual = np.array([effect.between_flights.get(p.unit, 0.0) for p in term.linear])
             if DERIVED in effect.excited_by:
-                out[at] = np.hypot(out[at], hidden_in(base, known)[at])
+                usual = np.hypot(usual, hidden_in(base, known)[at])
+            # Several forms have the same parameter, and with it the same column.
+            out[at] = np.hypot(out[at], usual / np.sqrt([forms[term.effect, p.symbol] for p in term.linear]))
     return out
 
 
@@ -84,6 +88,19 @@ def form_spread(evidence: Evidence, known: np.ndarray, form_sd: float) -> np.nda
         if term.kind == "effect":
             at = evidence.start[term.key] + np.arange(term.size)
             out[at] = form[at]
+    return share_of_form(evidence) * out
+
+
+def share_of_form(evidence: Evidence) -> np.ndarray:
+    """What part of an effect's one-sigma each coefficient (K,) has: of its forms one is at work, no matter which.
+
+    Forms of one effect look alike. Were each to differ by the whole, the effect would by the root of their number more.
+    """
+    forms = Counter(t.effect for t in evidence.terms if t.kind == "effect")
+    out = np.ones(evidence.gram.shape[-1])
+    for term in evidence.terms:
+        if term.kind == "effect":
+            out[evidence.start[term.key] + np.arange(term.size)] = forms[term.effect] ** -0.5
     return out
 
 

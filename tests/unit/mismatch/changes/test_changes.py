@@ -6,13 +6,16 @@ import json
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
+from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes import Changes, as_one, changes_between
 from rotorid.mismatch.changes.compare import Change
+from rotorid.mismatch.changes.joint import joints_of, lasting_effects, moved_by, reference_of
 from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.recordings import RecordingSet, Vehicle, write_set
@@ -73,6 +76,34 @@ def test_a_vehicle_that_is_heavier_than_its_file_says_is_told_by_how_much():
 def test_a_larger_drag_is_the_one_change():
     (change,) = sure(compared("dragging"))
     assert "rotor_drag" in {change.id, *change.alternatives}
+
+
+def test_columns_are_taken_at_accelerations_that_hold_what_the_first_set_has():
+    """What a mass or a lever arm does is proportional to all of an acceleration: of a drag, too."""
+    reference = reference_of(monday())
+    model = reference.found.model
+    assert [form.name for form, _ in lasting_effects(model)] == [k.split("/")[1] for k in model.selection.active]
+    at = columns_of_sideways_force(reference, "payload/rigid")
+    drag = np.concatenate([r.y[:, 0] for r in reference.rows])
+    # A payload is slowed by the drag as the vehicle is: F = -m_p a.
+    assert np.corrcoef(at, -drag)[0, 1] > 0.8
+
+
+def columns_of_sideways_force(reference, key: str) -> np.ndarray:
+    """First column of a term in the forward force, all stretches."""
+    start = reference.evidence.start[key]
+    return np.concatenate([r.x[:, 0, start] for r in reference.rows])
+
+
+def test_what_changed_moves_the_second_set_alone():
+    reference = reference_of(monday())
+    (joint,) = joints_of(reference, flights("friday", (3, 4)))
+    rigid = next(f for f in catalogue()["payload"].forms(joint.recordings.vehicle) if f.name == "rigid")
+    moved = moved_by(reference, joint, [(rigid, np.array([0.1 * joint.recordings.vehicle.mass_kg, 0.0, 0.0, 0.0]))])
+    start = joint.new.start["payload/rigid"]
+    assert np.array_equal(moved.base.gram, joint.base.gram)
+    before, now = (own.new.gram[:, :, start, start].sum() for own in (joint, moved))
+    assert now == pytest.approx(0.81 * before, rel=0.02)
 
 
 def test_the_result_as_json_is_what_the_sentences_say():
