@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.problem import Problem
-from rotorid.mismatch.posterior.search import Found, decide, joint, ranked
+from rotorid.mismatch.posterior.search import Found, decide, ranked
 from rotorid.mismatch.posterior.statements import Statement, statements_of
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid_proof.decisions.store import Kept
@@ -58,17 +56,17 @@ def ideal_observer(kept: Kept, answer: Mapping[str, Any]) -> Said:
     if kept.evidence is None:
         return kept.verdict
     found = decide(kept.evidence, Prior(), kept.evidence.active)
-    spectrum, truth = spectrum_of(kept.evidence), frozenset(effect["id"] for effect in answer["effects"])
-    ends = [found, *(decide(kept.evidence, Prior(), keys) for keys in starts(found.problem, truth))]
-    return stated(kept, max(ends, key=lambda end: joint(spectrum, end)))
+    truth = {effect["id"] for effect in answer["effects"]}
+    return stated(kept, decide(kept.evidence, Prior(), kept.evidence.active, *starts(found, truth)))
 
 
-def starts(problem: Problem, truth: frozenset[str]) -> list[tuple[str, ...]]:
-    """Models of the ids that are true, each in one of its forms; the most probable with no other id first."""
-    forms = [[key for key, t in problem.terms.items() if t.kind == "effect" and t.effect == one] for one in truth]
+def starts(found: Found, truth: Iterable[str]) -> list[tuple[str, ...]]:
+    """Models of the ids that are true, each in one of its forms; the most probable first."""
+    terms = found.problem.terms
+    forms = [[key for key, t in terms.items() if t.kind == "effect" and t.effect == one] for one in sorted(truth)]
     models = itertools.islice(itertools.product(*(own for own in forms if own)), MOST_RANKED)
-    best = sorted(models, key=lambda model: -ranked(problem, tuple(sorted(model))))
-    return [tuple(sorted(model)) for model in best[:MOST_STARTS] if model]
+    best = sorted((tuple(sorted(model)) for model in models), key=lambda model: -ranked(found.problem, model))
+    return best[:MOST_STARTS]
 
 
 def stated(kept: Kept, found: Found) -> Said:

@@ -47,15 +47,15 @@ class Found:
         return self.posterior.problem
 
 
-def decide(evidence: Evidence, prior: Prior, start: Iterable[str] = ()) -> Found:
+def decide(evidence: Evidence, prior: Prior, *starts: Iterable[str]) -> Found:
     """The most probable model of a flight with its leftover, which is learnt from the flight itself.
 
-    The search starts from nothing and from the effects of `start`. What its best model leaves says how large the
-    leftover is, and with that the search goes on, until the leftover stays as it is. That is done twice, from no
+    The search starts from nothing and from the effects of each of `starts`. What its best model leaves says how large
+    the leftover is, and with that the search goes on, until the leftover stays as it is. That is done twice, from no
     leftover and from all being leftover; where both ends are about as probable the larger leftover is believed.
     """
     there = {term.key for term in evidence.terms if term.kind == "effect"}
-    spectrum, known = spectrum_of(evidence), tuple(sorted(there & set(start)))
+    spectrum, known = spectrum_of(evidence), [tuple(sorted(there & set(start))) for start in starts]
     all_of_it = spectrum.variance_of_leftover(np.zeros(len(spectrum.unit)))
     small, large = (settled(evidence, spectrum, prior, v, known) for v in (np.zeros(len(all_of_it)), all_of_it))
     gain = joint(spectrum, small) - joint(spectrum, large)
@@ -67,9 +67,11 @@ def joint(spectrum: Spectrum, found: Found) -> float:
     return found.log_posterior + spectrum.evidence_of(found.problem.variance)
 
 
-def settled(evidence: Evidence, spectrum: Spectrum, prior: Prior, variance: np.ndarray, known: Model) -> Found:
-    """The most probable model and its leftover, from a `variance` (C,) of the leftover and the effects `known`."""
-    starts: dict[Model, None] = dict.fromkeys([(), known])
+def settled(
+    evidence: Evidence, spectrum: Spectrum, prior: Prior, variance: np.ndarray, known: Iterable[Model]
+) -> Found:
+    """The most probable model and its leftover, from a leftover of `variance` (C,) and each of the models `known`."""
+    starts: dict[Model, None] = dict.fromkeys([(), *known])
     for _ in range(LEFTOVER_ROUNDS):
         found = most_probable(problem_of(evidence, spectrum, variance, prior), starts)
         before, variance = variance, found.posterior.leftover_of(found.model, spectrum)
