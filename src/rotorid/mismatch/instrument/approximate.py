@@ -63,7 +63,7 @@ def freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) 
     return out
 
 
-def beside(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regression:
+def with_free(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regression:
     """The regression of some terms with the columns of a free form, key FREE, added."""
     regression, setup = model.regression, model.setup
     kept = [t for t in regression.terms if t.key in keys or t.kind != "effect"]
@@ -86,7 +86,7 @@ def left_of(model: ReadingModel, value: str, strong: str, active: list[str], cha
     The value is as free as one that is called wrong.
     """
     fit, loose = model.regression.fit([*model.search.always, *active]), {value: WIDEST_TRUST}
-    small = beside(model, active, freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
+    small = with_free(model, active, freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
     every = [*model.search.always, *active]
     rest = [k for k in every if k != value]
     with_it = small.fit([FREE, *every], loose=loose)

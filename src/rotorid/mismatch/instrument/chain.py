@@ -616,11 +616,11 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
     for name in catalogue()[key].like_of_reading:
         for form in forms_of(catalogue()[name], problem.setup.instrument):
-            first, beside = form.parameters[0], copy(problem)
+            first, with_it = form.parameters[0], copy(problem)
 
-            def white(theta, form=form, beside=beside):
-                beside.others = [*problem.others, (form, theta[:1])]
-                return beside.white(rest, theta[1:])
+            def white(theta, form=form, with_it=with_it):
+                with_it.others = [*problem.others, (form, theta[:1])]
+                return with_it.white(rest, theta[1:])
 
             for p in first.starts:
                 start, bounds = np.append(p, known), (np.append(first.low, low), np.append(first.high, high))

@@ -150,7 +150,7 @@ def sagging_run(name: str, seed: int) -> Run:
     return Run(name, pd.DataFrame(table | {"force_z_n": -thrust + 0.02 * rng.standard_normal(len(u))}))
 
 
-def test_noise_of_a_voltmeter_beside_a_sag_is_no_other_effect():
+def test_noise_of_a_voltmeter_next_to_a_sag_is_no_other_effect():
     made = one_rotor([sagging_run(n, k) for k, n in enumerate("abc")], ["c"])
     limits = {"rotor_speed_limits_rad_s": (0.0, FULL_RAD_S), "torque_coefficient_n_m_s2": 1.9e-8}
     recordings = RecordingSet(made.name, made.vehicle.model_copy(update=limits), made.runs, made.held_out)
