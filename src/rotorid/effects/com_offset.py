@@ -8,29 +8,31 @@ from rotorid.effects.loading import NO_ROTORS, weight
 
 def moment_only(motion, vehicle, values):
     """M = -r_c × F_thrust: the rotors' arms are r_i - r_c; moments about the true centre of mass."""
-    return along_the_axis(values, (vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2).sum(axis=1))
+    thrust = (vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2).sum(axis=1)
+    return Contribution(moment=np.stack([values[1] * thrust, -values[0] * thrust, 0.0 * thrust], axis=1))
 
 
 def of_all_forces(motion, vehicle, values):
-    """M = -r_c × F: what drag and inflow do to the rotors' forces acts on that arm, too; F = m a, a the specific force.
-
-    Of F the part along the rotors' axis, as of the thrust.
-    """
-    return along_the_axis(values, -vehicle.mass_kg * motion.specific_force[:, 2])
-
-
-def along_the_axis(values, upward_n):
-    """Moment (n, 3) of a force along the rotors' axis, (n,), about a centre of mass at (x, y)."""
-    return Contribution(moment=np.stack([values[1] * upward_n, -values[0] * upward_n, 0.0 * upward_n], axis=1))
+    """M = -r_c × F: what drag and inflow do to the forces acts on that arm, too; F = m a, a the specific force."""
+    return Contribution(moment=-np.cross(first_moment(vehicle, values), motion.specific_force))
 
 
 def with_lever_arm(motion, vehicle, values):
-    """The same, and the accelerometer then sits at -r_c from the true centre of mass; r_c in the plane or in space."""
-    offset = np.zeros(3)
-    offset[: len(values)] = values
-    rate = motion.angular_velocity
-    shift = np.cross(motion.angular_acceleration, -offset) + np.cross(rate, np.cross(rate, -offset))
-    return Contribution(moment=of_all_forces(motion, vehicle, values).moment, specific_force=shift)
+    """The same, and what is recorded is the motion of the believed centre of mass, at −r_c from the true one.
+
+    F = −m (dΩ × r_c + Ω × (Ω × r_c)), r_c in the plane or in space: an accelerometer there and the recorded velocity
+    both hold it.
+    """
+    lever, rate = first_moment(vehicle, values), motion.angular_velocity
+    force = -np.cross(motion.angular_acceleration, lever) - np.cross(rate, np.cross(rate, lever))
+    return Contribution(force=force, moment=of_all_forces(motion, vehicle, values).moment)
+
+
+def first_moment(vehicle, values):
+    """m r_c (3,), kg m, of an offset in the plane or in space."""
+    lever = np.zeros(3)
+    lever[: len(values)] = vehicle.mass_kg * np.asarray(values)
+    return lever
 
 
 def kernel(m, v, p, w):
@@ -42,17 +44,37 @@ def kernel(m, v, p, w):
 
 
 def kernel_of_all_forces(m, v, p, w):
-    upward = -v.mass * m.specific_force[2]
-    w.moment[0] += p[1] * upward
-    w.moment[1] -= p[0] * upward
+    """`p` is r_x, r_y, r_z."""
+    s = m.specific_force
+    w.moment[0] -= v.mass * (p[1] * s[2] - p[2] * s[1])
+    w.moment[1] -= v.mass * (p[2] * s[0] - p[0] * s[2])
+    w.moment[2] -= v.mass * (p[0] * s[1] - p[1] * s[0])
+
+
+def kernel_with_lever_arm(m, v, p, w):
+    """`p` is r_x, r_y, r_z."""
+    s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
+    w.moment[0] -= v.mass * (p[1] * s[2] - p[2] * s[1])
+    w.moment[1] -= v.mass * (p[2] * s[0] - p[0] * s[2])
+    w.moment[2] -= v.mass * (p[0] * s[1] - p[1] * s[0])
+    # Ω × r, and of that Ω × once more.
+    i, j, k = o[1] * p[2] - o[2] * p[1], o[2] * p[0] - o[0] * p[2], o[0] * p[1] - o[1] * p[0]
+    w.force[0] -= v.mass * (a[1] * p[2] - a[2] * p[1] + o[1] * k - o[2] * j)
+    w.force[1] -= v.mass * (a[2] * p[0] - a[0] * p[2] + o[2] * i - o[0] * k)
+    w.force[2] -= v.mass * (a[0] * p[1] - a[1] * p[0] + o[0] * j - o[1] * i)
+
+
+def _in_the_plane(values):
+    """The kernel's values of an offset in the rotor plane."""
+    return (*values, 0.0)
 
 
 def forms(vehicle):
     space = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xyz")
     plane, text = space[:2], "M = −r_c × m a"
-    read_too = text + ", a_m = a + dΩ × (−r_c) + Ω × (Ω × (−r_c))"
+    felt = text + ", F = −m (dΩ × r_c + Ω × (Ω × r_c))"
     known = ("rotor_speed", "angular_velocity")
-    needs = (*known, "angular_acceleration", "specific_force", "accelerometer")
+    needs = (*known, "angular_acceleration", "specific_force")
     return (
         Form("moment", "M = −r_c × F_thrust", plane, moment_only, known, excited_by=("rotor_speed",), kernel=kernel),
         Form(
@@ -63,16 +85,25 @@ def forms(vehicle):
             (*known, "specific_force"),
             excited_by=("specific_force",),
             kernel=kernel_of_all_forces,
+            kernel_values=_in_the_plane,
         ),
-        Form("moment and accelerometer", read_too, plane, with_lever_arm, needs, kernel=kernel_of_all_forces),
         Form(
-            "moment and accelerometer, in space",
-            read_too,
+            "moment and lever arm",
+            felt,
+            plane,
+            with_lever_arm,
+            needs,
+            kernel=kernel_with_lever_arm,
+            kernel_values=_in_the_plane,
+        ),
+        Form(
+            "moment and lever arm, in space",
+            felt,
             space,
             with_lever_arm,
             needs,
             must_show=(0, 1),
-            kernel=kernel_of_all_forces,
+            kernel=kernel_with_lever_arm,
         ),
     )
 
@@ -108,10 +139,7 @@ EFFECT = Effect(
         "r is where the true centre of mass lies from the believed one; positive r_x (forward) gives a "
         "nose-down moment in hover"
     ),
-    validity=(
-        "offsets in the rotor plane; a vertical one shows in the accelerometer alone, as the moment of side forces is "
-        "left out, and so is the change of inertia (m r², below 1 % for r under 5 mm)"
-    ),
+    validity="the change of inertia (m r², below 1 % for r under 5 mm) is left out",
     excited_by=("specific_force", "angular_velocity", "angular_acceleration"),
     reading_forms=reading_forms,
     confusers=("unequal_rotors", "thrust_tilt"),

@@ -65,6 +65,8 @@ class Motion:
     hung_by: np.ndarray | None = None
     """What it swung by since, g − a as measured, (n, 3), m/s2, world axes: a wide swing forgets its state if this is
     predicted. Given together with `hung`."""
+    rotor_thrust: np.ndarray | None = None
+    """Thrust of each rotor, (n, k), N, where effects are known that change it; None for the believed C_F ω²."""
     tilt_gravity: np.ndarray | None = None
     """Gravity on a stand, (n, 3), m/s2, sensor axes (kind `stand` only)."""
 
@@ -421,7 +423,9 @@ def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
 
 
 def rotor_thrusts(motion: Motion, vehicle: Vehicle) -> np.ndarray:
-    """Believed thrust of each rotor, C_F ω², shape (n, k), N."""
+    """Thrust of each rotor, shape (n, k), N: the believed C_F ω² where the motion does not have another."""
+    if motion.rotor_thrust is not None:
+        return motion.rotor_thrust
     return vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
 
 

@@ -85,7 +85,9 @@ def segment(motion: Motion, **changes) -> Segment:
 
 def typical_values(effect_id: str, form: Form | SpeedForm) -> np.ndarray:
     """Plain values of a form's parameters: a starting value of the nonlinear ones, a small share of the bounds else."""
-    share = {"gust": 2e-3, "payload": 0.05, "accelerometer_error": 0.05, "gyro_error": 0.02}.get(effect_id, 0.1)
+    share = {"gust": 2e-3, "payload": 0.05, "com_offset": 0.05, "accelerometer_error": 0.05, "gyro_error": 0.02}.get(
+        effect_id, 0.1
+    )
     values = []
     for number, p in enumerate(form.parameters):
         if p.nonlinear:

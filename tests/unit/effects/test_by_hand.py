@@ -150,9 +150,9 @@ def test_readings():
     arm = dict(angular_velocity=row(0, 0, 3), angular_acceleration=row(0, 0, 20))
     shifted = contribution("imu_lever_arm", "lever arm", [0.1, 0, 0], **arm)
     np.testing.assert_allclose(shifted.specific_force, [[-0.9, 2.0, 0]])
-    # The centre of mass 0.1 m behind belief: the accelerometer sits 0.1 m in front of it.
-    offset = contribution("com_offset", "moment and accelerometer", [-0.1, 0], specific_force=row(0, 0, -9), **arm)
-    np.testing.assert_allclose(offset.specific_force, [[-0.9, 2.0, 0]])
+    # The centre of mass 0.1 m behind belief: what is recorded is the motion of a point 0.1 m in front of it.
+    offset = contribution("com_offset", "moment and lever arm", [-0.1, 0], specific_force=row(0, 0, -9), **arm)
+    np.testing.assert_allclose(offset.force, thesis_vehicle().mass_kg * np.array([[-0.9, 2.0, 0]]))
     gyro = contribution("gyro_error", "misalignment", [0.01, 0, 0], **arm)
     np.testing.assert_allclose(gyro.angular_velocity, [[0, -0.03, 0]])
     np.testing.assert_allclose(gyro.angular_acceleration, [[0, -0.2, 0]])

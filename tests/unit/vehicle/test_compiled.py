@@ -125,6 +125,19 @@ def test_a_compiled_flight_with_an_effect_is_the_flight_of_the_array_code(case):
     )
 
 
+def test_an_offset_moves_the_point_that_is_recorded_about_the_true_centre_of_mass():
+    """The true centre accelerates by the thrust alone, a_0 + dΩ × r + Ω × (Ω × r) = F / m; a_0 is what is recorded."""
+    offset = np.array([0.01, -0.006, 0.004])
+    form = next(f for f in catalogue()["com_offset"].forms(VEHICLE) if f.name == "moment and lever arm, in space")
+    flown = simulate(VEHICLE, commands(), 0.3, 0.004, start=start(), effects=[(form, offset)])
+    turning, rate = flown.angular_acceleration, flown.angular_velocity
+    of_centre = flown.specific_force + np.cross(turning, offset) + np.cross(rate, np.cross(rate, offset))
+    thrust = (VEHICLE.thrust_coefficients_n_s2() * flown.rotor_speed**2).sum(axis=-1)
+    np.testing.assert_allclose(of_centre[..., 2], -thrust / VEHICLE.mass_kg, rtol=1e-6)
+    np.testing.assert_allclose(of_centre[..., :2], 0.0, atol=1e-6)
+    assert np.abs(flown.specific_force[..., :2]).max() > 0.1
+
+
 SEVERAL = ("rotor_drag", "frame_drag", "payload", "inertia_products", "ground_effect", "thrust_tilt", "vortex_ring")
 
 

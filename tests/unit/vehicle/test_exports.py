@@ -26,7 +26,7 @@ def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
 DRAG = ("rotor_drag", "at the hubs", {"k_d": 6e-5})
 OFFSET = ("com_offset", "moment", {"r_x": 0.002, "r_y": -0.001})
 PRODUCTS = ("inertia_products", "products", {"J_xy": 1e-4, "J_xz": 2e-4, "J_yz": -1e-4})
-IN_SPACE = ("com_offset", "moment and accelerometer, in space", {"r_x": 0.002, "r_y": -0.001, "r_z": 0.003})
+IN_SPACE = ("com_offset", "moment and lever arm, in space", {"r_x": 0.002, "r_y": -0.001, "r_z": 0.003})
 FLAP = ("flapping_moment", "at the hubs", {"k_flap": 2e-7})
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.contract import Form
+from rotorid.effects.scale import hover_inflow_m_s
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
     ChainTerms,
@@ -44,8 +45,12 @@ FORCES, MOMENTS = (0, 1, 2), (3, 4, 5)
 """Channels of the forces and of the moments."""
 REACH_OF_KNOWN = 3.0
 """Standard errors by which a coefficient of the first set may be other than its model has it."""
-REGIMES = ("airspeed_m_s", "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
+AIRSPEED = "airspeed_m_s"
+REGIMES = (AIRSPEED, "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
 """Regime variables by which two sets are compared."""
+FARTHER = 1.5
+"""How many times as far the second set must go in a regime variable to be noted. Airspeeds beyond that are not
+compared: the aerodynamic forms that suit the first set are not known to hold there, and their error is no change."""
 INERTIA_OF = {3: "inertia_xx", 4: "inertia_yy", 5: "inertia_zz"}
 """Channel of each moment to the inertia that it turns."""
 
@@ -245,7 +250,14 @@ def joined_at(
     segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
     rows = as_seen(rows, reference)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
-    of_new = regression_of(rows, terms, model, reference.block_s)
+    flown = how_far(reference.segments, model.prepared)
+    slow = slower(segments, model.prepared, reference.block_s, flown)
+    of_new = regression_of(rows, terms, model, reference.block_s, within=slow)
+    if (of_new.by_channel.environment < 0).all():
+        raise InputError(
+            f"set {new.name}: all of it is more than {FARTHER} times as fast as {reference.recordings.name}; "
+            "expected some flight at the same airspeeds in both"
+        )
     evidence = with_known_effects(noisy_evidence(of_new, reference.noise), reference.known)
     evidence = within_bounds(evidence, reference)
     inertia, inertia_of_base = (
@@ -257,7 +269,7 @@ def joined_at(
         known=reference.known,
         more_usual=reference.usual_of_chain,
         inertia=inertia / inertia_of_base,
-        flown_by_base=how_far(reference.segments, model.prepared),
+        flown_by_base=flown,
         flown_by_new=how_far(segments, model.prepared),
         recordings=new,
         recorded=tuple(recorded),
@@ -311,7 +323,7 @@ def rows_of(
     # What lasts of the residual moment is what lasts of the rotors' own. Free coefficients of a column with that part
     # (arm) and of one without (inertia) would together explain it, whatever it is of.
     rows = assemble_rows(
-        model.prepared, list(terms), segments, [*lasting_effects(model), *own_effects], low_frequencies=True
+        model.prepared, list(terms), segments, [*lasting_effects(model), *own_effects], for_comparison=True
     )
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
     rows = against_own(rows, model, segments, vehicle)
@@ -329,6 +341,26 @@ def lasting_effects(model: WrenchModel) -> Effects:
     proportional to all of an acceleration, not to the part that the believed vehicle predicts."""
     known = zip(model.selection.active, chosen(model), strict=True)
     return [effect for key, effect in known if not model.search.terms[key].run]
+
+
+def slower(
+    segments: Sequence[Segment], prepared: Prepared, block_s: float, flown: Mapping[str, float]
+) -> Callable[[str, float], bool | None]:
+    """Of the middle of a block in the second set, (run, time in s): True where its airspeed is at most FARTHER times
+    that `flown` by the first set or the induced velocity in hover, below which rotors work as in hover; else None."""
+    if AIRSPEED not in flown:
+        return lambda run, time_s: True
+    most = max(FARTHER * flown[AIRSPEED], hover_inflow_m_s(prepared.vehicle))
+    known = [(s.run, regime_variables(s, prepared)) for s in segments]
+
+    def within(run: str, time_s: float) -> bool | None:
+        for own_run, own in known:
+            near = np.abs(own["time_s"] - time_s) <= 0.5 * block_s
+            if own_run == run and near.any() and np.median(own[AIRSPEED][near]) > most:
+                return None
+        return True
+
+    return within
 
 
 def how_far(segments: Sequence[Segment], prepared: Prepared) -> dict[str, float]:
@@ -422,18 +454,24 @@ def as_seen(rows: list[Rows], reference: Reference) -> list[Rows]:
 
 
 def regression_of(
-    rows: list[Rows], terms: list[Term], model: WrenchModel, block_s: float, noisy: list[Rows] | None = None
+    rows: list[Rows],
+    terms: list[Term],
+    model: WrenchModel,
+    block_s: float,
+    noisy: list[Rows] | None = None,
+    within: Callable[[str, float], bool | None] = lambda run, time_s: True,
 ) -> Regression:
     """The regression that some rows make, whitened as the model's, with its products by channel.
 
-    `noisy` are the rows with the sensors' noise added once more.
+    `noisy` are the rows with the sensors' noise added once more. `within` says of the middle of a block whether it
+    counts (`regression.build`).
     """
     rate_hz = model.prepared.thinner.rate_hz
     return build(
         rows,
         terms,
         model_filters(model),
-        lambda run, time_s: True,
+        within,
         block_s,
         rate_hz,
         noisy,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rotorid.mismatch.changes.joint import Joint
+from rotorid.mismatch.changes.joint import FARTHER, Joint
 from rotorid.mismatch.changes.usual import left_by_all
 from rotorid.mismatch.decision.words import channel_words, listed, number, regime_words
 from rotorid.mismatch.plant.channel_errors import CHANNELS_OF_WRENCH
@@ -16,8 +16,6 @@ from rotorid.mismatch.posterior.leftover import TINY
 
 LARGER = 2.0
 """How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""
-FARTHER = 1.5
-"""How many times as far the second set must go in a regime variable."""
 
 
 def notes_of(joint: Joint, base: str, new: str) -> tuple[str, ...]:
@@ -60,4 +58,7 @@ def regime_notes(first: Mapping[str, float], second: Mapping[str, float], base: 
             farther.append(f"{words} {number(second[name])} {unit} where {base} has {number(far)} {unit}")
     if not farther:
         return []
-    return [f"{new} goes farther ({listed(farther)}): what is beyond is compared by the forms of the effects alone."]
+    return [
+        f"{new} goes farther ({listed(farther)}). Airspeeds more than {FARTHER} times as high are not compared; other "
+        "flight is by the forms of the effects."
+    ]

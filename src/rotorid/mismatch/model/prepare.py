@@ -12,7 +12,7 @@ import numpy as np
 from scipy.signal import welch
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import Form, Motion, not_testable_reason
+from rotorid.effects.contract import Form, Motion, not_testable_reason, rotor_thrusts
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.model.made import Memory
 from rotorid.mismatch.plant.estimated_velocity import made_from_accelerometer
@@ -338,6 +338,17 @@ def with_predictions(segment: Segment, prepared: Prepared, effects: list[tuple[F
     return replace(segment, motion=replace(segment.motion, **changed))
 
 
+def with_thrusts(motion: Motion, vehicle: Vehicle) -> Motion:
+    """The motion with the thrust of each rotor scaled so that all of them make the force along their axis.
+
+    What effects do to the thrust is seldom known rotor by rotor; of the believed thrusts each takes the same share.
+    """
+    believed = rotor_thrusts(replace(motion, rotor_thrust=None), vehicle)
+    total, upward = believed.sum(axis=1), -vehicle.mass_kg * motion.specific_force[:, 2]
+    share = np.divide(upward, total, out=np.ones_like(total), where=total > 0.0)
+    return replace(motion, rotor_thrust=believed * share[:, None])
+
+
 def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[dict[str, np.ndarray]]:
     """What one metre a second more wind from each of north and east adds through the effects that feel the air."""
     wind = np.zeros(3) if segment.motion.wind is None else segment.motion.wind
@@ -369,17 +380,18 @@ def assemble_rows(
     segments: list[Segment] | None = None,
     effects: list[tuple[Form, np.ndarray]] | None = None,
     measured_moment: bool = False,
-    low_frequencies: bool = False,
+    for_comparison: bool = False,
 ) -> list[Rows]:
     """Rows of every segment for the given terms; `effects` only shape the accelerations in regressors.
 
-    `measured_moment` puts the measured moments into the value columns in place of the predicted ones, and
-    with `low_frequencies` those of predicted angular accelerations stay in them.
+    `measured_moment` puts the measured moments into the value columns in place of the predicted ones. With
+    `for_comparison` the value columns keep the low frequencies of predicted angular accelerations, and rotors push as
+    the effects have it (`with_thrusts`).
     """
 
     def rows_of(segment: Segment) -> Rows:
         blocks = chain.from_iterable(
-            columns_of(segment, prepared, terms, effects or [], measured_moment, low_frequencies)
+            columns_of(segment, prepared, terms, effects or [], measured_moment, for_comparison)
         )
         return assemble(segment, prepared.vehicle, prepared.thinner, list(blocks))
 
@@ -392,7 +404,7 @@ def columns_of(
     terms: list[Term],
     effects: list[tuple[Form, np.ndarray]],
     measured_moment: bool,
-    low_frequencies: bool,
+    for_comparison: bool,
 ) -> Iterator[list[Block]]:
     """Columns of every term in a segment, thinned.
 
@@ -403,6 +415,8 @@ def columns_of(
     flown, same = segment, (vehicle, groups, segment.independent_velocity)
     if segment.motion.rotor_speed is not None:
         segment = with_predictions(flown, prepared, effects)
+        if for_comparison and segment.motion.specific_force is not None:
+            segment = replace(segment, motion=with_thrusts(segment.motion, vehicle))
 
     def thinned(blocks: Iterable[Block]) -> list[Block]:
         return [{g: prepared.thinner(np.ascontiguousarray(part)) for g, part in block.items()} for block in blocks]
@@ -414,7 +428,7 @@ def columns_of(
         at = replace(flown, motion=motion)
         model = model_wrench(at, vehicle, [])
         reverse = moment_of(at, vehicle) if measured_moment and "moment" in groups else None
-        return thinned([value_columns(term.key, at, vehicle, groups, model, reverse, low_frequencies)])
+        return thinned([value_columns(term.key, at, vehicle, groups, model, reverse, for_comparison)])
 
     for term in terms:
         if term.run and term.run != segment.run:
@@ -430,7 +444,7 @@ def columns_of(
             given = (*same, term.form, term.values)
             yield made((term.key,), given, segment.motion, partial(of_effect, term))
         elif term.kind == "value":
-            yield made((term.key,), (*same, measured_moment, low_frequencies), flown.motion, partial(of_value, term))
+            yield made((term.key,), (*same, measured_moment, for_comparison), flown.motion, partial(of_value, term))
         else:
             yield thinned([offset_columns(term.key, segment, vehicle, groups)])
 

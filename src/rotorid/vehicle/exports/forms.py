@@ -18,7 +18,7 @@ from rotorid.vehicle.exports.limits import refusal
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 FLU = np.array([1.0, -1.0, -1.0])
-MOVED_CENTRES = ("moment", "moment and accelerometer", "moment and accelerometer, in space")
+MOVED_CENTRES = ("moment", "moment and lever arm", "moment and lever arm, in space")
 """Forms of `com_offset` whose moment is that of rotors which sit elsewhere."""
 AT_ONCE_S = 1e-3
 """Time constant of a motor in tools that need one, where the vehicle states none."""

@@ -15,7 +15,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes import Changes, as_one, changes_between
 from rotorid.mismatch.changes.compare import Change
-from rotorid.mismatch.changes.joint import joints_of, lasting_effects, moved_by, reference_of
+from rotorid.mismatch.changes.joint import FARTHER, joints_of, lasting_effects, moved_by, reference_of, slower
 from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.recordings import RecordingSet, Vehicle, write_set
@@ -146,6 +146,30 @@ def test_a_set_that_goes_farther_than_the_good_one_is_noted():
     assert note.startswith("friday goes farther (") and "9.0 m/s where monday has 3.0 m/s" in note
     assert regime_notes(fast, slow, "friday", "monday") == []
     assert compared("same").notes == ()
+
+
+def test_airspeeds_that_the_good_flights_never_had_are_not_compared():
+    """From some time on the second set is faster than the first ever was: blocks before count, later ones do not."""
+    reference = reference_of(flights("monday", (1,)))
+    prepared, own = reference.found.model.prepared, reference.segments[0]
+    time_s = own.motion.time_s
+    half, fast = time_s[len(time_s) // 2], np.zeros_like(own.motion.velocity)
+    fast[time_s >= half, 0] = 40.0
+    within = slower(
+        [replace(own, motion=replace(own.motion, velocity=fast))], prepared, reference.block_s, {"airspeed_m_s": 5.0}
+    )
+    assert within(own.run, half - 2.0) is True and within(own.run, half + 2.0) is None
+    everywhere = slower([own], prepared, reference.block_s, {"airspeed_m_s": 40.0 / FARTHER})
+    assert everywhere(own.run, half + 2.0) is True
+
+
+def test_a_set_that_is_faster_throughout_is_refused():
+    reference, new = reference_of(flights("monday", (1,))), flights("friday", (2,))
+    table = new.runs[0].table.copy()
+    for axis in "xyz":
+        table[f"velocity_{axis}_m_s"] += 60.0
+    with pytest.raises(InputError, match="all of it is more than 1.5 times as fast as monday"):
+        joints_of(reference, replace(new, runs=(replace(new.runs[0], table=table),)))
 
 
 def test_what_differs_between_good_flights_is_no_change():

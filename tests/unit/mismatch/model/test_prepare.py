@@ -20,6 +20,7 @@ from rotorid.mismatch.model.prepare import (
     split_runs,
     white_level,
     with_predictions,
+    with_thrusts,
 )
 from rotorid.mismatch.plant.split import GAP_S, training_rule
 from rotorid.recordings import RecordingSet, Run, Split
@@ -174,3 +175,15 @@ def test_predicted_accelerations_hold_no_measured_ones():
     )
     np.testing.assert_allclose(loaded, 0.9 * alone)
     np.testing.assert_allclose(again, loaded)
+
+
+def test_thrusts_of_a_comparison_make_the_force_along_their_axis():
+    """A tenth less force than believed: each rotor pushes with a tenth less, and what leans with it is as much less."""
+    prepared = prepare(recorded(1, 2))
+    vehicle, motion = prepared.vehicle, with_predictions(prepared.segments[0], prepared, []).motion
+    weaker = with_thrusts(replace(motion, specific_force=0.9 * motion.specific_force), vehicle)
+    believed = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
+    np.testing.assert_allclose(weaker.rotor_thrust, 0.9 * believed)
+    tilt = next(f for f in catalogue()["thrust_tilt"].forms(vehicle) if "centre" in f.name)
+    sideways = tilt.contribution(weaker, vehicle, np.array([0.01, 0.0])).force[:, 0]
+    np.testing.assert_allclose(sideways, 0.009 * believed.sum(axis=1))
