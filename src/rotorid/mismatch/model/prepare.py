@@ -57,6 +57,8 @@ MOST_S, PIECE_S = 600.0, 20.0
 """Longer recordings are represented by pieces: memory must not grow with an hour's flight."""
 NOISE_REACH = 5.0
 """Highest frequency, over the cutoff of the analysis, that a sensor's noise is read from."""
+OF_THE_BODY = frozenset({"specific_force", "angular_acceleration"})
+"""Fields of a motion that effects on the body read, and none on the rotors."""
 FINEST_HZ = 1.0
 PIECE_SAMPLES, SMOOTHED = 256, 9
 """Samples of the pieces that spectra are averaged over (more where a bin would be wider than FINEST_HZ), and bins that
@@ -338,13 +340,19 @@ def with_predictions(segment: Segment, prepared: Prepared, effects: list[tuple[F
     return replace(segment, motion=replace(segment.motion, **changed))
 
 
-def with_thrusts(motion: Motion, vehicle: Vehicle) -> Motion:
-    """The motion with the thrust of each rotor scaled so that all of them make the force along their axis.
+def with_thrusts(motion: Motion, vehicle: Vehicle, effects: list[tuple[Form, np.ndarray]]) -> Motion:
+    """The motion with the thrust of each rotor scaled so that all of them push as the effects on rotors have it.
 
-    What effects do to the thrust is seldom known rotor by rotor; of the believed thrusts each takes the same share.
+    What those do to the thrust is seldom known rotor by rotor; of the believed thrusts each takes the same share. A
+    payload, a drag of the frame or an offset act on the body: the rotors push as before.
     """
     believed = rotor_thrusts(replace(motion, rotor_thrust=None), vehicle)
-    total, upward = believed.sum(axis=1), -vehicle.mass_kg * motion.specific_force[:, 2]
+    total = believed.sum(axis=1)
+    upward = total.copy()
+    for form, values in effects:
+        if "rotor_speed" in form.requires and not OF_THE_BODY & set(form.requires):
+            force = form.contribution(motion, vehicle, values).force
+            upward -= 0.0 if force is None else force[:, 2]
     share = np.divide(upward, total, out=np.ones_like(total), where=total > 0.0)
     return replace(motion, rotor_thrust=believed * share[:, None])
 
@@ -415,8 +423,8 @@ def columns_of(
     flown, same = segment, (vehicle, groups, segment.independent_velocity)
     if segment.motion.rotor_speed is not None:
         segment = with_predictions(flown, prepared, effects)
-        if for_comparison and segment.motion.specific_force is not None:
-            segment = replace(segment, motion=with_thrusts(segment.motion, vehicle))
+        if for_comparison:
+            segment = replace(segment, motion=with_thrusts(segment.motion, vehicle, effects))
 
     def thinned(blocks: Iterable[Block]) -> list[Block]:
         return [{g: prepared.thinner(np.ascontiguousarray(part)) for g, part in block.items()} for block in blocks]

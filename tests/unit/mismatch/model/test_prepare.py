@@ -177,13 +177,20 @@ def test_predicted_accelerations_hold_no_measured_ones():
     np.testing.assert_allclose(again, loaded)
 
 
-def test_thrusts_of_a_comparison_make_the_force_along_their_axis():
-    """A tenth less force than believed: each rotor pushes with a tenth less, and what leans with it is as much less."""
+def test_thrusts_of_a_comparison_are_what_effects_leave_of_them():
+    """Rotors that all push with a tenth less lean with a tenth less; under a payload they push as before."""
     prepared = prepare(recorded(1, 2))
-    vehicle, motion = prepared.vehicle, with_predictions(prepared.segments[0], prepared, []).motion
-    weaker = with_thrusts(replace(motion, specific_force=0.9 * motion.specific_force), vehicle)
+    vehicle, motion = prepared.vehicle, prepared.segments[0].motion
+    forms = {effect: catalogue()[effect].forms(vehicle) for effect in ("thrust_curve", "payload", "thrust_tilt")}
+    curve = next(f for f in forms["thrust_curve"] if f.name == "constant term")
+    rigid = next(f for f in forms["payload"] if f.name == "rigid")
     believed = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-    np.testing.assert_allclose(weaker.rotor_thrust, 0.9 * believed)
-    tilt = next(f for f in catalogue()["thrust_tilt"].forms(vehicle) if "centre" in f.name)
+    loaded = with_thrusts(motion, vehicle, [(rigid, np.array([0.1, 0.0, 0.0, 0.0]))])
+    np.testing.assert_allclose(loaded.rotor_thrust, believed)
+    less = 0.1 * believed.sum(axis=1).mean() / vehicle.rotor_count
+    weaker = with_thrusts(motion, vehicle, [(curve, np.array([-less]))])
+    share = 1.0 - vehicle.rotor_count * less / believed.sum(axis=1)
+    np.testing.assert_allclose(weaker.rotor_thrust, believed * share[:, None])
+    tilt = next(f for f in forms["thrust_tilt"] if "centre" in f.name)
     sideways = tilt.contribution(weaker, vehicle, np.array([0.01, 0.0])).force[:, 0]
-    np.testing.assert_allclose(sideways, 0.009 * believed.sum(axis=1))
+    np.testing.assert_allclose(sideways, 0.01 * share * believed.sum(axis=1))
