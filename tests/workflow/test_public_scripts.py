@@ -10,7 +10,14 @@ import pytest
 from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
 from rotorid.recordings.importers.public_sets import sets_of
 from rotorid.recordings.importers.report import ImportReport, read_report
-from workflow.scripts import check_recordings, fit_rotor_coefficients, import_public, neurobem_residuals
+from tests.unit.mismatch.flights import Flight
+from workflow.scripts import (
+    check_recordings,
+    compare_labelled,
+    fit_rotor_coefficients,
+    import_public,
+    neurobem_residuals,
+)
 
 ROOT = Path(__file__).parents[2]
 SETTINGS = {"cutoff_hz": 20.0, "airspeed_bin_m_s": 1.0, "block_s": 1.0, "seed": 1}
@@ -107,3 +114,33 @@ def test_the_check_writes_a_page_for_each_set_and_names_the_others(bench: Path, 
     assert "strawson-t5040c: kind stand, 1 rotors, 6 runs" in page
     assert "absent: not there; see" in page
     assert "broken/vehicle.yaml: kind: is missing" in page
+
+
+def labelled(folder: Path, drag: float, number: int) -> str:
+    """A set of one flight with its import report."""
+    flight = Flight(number, 8.0, drag=drag)
+    write_set(RecordingSet(folder.name, flight.vehicle, (flight.record(100.0, name="run01"),)), folder.parent)
+    report_into(folder, True)
+    return str(folder)
+
+
+def test_labelled_flights_are_compared_with_the_good_ones(tmp_path: Path) -> None:
+    normal = labelled(tmp_path / "normal", 0.4, 1)
+    changed = {"weight": labelled(tmp_path / "weight", 1.4, 2), "cut": labelled(tmp_path / "cut", 0.4, 3)}
+    outputs = [str(tmp_path / name) for name in ("found.json", "values.svg", "residuals.svg")]
+    compare_labelled.main(normal, changed, *outputs)
+    found = json.loads(Path(outputs[0]).read_text())
+    assert found["available"] and list(found["pairs"]) == ["weight", "cut"]
+    assert "rotor_drag" in [i for c in found["pairs"]["weight"]["changes"] for i in (c["id"], *c["alternatives"])]
+    assert found["pairs"]["cut"]["changes"] == []
+    assert all(Path(path).read_text().startswith("<?xml") for path in outputs[1:])
+
+
+def test_without_the_labelled_flights_the_result_says_why(tmp_path: Path) -> None:
+    for name in ("normal", "weight", "cut"):
+        report_into(tmp_path / name, name != "cut")
+    changed = {name: str(tmp_path / name) for name in ("weight", "cut")}
+    outputs = [str(tmp_path / name) for name in ("found.json", "values.svg", "residuals.svg")]
+    compare_labelled.main(str(tmp_path / "normal"), changed, *outputs)
+    found = json.loads(Path(outputs[0]).read_text())
+    assert found == {"available": False, "reason": "4 files could not be had: no answer from nowhere", "pairs": {}}

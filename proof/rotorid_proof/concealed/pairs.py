@@ -18,6 +18,7 @@ from .continuous.equations import Strayed
 from .continuous.instruments import Kit
 from .multibody import cases as multibody
 from .multibody import course, logger, vehicle
+from .multibody.engine import Lost
 from .write import Recording, plain
 
 SMALL = 0.25
@@ -54,7 +55,7 @@ def make(name: str) -> Pair:
     while True:
         try:
             return MAKERS[simulator](int(hashlib.sha256(drawn.encode()).hexdigest()[:12], 16))
-        except Strayed:
+        except (Lost, Strayed):
             drawn += "|again"
 
 

@@ -1,11 +1,15 @@
 """Rotors that are not alike: thrust or torque coefficients differ between them."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
 from rotorid.effects.loading import NO_ROTORS, on_stand
+
+MOST_TWIST = 0.5
+"""Largest share by which the torque of a rotor differs from that of the others at the same thrust."""
 
 
 def _thrust(motion, vehicle, weights):
@@ -106,13 +110,15 @@ def forms(vehicle):
         for i in range(count)
     ]
     free, closed = symbols[:-1], ", Σ d_i = 0"
+    # At the same thrust: blades of another twist or profile, no other propeller.
+    twisted = tuple(replace(p, low=-MOST_TWIST, high=MOST_TWIST) for p in free)
     return (
         *singles,
         *(
             Form(
                 name,
                 text.format("i") + closed,
-                free,
+                parameters,
                 _contrast(function),
                 needs,
                 (),
@@ -120,10 +126,10 @@ def forms(vehicle):
                 kernel=kernel,
                 kernel_values=partial(_of_contrast, function),
             )
-            for name, text, function in (
-                ("thrust and torque", both_text, both),
-                ("thrust", thrust_text, thrust_only),
-                ("torque", torque_text, torque_only),
+            for name, text, function, parameters in (
+                ("thrust and torque", both_text, both, free),
+                ("thrust", thrust_text, thrust_only, free),
+                ("torque", torque_text, torque_only, twisted),
             )
         ),
     )

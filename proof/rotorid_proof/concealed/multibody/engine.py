@@ -9,6 +9,8 @@ from numba import njit
 from .vehicle import GRAVITY, RHO, Quad
 
 STEP = 1e-3
+SWINGING = 0.1
+"""Second difference of the yaw rate from step to step, rad/s: commands with noise make a hundredth of it."""
 mujoco.set_mju_user_warning(lambda text: None)  # said by `Lost`; MuJoCo would write a file where it is run
 
 
@@ -146,7 +148,8 @@ def machine(speed, duty, voltage, m, torque):
 def fly(quad: Quad, world: World, reference: np.ndarray, noise: np.ndarray, bandwidth: float, charge: float = 1.0):
     """Fly a reference (k, 13) from hover; `noise` (k, 3) is on the rates that the controller sees.
 
-    Returns a dict of arrays with one row a step. Raises `Lost` if the vehicle strays more than 12 m.
+    Returns a dict of arrays with one row a step. Raises `Lost` if the vehicle strays more than 12 m, or its
+    controller and the reaction of its rotors set each other swinging.
     """
     model = mujoco.MjModel.from_xml_string(mjcf(quad, world))
     data = mujoco.MjData(model)
@@ -239,4 +242,7 @@ def fly(quad: Quad, world: World, reference: np.ndarray, noise: np.ndarray, band
             raise Lost(f"a hung body whipped about at {i * STEP:.1f} s")
         if i % 200 == 0 and not (np.abs(p - reference[i, :3]).max() < 12.0):
             raise Lost(f"strayed at {i * STEP:.1f} s")
+    # Slow rotors of much inertia that follow their commands at once: the reaction of one step is the controller's next.
+    if np.abs(np.diff(out["w"][:, 2], 2)).max() > SWINGING:
+        raise Lost("yaw swings from step to step")
     return out

@@ -6,7 +6,7 @@ import pytest
 
 from rotorid_proof.concealed.multibody import course
 from rotorid_proof.concealed.multibody.cases import FAMILIES, bodies, drafted, make
-from rotorid_proof.concealed.multibody.engine import STEP, World, airload, cushion, fly, machine, mjcf
+from rotorid_proof.concealed.multibody.engine import STEP, Lost, World, airload, cushion, fly, machine, mjcf
 from rotorid_proof.concealed.multibody.vehicle import GRAVITY, RHO, drawn
 
 QUAD = drawn(np.random.default_rng(4))
@@ -115,6 +115,15 @@ def test_the_motor_lags_as_its_linear_equation_says_and_the_ground_lifts_at_one_
     assert step == pytest.approx(-1 / tau, rel=1e-6)
     near, far = cushion(np.array([0.1, 3.0]), 0.1, 0.3)
     assert near > 1 / (1 - 1 / 16) and far == pytest.approx(1.0, abs=2e-3)
+
+
+def test_rotors_of_much_inertia_that_follow_at_once_make_yaw_swing_and_are_refused():
+    path = np.zeros((1000, 13))
+    path[:, 2] = -2.0
+    noise = 0.01 * np.random.default_rng(1).standard_normal((len(path), 3))
+    assert len(fly(QUAD, World(rotor_inertia=2e-6), path, noise, 12.0)["w"]) == len(path)
+    with pytest.raises(Lost, match="yaw swings"):
+        fly(QUAD, World(rotor_inertia=3e-3), path, noise, 12.0)
 
 
 @pytest.mark.slow

@@ -1,0 +1,46 @@
+"""What changed between flights whose authors say what they changed.
+
+- The good flights are fitted once; flights with a weight and with a cut propeller are compared with them.
+- Figures of the flights with a weight: change of every believed value, and what both believed vehicles leave.
+- Where the recordings are not there, the result says so.
+"""
+
+import json
+from pathlib import Path
+
+from rotorid.mismatch.changes import changes_from, reference_of, words
+from rotorid.mismatch.decision.words import channel_words
+from rotorid.recordings import read_set
+from rotorid.recordings.importers.report import read_report
+from rotorid.report import log
+from rotorid.report.plots import style
+from rotorid.report.plots.changes import draw_residuals, draw_values
+
+
+def main(normal: str, changed: dict[str, str], found: str, values: str, residuals: str) -> None:
+    """Compare the sets in the folders `changed`, by what was changed, with that in `normal`; figures of the first."""
+    reports = [read_report(Path(folder)) for folder in (normal, *changed.values())]
+    reasons = [report["reason"] for report in reports if not report["available"]]
+    out = {"available": not reasons, "reason": reasons[0] if reasons else "", "pairs": {}}
+    if reasons:
+        for path in (values, residuals):
+            style.placeholder(Path(path), reasons[0])
+    else:
+        reference = reference_of(read_set(normal))
+        compared = {name: changes_from(reference, read_set(folder)) for name, folder in changed.items()}
+        out["pairs"] = {name: words.as_json(own) for name, own in compared.items()}
+        first = next(iter(compared.values()))
+        draw_values(first, {p.symbol: words.name_words(p.symbol) for p in first.values}, Path(values))
+        draw_residuals(first, {c: channel_words(c) for c in first.residuals[0]}, Path(residuals))
+    Path(found).write_text(json.dumps(out, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    with log.to(snakemake.log[0]):
+        main(
+            normal=snakemake.input.normal,
+            changed={name: snakemake.input[name] for name in ("weight", "cut")},
+            found=snakemake.output.found,
+            values=snakemake.output.values,
+            residuals=snakemake.output.residuals,
+        )
