@@ -36,7 +36,7 @@ from rotorid.mismatch.changes.of_instruments import (
     instrument_reference_of,
     joint_of_instruments,
 )
-from rotorid.mismatch.changes.problem import NAMES, change_of
+from rotorid.mismatch.changes.problem import MOST_CHANGE, NAMES, change_of
 from rotorid.mismatch.changes.usual import form_spread, spread_of_flights, usual_spread
 from rotorid.mismatch.decision.decide import relative_change
 from rotorid.mismatch.decision.findings import Finding
@@ -311,13 +311,17 @@ def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]
 
 
 def in_percent(name: str, changes: tuple[Estimate, ...], base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
-    """Changes of an id's parameters as stated: those of a value relative to what the second vehicle.yaml says."""
+    """Changes of an id's parameters as stated: those of a value relative to what the second vehicle.yaml says.
+
+    An interval ends where the prior does: beyond, the coefficient of a mass is that of an infinite one, or a negative.
+    """
     key = KEYS.get(name)
     if key is None:
         return changes
     scale, flown = believed_over(key, base, new), new.kind == "flight"
 
     def relative(coefficient: float) -> float:
+        coefficient = float(np.clip(coefficient, -MOST_CHANGE, MOST_CHANGE))
         # Nothing accelerates on a stand: there a coefficient is the change itself.
         return scale * (relative_change(key, coefficient, 0.0)[0] if flown else coefficient)
 

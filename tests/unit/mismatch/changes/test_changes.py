@@ -14,10 +14,11 @@ from rotorid.cli import app
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes import Changes, as_one, changes_between
-from rotorid.mismatch.changes.compare import Change
+from rotorid.mismatch.changes.compare import Change, in_percent
 from rotorid.mismatch.changes.joint import FARTHER, joints_of, lasting_effects, moved_by, reference_of, slower
 from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
+from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from rotorid.report.page.changes import make_changes_page
 from tests.unit.mismatch.flights import Flight
@@ -138,6 +139,13 @@ def test_every_value_has_its_change_with_an_interval():
     changed = {p.symbol: p for p in compared("believed lighter").values}
     named = sure(compared("believed lighter"))[0]
     assert changed[named.id].low == pytest.approx(named.parameters[0].low)
+
+
+def test_the_interval_of_a_mass_that_is_hardly_known_contains_its_value():
+    """A coefficient of one is an infinite mass, of more a negative one: the interval ends where the prior does."""
+    vehicle = monday().vehicle
+    (known,) = in_percent("mass_kg", (Estimate("mass_kg", 0.2, "1", -0.5, 1.2),), vehicle, vehicle)
+    assert (known.low, known.value, known.high) == pytest.approx((-1 / 3, 0.25, 1.5))
 
 
 def test_a_set_that_goes_farther_than_the_good_one_is_noted():
