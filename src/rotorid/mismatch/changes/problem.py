@@ -21,10 +21,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotorid.mismatch.changes.usual import left_by_all
 from rotorid.mismatch.instrument.columns import VALUE_NAMES
 from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
-from rotorid.mismatch.posterior.leftover import VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
+from rotorid.mismatch.posterior.leftover import TINY, VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, believed, limiting, log_priors
 from rotorid.mismatch.posterior.score import scored
@@ -66,13 +67,29 @@ def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pr
     The log posterior, nats, less a constant of the first set alone, is what variants of the second set are compared by:
     as recorded or corrected for a mistake, with the columns of one chain or of another.
     """
+    new, normalisation = at_own_noise(base, new)
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     nothing, all_of_it = np.zeros(len(unit)), difference_of(spectra)
     large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
     of_large, of_small = (joint(spectra, found, spread) for found in (large, small))
     chosen, value = (small, of_small) if of_small - of_large > prior.leftover_nats else (large, of_large)
-    return chosen, value - 0.5 * float(new.square.sum())
+    return chosen, value - 0.5 * float(new.square.sum()) - normalisation
+
+
+def at_own_noise(base: Evidence, new: Evidence) -> tuple[Evidence, float]:
+    """The second set's evidence in units of its own noise where that is larger than the first's, and by how much
+    less probable, in nats, its rows are in them.
+
+    Whitening is the first set's. Rotors with more inertia pass on more of the noise of their speeds; a leftover whose
+    coefficients were to explain white noise would hide every change.
+    """
+    left, blocks = [np.maximum(left_by_all(e), TINY) for e in (base, new)], [e.blocks.sum() for e in (base, new)]
+    rows = left[0] * blocks[1] / blocks[0]
+    larger = np.maximum(left[1] / rows, 1.0)
+    products = {name: getattr(new, name) for name in ("gram", "cross", "square", "bias_gram", "bias_cross")}
+    scaled = {name: (own.T / larger).T for name, own in products.items()}
+    return replace(new, **scaled), 0.5 * float(rows @ np.log(larger))
 
 
 def held(new: Evidence, keys: Collection[str]) -> Evidence:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.changes.joint import within_bounds
-from rotorid.mismatch.changes.problem import decide_changes
+from rotorid.mismatch.changes.problem import at_own_noise, decide_changes
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.prior import Prior
@@ -69,6 +69,18 @@ def test_a_change_far_beyond_what_flights_differ_by_is_not_drawn_to_nothing():
     (said,) = statements_of(decided(made([0.0, 100.5, 0.0], 2), spread=10.0))
     (size,) = said.parameters
     assert size.value == pytest.approx(100.0, rel=0.03) and size.low < 100.0 < size.high
+
+
+def test_a_second_set_with_more_noise_has_its_own():
+    """With four times the noise all products are a sixteenth; a change three times its error is found all the same."""
+    base, noisy = made([0.0, 0.5, 0.0], 1), made([0.0, 0.9, 0.0], 2, noise=4.0)
+    scaled, nats = at_own_noise(base, noisy)
+    np.testing.assert_allclose(scaled.gram, noisy.gram / 16.0, rtol=0.15)
+    assert nats == pytest.approx(noisy.blocks.sum() * base.square.sum() / base.blocks.sum() * np.log(4.0), rel=0.3)
+    alike, none = at_own_noise(base, made([0.0, 0.9, 0.0], 2, noise=0.5))
+    assert none == 0.0 and np.array_equal(alike.gram, made([0.0, 0.9, 0.0], 2, noise=0.5).gram)
+    assert decided(made([0.0, 2.5, 0.0], 2, noise=4.0)).model == (DRAG,)
+    assert decided(made([0.0, 0.5, 0.0], 2, noise=4.0)).model == ()
 
 
 def test_an_effect_may_stand_for_several_but_what_is_stated_itself_is_no_rival():
