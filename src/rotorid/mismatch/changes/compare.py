@@ -299,11 +299,15 @@ def residuals_of(rows: Sequence[Rows]) -> dict[str, Residual]:
 
 
 def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
-    """By how much each believed value changed, relative, with its 95 % interval, changed or not."""
-    out, problem = [], widened(found.problem)
-    for key, term in problem.terms.items():
-        if term.effect not in KEYS or not problem.unit[problem.columns_of[key]].all():
+    """By how much each believed value changed, relative, with its 95 % interval, changed or not.
+
+    One that did not change is known by the prior that its limit is of (`limits_of`), so that both agree.
+    """
+    out = []
+    for key, term in found.problem.terms.items():
+        if term.effect not in KEYS or not found.problem.unit[found.problem.columns_of[key]].all():
             continue
+        problem = widened(found.problem) if key in found.model else found.problem
         at = scored(problem, tuple(sorted({*found.model, key})))
         if at.mode is not None:
             out += in_percent(term.effect, parameters(problem, at, key, FORM_SD), base, new)
