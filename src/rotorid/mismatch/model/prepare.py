@@ -346,7 +346,7 @@ def with_thrusts(motion: Motion, vehicle: Vehicle, effects: list[tuple[Form, np.
     What those do to the thrust is seldom known rotor by rotor; of the believed thrusts each takes the same share. A
     payload, a drag of the frame or an offset act on the body: the rotors push as before.
     """
-    believed = rotor_thrusts(replace(motion, rotor_thrust=None), vehicle)
+    believed = rotor_thrusts(motion, vehicle)
     total = believed.sum(axis=1)
     upward = total.copy()
     for form, values in effects:
