@@ -151,7 +151,7 @@ def evidence_from(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) ->
 def _term(facts: Mapping[str, Any]) -> EvidenceTerm:
     """A term from its JSON, in which tuples are lists; what an older engine kept and nothing reads is left out."""
     facts = {name: facts[name] for name in EvidenceTerm.__dataclass_fields__ if name in facts}
-    lists = {name: tuple(facts[name]) for name in ("prior_sd", "values", "nonlinear", "must_show")}
+    lists = {name: tuple(facts[name]) for name in ("prior_sd", "values", "nonlinear", "must_show", "brings")}
     return EvidenceTerm(
         **{
             **facts,

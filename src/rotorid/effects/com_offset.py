@@ -4,6 +4,7 @@ import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import NO_ROTORS, weight
+from rotorid.effects.rigid_body import force_of_lever
 
 
 def moment_only(motion, vehicle, values):
@@ -23,8 +24,7 @@ def with_lever_arm(motion, vehicle, values):
     F = −m (dΩ × r_c + Ω × (Ω × r_c)), r_c in the plane or in space: an accelerometer there and the recorded velocity
     both hold it.
     """
-    lever, rate = first_moment(vehicle, values), motion.angular_velocity
-    force = -np.cross(motion.angular_acceleration, lever) - np.cross(rate, np.cross(rate, lever))
+    force = force_of_lever(motion, first_moment(vehicle, values))
     return Contribution(force=force, moment=of_all_forces(motion, vehicle, values).moment)
 
 

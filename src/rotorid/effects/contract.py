@@ -191,6 +191,8 @@ class Form:
     """Whether it swings: how it hung in a run is read from the run (`Motion.hung`)."""
     comes_and_goes: bool = False
     """Whether it may be there for a part of a run alone (`Motion.on_board`)."""
+    brings: tuple[str, ...] = ()
+    """Believed values (the contract's names) that it changes as well where it is new in a vehicle."""
     resolution: float = 1.0
     """How many times the size that counts elsewhere its contribution must have."""
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.pendulum import cable_pull, likely_lengths
+from rotorid.effects.rigid_body import force_of_lever
 from rotorid.effects.scale import scale
 
 LENGTHS_M = (0.15, 6.0)
@@ -72,8 +73,7 @@ def rigid(motion, vehicle, values):
     lever = np.asarray(values[1:4])
     on_board, force = aboard(motion), -values[0] * motion.specific_force
     if motion.angular_acceleration is not None:
-        rate = motion.angular_velocity
-        force = force - np.cross(motion.angular_acceleration, lever) - np.cross(rate, np.cross(rate, lever))
+        force = force + force_of_lever(motion, lever)
     return Contribution(force=on_board * force, moment=-np.cross(lever, on_board * motion.specific_force))
 
 
@@ -127,6 +127,7 @@ def forms(vehicle):
         Parameter(name, "kg m2", -bound, bound, meaning="product of inertia that it adds")
         for name in ("J_xy", "J_xz", "J_yz")
     )
+    moments = tuple(f"inertia_{axis}_kg_m2" for axis in ("xx", "yy", "zz"))
     return (
         Form(
             "rigid with its products of inertia",
@@ -136,6 +137,7 @@ def forms(vehicle):
             ("specific_force", "angular_velocity", "angular_acceleration"),
             must_show=(0,),
             comes_and_goes=True,
+            brings=moments,
             kernel=kernel_rigid,
         ),
         Form(
@@ -146,6 +148,7 @@ def forms(vehicle):
             ("specific_force",),
             must_show=(0,),
             comes_and_goes=True,
+            brings=moments,
             kernel=kernel_rigid,
             kernel_values=_without_products,
         ),

@@ -26,7 +26,7 @@ from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.model.absent import squares_of
 from rotorid.mismatch.model.fitted import Fitted, fitted
-from rotorid.mismatch.model.prepare import Prepared, assemble_rows, prepare, prepare_like
+from rotorid.mismatch.model.prepare import assemble_rows, prepare, prepare_like
 from rotorid.mismatch.model.report_runs import as_flown, comparable
 from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, chosen, model_filters
 from rotorid.mismatch.plant.motion import Segment
@@ -115,6 +115,8 @@ class Reference:
     evidence: Evidence
     runs: tuple[Evidence, ...]
     """The same run by run."""
+    flown: Mapping[str, float]
+    """How far it goes: 95th percentile of the magnitude of some regime variables."""
     recorded: tuple[Segment, ...]
     """Its stretches as recorded."""
     mistakes: tuple[Finding, ...]
@@ -155,6 +157,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
         noise=noise,
         evidence=evidence,
         runs=runs,
+        flown=how_far([regime_variables(s, model.prepared) for s in segments]),
         recorded=tuple(recorded),
         mistakes=mistakes,
     )
@@ -250,8 +253,8 @@ def joined_at(
     segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
     rows = as_seen(rows, reference)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
-    flown = how_far(reference.segments, model.prepared)
-    slow = slower(segments, model.prepared, reference.block_s, flown)
+    regimes = [(s.run, regime_variables(s, model.prepared)) for s in segments]
+    slow = slower(regimes, model.prepared.vehicle, reference.block_s, reference.flown)
     of_new = regression_of(rows, terms, model, reference.block_s, within=slow)
     if (of_new.by_channel.environment < 0).all():
         raise InputError(
@@ -269,8 +272,8 @@ def joined_at(
         known=reference.known,
         more_usual=reference.usual_of_chain,
         inertia=inertia / inertia_of_base,
-        flown_by_base=flown,
-        flown_by_new=how_far(segments, model.prepared),
+        flown_by_base=reference.flown,
+        flown_by_new=how_far([own for _, own in regimes]),
         recordings=new,
         recorded=tuple(recorded),
         segments_of_new=tuple(segments),
@@ -344,17 +347,22 @@ def lasting_effects(model: WrenchModel) -> Effects:
 
 
 def slower(
-    segments: Sequence[Segment], prepared: Prepared, block_s: float, flown: Mapping[str, float]
+    regimes: Sequence[tuple[str, Mapping[str, np.ndarray]]],
+    vehicle: Vehicle,
+    block_s: float,
+    flown: Mapping[str, float],
 ) -> Callable[[str, float], bool | None]:
     """Of the middle of a block in the second set, (run, time in s): True where its airspeed is at most FARTHER times
-    that `flown` by the first set or the induced velocity in hover, below which rotors work as in hover; else None."""
+    that `flown` by the first set or the induced velocity in hover, below which rotors work as in hover; else None.
+
+    `regimes` are run and regime variables of each stretch of the second set.
+    """
     if AIRSPEED not in flown:
         return lambda run, time_s: True
-    most = max(FARTHER * flown[AIRSPEED], hover_inflow_m_s(prepared.vehicle))
-    known = [(s.run, regime_variables(s, prepared)) for s in segments]
+    most = max(FARTHER * flown[AIRSPEED], hover_inflow_m_s(vehicle))
 
     def within(run: str, time_s: float) -> bool | None:
-        for own_run, own in known:
+        for own_run, own in regimes:
             near = np.abs(own["time_s"] - time_s) <= 0.5 * block_s
             if own_run == run and near.any() and np.median(own[AIRSPEED][near]) > most:
                 return None
@@ -363,9 +371,8 @@ def slower(
     return within
 
 
-def how_far(segments: Sequence[Segment], prepared: Prepared) -> dict[str, float]:
-    """95th percentile of the magnitude of each variable in REGIMES that some stretches have."""
-    known = [regime_variables(s, prepared) for s in segments]
+def how_far(known: Sequence[Mapping[str, np.ndarray]]) -> dict[str, float]:
+    """95th percentile of the magnitude of each variable in REGIMES that all stretches have, from those of each."""
     names = [n for n in REGIMES if all(n in k for k in known)]
     return {n: float(np.nanquantile(np.abs(np.concatenate([k[n] for k in known])), 0.95)) for n in names}
 

@@ -28,7 +28,7 @@ from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearPa
 from rotorid.mismatch.posterior.leftover import TINY, VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, believed, limiting, log_priors
-from rotorid.mismatch.posterior.score import scored
+from rotorid.mismatch.posterior.score import Model, scored
 from rotorid.mismatch.posterior.search import Found, most_probable
 
 NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
@@ -110,14 +110,22 @@ def settled(
 
     `sizes` (C, K, K) are products that the sizes of contributions are taken from where they are not those of `new`.
     """
-    starts = [()]
+    starts: list[Model] = []
     for _ in range(ROUNDS):
-        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior, sizes), starts)
-        starts = [(), found.model]
+        problem = problem_of_changes(new, spectra, variance, spread, prior, sizes)
+        found = most_probable(problem, [(), *(starts or brought_together(problem))])
+        starts = [found.model]
         before, variance = variance, leftover_of(spectra, change_of(found))
         if np.array_equal(before, variance):
             break
     return found
+
+
+def brought_together(problem: Problem) -> list[Model]:
+    """The effect that brings others about, in its most general form, with them: one by one they may explain less than
+    what only looks alike."""
+    bringing = sorted(frozenset().union(*problem.brought_by.values()), key=lambda key: problem.terms[key].size)
+    return [tuple(sorted((b, *(k for k, own in problem.brought_by.items() if b in own)))) for b in bringing[-1:]]
 
 
 def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) -> float:
@@ -221,6 +229,7 @@ def problem_of_changes(
         variance=variance,
         prior=prior,
         channel_gram=(new.gram.sum(axis=1) if sizes is None else sizes) * np.outer(unit, unit),
+        brought_by={k: frozenset(b for b in effects if e in terms[b].brings) for k, e in effects.items()},
     )
 
 

@@ -27,6 +27,8 @@ RATE_HZ = 10.0
 """Rate at which the sideways force is looked at: a swing has less than 2 Hz."""
 LEAST_SHARE = 0.3
 """Share of the sideways force's squares that a swing must explain: four numbers of five seconds make 0.1 of noise."""
+CONVERGED = 1e-4
+"""Relative change of squares and state at which a fit ends: far below what noise makes of either."""
 MOST_STEPS = 40
 QUARTER, MOST_LEAN = np.pi / 2, 0.9
 """Phase of a swing from which its first state is seen, rad, and the largest sideways part of a direction."""
@@ -300,7 +302,9 @@ def fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg:
         pull = piece.pull(cable, moved(state, move, cable.rate))
         return np.append(((piece.force - mass_of(pull) * pull) / size).ravel(), move)
 
-    found = least_squares(left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", max_nfev=MOST_STEPS).x
+    found = least_squares(
+        left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", ftol=CONVERGED, xtol=CONVERGED, max_nfev=MOST_STEPS
+    ).x
     own = moved(state, found, cable.rate)
     pull = piece.pull(cable, own)
     return own, mass_of(pull), float(((piece.force - mass_of(pull) * pull) ** 2).sum())

@@ -53,6 +53,8 @@ class EvidenceTerm:
     """Symbols of the parameters that the columns depend on nonlinearly."""
     must_show: tuple[int, ...] = ()
     """Places in `linear` of parameters without which the form is another effect."""
+    brings: tuple[str, ...] = ()
+    """Believed values (the contract's names) that it changes as well where it is new in a vehicle."""
     resolution: float = 1.0
     """How many times the size that matters elsewhere its contribution must have."""
     of_change: bool = False
@@ -122,6 +124,7 @@ def term_of(term: Term) -> EvidenceTerm:
         ),
         nonlinear=tuple(parameters[i].symbol for i in term.form.nonlinear),
         must_show=tuple(linear.index(i) for i in term.form.must_show if i in linear),
+        brings=term.form.brings,
         resolution=float(term.form.resolution),
         of_reading=tuple((linear.index(p), linear.index(s)) for p, s in term.form.of_reading),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -68,6 +68,8 @@ class Problem:
     prior: Prior
     channel_gram: np.ndarray
     """(C, K, K) products in each channel with the leftover in them: how large a contribution is."""
+    brought_by: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """To a key those of which one brings it about: next to it, it costs nothing."""
 
     def columns(self, keys: Iterable[str]) -> np.ndarray:
         """Columns of the model `keys`: those that are always there, then those of its effects."""

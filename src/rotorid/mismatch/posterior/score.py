@@ -77,8 +77,9 @@ def scored(problem: Problem, model: Model) -> Scored:
 
 
 def log_prior(problem: Problem, model: Model) -> float:
-    """Log prior of a model, nats."""
-    return sum(problem.log_prior_of[key] for key in model)
+    """Log prior of a model, nats: what one of its effects brings about by itself is free."""
+    own = set(model)
+    return sum(problem.log_prior_of[key] for key in model if own.isdisjoint(problem.brought_by.get(key, ())))
 
 
 def places(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -158,17 +158,12 @@ def test_a_set_that_goes_farther_than_the_good_one_is_noted():
 
 def test_airspeeds_that_the_good_flights_never_had_are_not_compared():
     """From some time on the second set is faster than the first ever was: blocks before count, later ones do not."""
-    reference = reference_of(flights("monday", (1,)))
-    prepared, own = reference.found.model.prepared, reference.segments[0]
-    time_s = own.motion.time_s
-    half, fast = time_s[len(time_s) // 2], np.zeros_like(own.motion.velocity)
-    fast[time_s >= half, 0] = 40.0
-    within = slower(
-        [replace(own, motion=replace(own.motion, velocity=fast))], prepared, reference.block_s, {"airspeed_m_s": 5.0}
-    )
-    assert within(own.run, half - 2.0) is True and within(own.run, half + 2.0) is None
-    everywhere = slower([own], prepared, reference.block_s, {"airspeed_m_s": 40.0 / FARTHER})
-    assert everywhere(own.run, half + 2.0) is True
+    vehicle, time_s = flights("monday", (1,)).vehicle, np.arange(0.0, 20.0, 0.05)
+    regimes = [("run", {"time_s": time_s, "airspeed_m_s": np.where(time_s < 10.0, 0.0, 40.0)})]
+    within = slower(regimes, vehicle, 2.0, {"airspeed_m_s": 5.0})
+    assert within("run", 8.0) is True and within("run", 12.0) is None
+    everywhere = slower(regimes, vehicle, 2.0, {"airspeed_m_s": 40.0 / FARTHER})
+    assert everywhere("run", 12.0) is True
 
 
 def test_a_set_that_is_faster_throughout_is_refused():

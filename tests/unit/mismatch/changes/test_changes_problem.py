@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.changes.joint import within_bounds
-from rotorid.mismatch.changes.problem import at_own_noise, decide_changes
+from rotorid.mismatch.changes.problem import at_own_noise, brought_together, decide_changes
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.prior import Prior
@@ -54,6 +54,15 @@ def test_noise_of_a_column_makes_no_change_smaller(spread):
 
     assert size(False) < 1.7
     assert size(True) == pytest.approx(2.0, abs=0.1)
+
+
+def test_what_an_effect_brings_about_costs_nothing_next_to_it():
+    new, brings = made([0.0, 0.9, 0.0], 2), {DRAG: ("lift",)}
+    bringing = replace(new, terms=tuple(replace(t, brings=brings.get(t.key, ())) for t in new.terms))
+    plain, free = decided(new).posterior, decided(bringing).posterior
+    assert free((DRAG, LIFT)) - plain((DRAG, LIFT)) == pytest.approx(Prior().effect_nats)
+    assert free((LIFT,)) == pytest.approx(plain((LIFT,)))
+    assert brought_together(free.problem) == [(DRAG, LIFT)] and brought_together(plain.problem) == []
 
 
 def test_a_change_is_stated_no_more_surely_than_its_equation_holds():
