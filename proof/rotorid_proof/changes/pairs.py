@@ -98,7 +98,7 @@ def halves(seed: str, count: int) -> Iterator[Pair]:
 
 
 def planted(recordings: Path, plantings: Path) -> Iterator[Pair]:
-    """Plantings of the larger size against the flight untouched, and against another flight of the vehicle."""
+    """Plantings against the flight untouched, and those of the larger size against another flight of the vehicle."""
     from rotorid_proof.plantings.flights import flight
     from rotorid_proof.plantings.judge import cut
 
@@ -114,10 +114,11 @@ def planted(recordings: Path, plantings: Path) -> Iterator[Pair]:
         return Made(base, new, sought, tuple(i for t in truths for i in (*t.names, *t.fair)))
 
     for one in read_list(plantings):
-        if one.size != "large" or one.family == "pair" or not (recordings / flight(one.flight).set).is_dir():
+        if one.family == "pair" or not (recordings / flight(one.flight).set).is_dir():
             continue
-        yield Pair(f"planted/{one.name}", "planted", partial(made, one, None), one.flight)
-        if one.flight in OTHERS:
+        kind = "planted" if one.size == "large" else "planted, smaller"
+        yield Pair(f"{kind}/{one.name}", kind, partial(made, one, None), one.flight)
+        if one.flight in OTHERS and one.size == "large":
             kind = "planted in another"
             yield Pair(f"{kind}/{one.name}", kind, partial(made, one, OTHERS[one.flight]), f"some of {one.flight}")
 

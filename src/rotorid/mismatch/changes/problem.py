@@ -16,7 +16,7 @@ with Q = N (B + N + Λ⁻¹)⁻¹, (1 − Q) N_noise (1 − Q)ᵀ + Q B_noise Q�
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,8 +28,8 @@ from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearPa
 from rotorid.mismatch.posterior.leftover import TINY, VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.problem import Problem, believed, limiting, log_priors
-from rotorid.mismatch.posterior.score import Model, scored
-from rotorid.mismatch.posterior.search import Found, most_probable
+from rotorid.mismatch.posterior.score import Model, Posterior, scored
+from rotorid.mismatch.posterior.search import Found, most_probable, without
 
 NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
 """Key of every believed value, of a flight or an instrument, to the contract's name."""
@@ -73,8 +73,14 @@ def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pr
     nothing, all_of_it = np.zeros(len(unit)), difference_of(spectra)
     large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
     of_large, of_small = (joint(spectra, found, spread) for found in (large, small))
-    chosen, value = (small, of_small) if of_small - of_large > prior.leftover_nats else (large, of_large)
-    return chosen, value - 0.5 * float(new.square.sum()) - normalisation
+    chosen = small if of_small - of_large > prior.leftover_nats else large
+
+    def at(model: Model, variance: np.ndarray) -> Found:
+        posterior = Posterior(problem_of_changes(new, spectra, variance, spread, prior))
+        return Found(posterior, model, posterior(model))
+
+    chosen = against_leftover(spectra, chosen, spread, at)
+    return chosen, joint(spectra, chosen, spread) - 0.5 * float(new.square.sum()) - normalisation
 
 
 def at_own_noise(base: Evidence, new: Evidence) -> tuple[Evidence, float]:
@@ -110,22 +116,53 @@ def settled(
 
     `sizes` (C, K, K) are products that the sizes of contributions are taken from where they are not those of `new`.
     """
-    starts: list[Model] = []
+    starts = [()]
     for _ in range(ROUNDS):
-        problem = problem_of_changes(new, spectra, variance, spread, prior, sizes)
-        found = most_probable(problem, [(), *(starts or brought_together(problem))])
-        starts = [found.model]
+        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior, sizes), starts)
+        starts = [(), found.model]
         before, variance = variance, leftover_of(spectra, change_of(found))
         if np.array_equal(before, variance):
             break
     return found
 
 
-def brought_together(problem: Problem) -> list[Model]:
-    """The effect that brings others about, in its most general form, with them: one by one they may explain less than
-    what only looks alike."""
-    bringing = sorted(frozenset().union(*problem.brought_by.values()), key=lambda key: problem.terms[key].size)
-    return [tuple(sorted((b, *(k for k, own in problem.brought_by.items() if b in own)))) for b in bringing[-1:]]
+def against_leftover(
+    spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray, at: Callable[[Model, np.ndarray], Found]
+) -> Found:
+    """The most probable changes where each is also compared with the leftover that would explain it.
+
+    A change makes the leftover smaller that is learnt next to it, and looks the surer for it. Without the change the
+    leftover is learnt anew. With few environments it may explain as much; then the change is left out. `at` gives the
+    posterior at a model with a variance (C,).
+    """
+    value = joint(spectra, found, spread)
+    others = [with_own_leftover(spectra, without(found.model, k), found, spread, at) for k in found.model]
+    best, most = max(others, key=lambda other: other[1], default=(found, value))
+    if most > value:
+        return against_leftover(spectra, best, spread, at)
+    for other, own in others:
+        visited = found.posterior.visited
+        visited[other.model] = max(visited.get(other.model, -np.inf), found.log_posterior + own - value)
+    return found
+
+
+def with_own_leftover(
+    spectra: tuple[Spectrum, Spectrum],
+    model: Model,
+    near: Found,
+    spread: np.ndarray,
+    at: Callable[[Model, np.ndarray], Found],
+) -> tuple[Found, float]:
+    """The posterior at a model with the leftover that it leaves, from that of another one, and log joint posterior."""
+    ends, variance = [], near.problem.variance
+    for _ in range(ROUNDS):
+        ends.append(at(model, variance))
+        before, variance = variance, leftover_of(spectra, change_of(ends[-1]))
+        if np.array_equal(before, variance):
+            break
+    values = [joint(spectra, end, spread) for end in ends]
+    best = int(np.argmax(values))
+    return ends[best], values[best]
 
 
 def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) -> float:

@@ -7,10 +7,18 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.changes.joint import within_bounds
-from rotorid.mismatch.changes.problem import at_own_noise, brought_together, decide_changes
+from rotorid.mismatch.changes.problem import (
+    against_leftover,
+    at_own_noise,
+    decide_changes,
+    problem_of_changes,
+)
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
+from rotorid.mismatch.posterior.leftover import spectrum_of, unit_of
 from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.score import Posterior
+from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import statements_of, visited_instead
 from tests.unit.mismatch.posterior.test_posterior import OFFSET, effect, flight
 
@@ -62,7 +70,34 @@ def test_what_an_effect_brings_about_costs_nothing_next_to_it():
     plain, free = decided(new).posterior, decided(bringing).posterior
     assert free((DRAG, LIFT)) - plain((DRAG, LIFT)) == pytest.approx(Prior().effect_nats)
     assert free((LIFT,)) == pytest.approx(plain((LIFT,)))
-    assert brought_together(free.problem) == [(DRAG, LIFT)] and brought_together(plain.problem) == []
+
+
+def scattered(sizes, seed: int):
+    """A set whose drag is another in each environment: half of one and `sizes`, by turns."""
+    own = flight([0.0, 0.0, 0.0, 0.0], TERMS, seed)
+    x = own.x.copy()
+    x[:, :, 3] = x[:, :, 1] + x[:, :, 2]
+    block = np.arange(len(x)) // 10
+    drag = 0.5 + np.asarray(sizes)[block % len(sizes)]
+    return replace(own, x=x, y=own.y + drag[:, None] * x[:, :, 1]).evidence()
+
+
+@pytest.mark.parametrize("sizes, stays", [([0.8], True), ([0.0] * 8 + [3.0], False)])
+def test_a_change_is_compared_with_the_leftover_that_would_explain_it(sizes, stays):
+    """The same in every environment, or all of it in one of nine: the latter is more probably leftover."""
+    base, new, spread = made([0.0, 0.5, 0.0], 1), scattered(sizes, 2), np.zeros(4)
+    unit = unit_of(base, new)
+    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
+
+    def at(model, variance):
+        posterior = Posterior(problem_of_changes(new, spectra, variance, spread, Prior()))
+        return Found(posterior, model, posterior(model))
+
+    found = at((DRAG,), np.zeros(1))
+    assert found.log_posterior - found.posterior(()) > 5.0
+    compared = against_leftover(spectra, found, spread, at)
+    assert compared.model == ((DRAG,) if stays else ())
+    assert bool(compared.problem.variance.any()) is not stays
 
 
 def test_a_change_is_stated_no_more_surely_than_its_equation_holds():
