@@ -41,6 +41,8 @@ MOST_LIMITED = 0.5
 """Share of the time that a limit may hold a rotor."""
 AT_BOUND = 1e-3
 """Share of a parameter's range from its bound within which the bound holds it."""
+LEAST_INFORMATION = 1e-30
+"""Inverse variance of a parameter that changes nothing."""
 
 Chain = tuple[tuple[str, SpeedForm], ...]
 
@@ -226,7 +228,9 @@ class SpeedProblem:
                 gram += flat.T @ flat
                 scores.append(flat.T @ residual[part].ravel())
         gram[-1, -1] += 1.0 / self.shift_prior_s**2
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        # A limit that is never reached changes nothing: its variance is large, and finite.
+        gram += np.diag(np.where(np.diag(gram) < LEAST_INFORMATION, LEAST_INFORMATION, 0.0))
+        scale = 1.0 / np.sqrt(np.diag(gram))
         inverse = np.linalg.pinv(gram * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
         scores = np.array(scores)
         robust = inverse @ (scores.T @ scores) @ inverse

@@ -67,6 +67,13 @@ def test_a_chain_is_applied_in_the_order_of_its_stages():
     assert path[-1, 0] == pytest.approx(1000.0)
 
 
+def test_a_limit_that_is_never_reached_has_a_large_and_finite_variance():
+    problem = MeasuredSpeed([recorded(0)], FULL, None)
+    chain = (("command_saturation", form("command_saturation", "lower limit")),)
+    fit = problem.with_covariance(problem.fit(chain, np.array([0.1])))
+    assert np.isfinite(fit.covariance).all() and fit.covariance[0, 0] > 1e20
+
+
 def test_speeds_that_follow_at_once_leave_nothing_to_find():
     assert searched(recorded(0)).fit.chain == ()
 
