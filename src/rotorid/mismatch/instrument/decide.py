@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,12 +10,7 @@ from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import TermReport, estimates, findings_of
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.instrument.model import (
-    ReadingModel,
-    active_values,
-    doubt_of_form,
-    nonlinear_deviation,
-)
+from rotorid.mismatch.instrument.model import ReadingModel, active_values, nonlinear_deviation
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.status import Estimate
@@ -26,38 +20,30 @@ SHOWS = 0.33
 REACH = 1.96
 
 
-def main_channels(model: ReadingModel, key: str) -> list[int]:
-    """Channels that a term shows in, the strongest first."""
-    fit, regression = model.selection.fit, model.regression
-    cols = regression.columns([key])
-    beta = fit.beta[fit.places(cols)]
-    size = model.search.ask.sizes_of(key, beta)
-    order = np.argsort(-size)
-    return [int(c) for c in order if size[c] > SHOWS * size[order[0]]]
-
-
 def reading_findings(model: ReadingModel) -> list[Finding]:
-    """Findings of the terms of a reading."""
+    """Findings of the terms of a reading, each with the channels that it shows in, the strongest first."""
+    fit, search = model.selection.fit, model.search
 
     def report_of(key: str) -> TermReport:
-        channels = tuple(CHANNELS[c] for c in main_channels(model, key))
-        return TermReport(active_values(model, key), parameters_of(model, key), channels, alternatives_of(model, key))
+        size = search.ask.sizes_of(key, fit.beta[fit.places(model.regression.columns([key]))])
+        order = np.argsort(-size)
+        channels = tuple(CHANNELS[c] for c in order if size[c] > SHOWS * size[order[0]])
+        others = search.alternatives(key, model.selection.active)
+        return TermReport(active_values(model, key), parameters_of(model, key), channels, others)
 
-    return findings_of(model.search, model.selection, report_of)
+    return findings_of(search, model.selection, report_of)
 
 
 def parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
-    """Parameters of a term at work with 95 % intervals: the doubt between forms of the same parameters is in them."""
+    """Parameters of a term at work with 95 % intervals."""
     term = model.search.terms[key]
-    if term.form.nonlinear:
-        values, sd = active_values(model, key), nonlinear_deviation(model, key, model.loadings)
-        parameters = tuple(
-            Estimate(p.symbol, float(v), p.unit, float(v - REACH * s), float(v + REACH * s))
-            for p, v, s in zip(term.form.parameters, values, sd, strict=True)
-        )
-    else:
-        parameters = estimates(model.regression, model.selection.fit, model.search, key)
-    return wider(parameters, doubt_of_form(model, key, model.loadings))
+    if not term.form.nonlinear:
+        return estimates(model.regression, model.selection.fit, model.search, key)
+    values, sd = active_values(model, key), nonlinear_deviation(model, key)
+    return tuple(
+        Estimate(p.symbol, float(v), p.unit, float(v - REACH * s), float(v + REACH * s))
+        for p, v, s in zip(term.form.parameters, values, sd, strict=True)
+    )
 
 
 def with_plainer_forms(model: ReadingModel, again: Callable[[ReadingModel, list[Term]], ReadingModel]) -> ReadingModel:
@@ -87,17 +73,3 @@ def forms_beside(model: ReadingModel, key: str) -> list[Term]:
 def plainer(one: Term, than: Term) -> bool:
     """Whether a term's form has fewer parameters than another's."""
     return len(one.form.parameters) < len(than.form.parameters)
-
-
-def wider(parameters: tuple[Estimate, ...], doubt: np.ndarray) -> tuple[Estimate, ...]:
-    """Estimates whose intervals hold a further one-sigma each, (p,)."""
-    out = []
-    for p, sd in zip(parameters, doubt, strict=True):
-        low, high = (float(np.hypot(p.value - edge, REACH * sd)) for edge in (p.low, p.high))
-        out.append(replace(p, low=p.value - low, high=p.value + high))
-    return tuple(out)
-
-
-def alternatives_of(model: ReadingModel, key: str) -> list[str]:
-    """Ids that are collinear with a term on these data."""
-    return model.search.alternatives(key, model.selection.active)

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
-from rotorid.effects.loading import Loading, forms_of
+from rotorid.effects.loading import Loading
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.select import Questions, Search, Selection
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of
@@ -384,86 +383,29 @@ def active_values(model: ReadingModel, key: str) -> np.ndarray:
     return values
 
 
-@dataclass(frozen=True)
-class Linearised:
-    """A form fitted around given parameter values, by its slopes and its linear parameters."""
-
-    values: np.ndarray
-    deviation: np.ndarray
-    """One-sigma of every parameter, (p,)."""
-    left: float
-    """Whitened squares left on the training blocks."""
-
-
-def linearised(model: ReadingModel, key: str, form: Form, values: np.ndarray, loadings=None) -> Linearised:
-    """A form in the place of a term at work: a step from `values`, everything else free."""
-    setup, term = model.setup, model.search.terms[key]
-    values = np.asarray(values, float)
-    size = max(1, len(form.linear))
-    own = replace(term, form=form, values=tuple(values), size=size, prior_sd=(np.inf,) * size)
-    at_work = [
-        own
-        if t.key == key
-        else replace(t, values=tuple(active_values(model, t.key)))
-        if t.key in model.selection.active
-        else t
-        for t in model.terms
-    ]
-    stay = (*kept_values(model.search, model.selection.active), *model.selection.active)
-    chosen = [t for t in at_work if t.key in stay]
+def nonlinear_deviation(model: ReadingModel, key: str) -> np.ndarray:
+    """One-sigma of every parameter of a term with nonlinear ones, (p,): its slopes join the regression."""
+    setup, term, form = model.setup, model.search.terms[key], model.search.terms[key].form
+    active = model.selection.active
+    at_work = [replace(t, values=tuple(active_values(model, t.key))) if t.key in active else t for t in model.terms]
+    own = next(t for t in at_work if t.key == key)
+    stay = {*kept_values(model.search, active), *active} - (set() if form.linear else {key})
     slopes = [
-        Term(f"{key}/slope{i}", "slope", term.effect, form, tuple(values), 1, (np.inf,), slope_of=i)
+        Term(f"{key}/slope{i}", "slope", term.effect, form, own.values, 1, (np.inf,), slope_of=i)
         for i in form.nonlinear
     ]
-    if not form.linear:
-        chosen = [t for t in chosen if t.key != key]
-    rows = rows_of(setup, [*chosen, *slopes], loadings, whole_reading(at_work, model.selection.active))
+    terms = [*(t for t in at_work if t.key in stay), *slopes]
+    rows = rows_of(setup, terms, model.loadings, whole_reading(at_work, active))
     if not form.linear:
         # The form itself, at gain one, is in the model: only its slopes are fitted.
-        known = rows_of(setup, [own], loadings)
+        known = rows_of(setup, [own], model.loadings)
         rows = [Rows(r.run, r.time_s, r.y - k.x[:, :, 0], r.x) for r, k in zip(rows, known, strict=True)]
-    per = block_length(setup, rows)
-    regression = build(
-        rows, [*chosen, *slopes], model.regression.filters, everything, per / setup.rate_hz, setup.rate_hz
-    )
+    block_s = block_length(setup, rows) / setup.rate_hz
+    regression = build(rows, terms, model.regression.filters, everything, block_s, setup.rate_hz)
     restrain(regression, setup)
-    fit = regression.fit([t.key for t in (*chosen, *slopes)], jackknife=True)
+    fit = regression.fit([t.key for t in terms], jackknife=True)
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    at = {c: (b, s) for c, b, s in zip(fit.columns, fit.beta, sd, strict=True)}
-    out, deviation = values.copy(), np.zeros(len(values))
-    for i, slope in zip(form.nonlinear, slopes, strict=True):
-        step, deviation[i] = at[regression.columns([slope.key])[0]]
-        out[i] += step
-    if form.linear:
-        for i, c in zip(form.linear, regression.columns([key]), strict=True):
-            out[i], deviation[i] = at[c]
-    return Linearised(out, deviation, float(fit.residual_square[regression.training].sum()))
-
-
-def nonlinear_deviation(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
-    """One-sigma of every parameter of a term with nonlinear ones, (p,): its slopes join the regression."""
-    form = model.search.terms[key].form
-    return linearised(model, key, form, active_values(model, key), loadings).deviation
-
-
-def doubt_of_form(model: ReadingModel, key: str, loadings=None) -> np.ndarray:
-    """One-sigma of every parameter (p,) by which other forms of the same id and the same parameters say otherwise.
-
-    Each form counts by its likelihood, exp(−½ whitened squares left), as in Buckland, Burnham and Augustin, Model
-    selection: an integral part of inference, Biometrics 53, 1997: an image rotor and its inverse square differ by
-    more than their errors where the recordings hardly distinguish them.
-    """
-    form, values = model.search.terms[key].form, active_values(model, key)
-    named = [(p.symbol, p.unit) for p in form.parameters]
-    others = [
-        f
-        for f in forms_of(catalogue()[model.search.terms[key].effect], model.setup.instrument)
-        if f.name != form.name and [(p.symbol, p.unit) for p in f.parameters] == named
-    ]
-    if not others:
-        return np.zeros(len(values))
-    own = linearised(model, key, form, values, loadings)
-    found = [linearised(model, key, f, values, loadings) for f in others]
-    weights = np.exp(np.clip([0.5 * (own.left - x.left) for x in found], -50.0, 50.0))
-    away = np.array([(x.values - values) ** 2 for x in found])
-    return np.sqrt(weights @ away / (1.0 + weights.sum()))
+    out = np.zeros(len(form.parameters))
+    for places, keys in ((form.nonlinear, [s.key for s in slopes]), (form.linear, [key] if form.linear else [])):
+        out[list(places)] = sd[fit.places(regression.columns(keys))]
+    return out

@@ -8,7 +8,6 @@ from rotorid.effects.loading import bracketed
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.chain import find_chain
 from rotorid.mismatch.instrument.columns import make_terms
-from rotorid.mismatch.instrument.decide import wider
 from rotorid.mismatch.instrument.setup import set_up
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.mismatch.tell.sentences import _wrong, surest
@@ -133,9 +132,3 @@ def test_a_sentence_names_the_surest_numbers() -> None:
 
 def test_a_product_of_units_stands_in_brackets_below_a_stroke() -> None:
     assert [f"1/{bracketed(u)}2" for u in ("N", "N m")] == ["1/N2", "1/(N m)2"]
-
-
-def test_doubt_about_the_form_widens_an_interval_by_the_root_of_squares() -> None:
-    """0.3 to each side and 1.96 · 0.2041 = 0.4 more: 0.5."""
-    (wide,) = wider((Estimate("c", 2.0, "1", 1.7, 2.3),), np.array([0.4 / 1.96]))
-    assert (wide.low, wide.value, wide.high) == pytest.approx((1.5, 2.0, 2.5))
