@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes import Changes, as_one, changes_from, reference_of
 from rotorid.mismatch.changes.words import change_words
@@ -87,14 +88,19 @@ def numbers_of(vehicle: str, name: str, found: Changes) -> list[dict]:
 
 
 def events_of(vehicle: str, compared: Mapping[str, Changes]) -> list[dict]:
-    """Rows of what a set shows and no set before it did; of a class its likeliest member."""
+    """Rows of what a set shows and no set before it did; of a class its likeliest member.
+
+    A value that a change shown before would change by itself (a payload the inertias) is no event of its own.
+    """
     names, out = list(compared), []
-    shown = {name: {c.id for c in compared[name].changes if c.status in CLAIMED} for name in names}
+    claimed = {name: [c for c in compared[name].changes if c.status in CLAIMED] for name in names}
+    shown = {name: {i for c in own for i in (c.id, *c.alternatives)} for name, own in claimed.items()}
     for k, name in enumerate(names):
         before = set().union(*(shown[earlier] for earlier in names[:k]))
-        for change in compared[name].changes:
+        before |= {value for i in before & shown[name] & set(catalogue()) for value in catalogue()[i].would_change}
+        for change in claimed[name]:
             members = {change.id, *change.alternatives}
-            if change.status not in CLAIMED or members & before:
+            if members & before:
                 continue
             lasts = sum(bool(members & shown[later]) for later in names[k:])
             sentence = f"{vehicle}, from {name} on: {change_words(change)}"

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 
+from rotorid.mismatch.changes.compare import Change
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.recordings.templates import read
-from rotorid.report.fleet.history import by_vehicle, history
+from rotorid.report.fleet.history import by_vehicle, events_of, history
 from rotorid.report.plots.fleet import draw_history
 from rotorid.vehicle.control.swings import swings
 
@@ -38,6 +40,22 @@ def test_the_heavier_vehicle_is_the_one_event_at_the_day_it_begins():
     assert event["set"] == "heron-2026-10-05" and event["day"] == "2026-10-05" and event["lasts"] == 2
     assert event["id"] in ("mass_kg", "thrust_coefficient_n_s2")
     assert event["sentence"].startswith("heron, from heron-2026-10-05 on: ")
+
+
+def test_what_an_earlier_change_brings_about_is_no_event_of_its_own():
+    def claims(*ids, others=()):
+        return SimpleNamespace(changes=tuple(Change(i, "established", others, 0.999, ()) for i in ids))
+
+    compared = {
+        "a": claims("payload"),
+        "b": claims("payload", "inertia_xx_kg_m2"),
+        "c": claims("inertia_xx_kg_m2", "com_offset"),
+        "d": claims("mass_kg", others=("com_offset", "mass_kg")),
+    }
+    found = [(e["set"], e["id"]) for e in events_of("heron", compared)]
+    assert found == [("a", "payload"), ("c", "com_offset")]
+    alone = {"a": claims("com_offset"), "b": claims("inertia_xx_kg_m2")}
+    assert [e["id"] for e in events_of("heron", alone)] == ["com_offset", "inertia_xx_kg_m2"]
 
 
 def test_every_later_set_has_its_numbers_with_intervals():
