@@ -90,14 +90,14 @@ def numbers_of(vehicle: str, name: str, found: Changes) -> list[dict]:
 def events_of(vehicle: str, compared: Mapping[str, Changes]) -> list[dict]:
     """Rows of what a set shows and no set before it did; of a class its likeliest member.
 
-    A value that a change shown before would change by itself (a payload the inertias) is no event of its own.
+    A value that another change of the set would change by itself (a payload the inertias) is no event of its own.
     """
     names, out = list(compared), []
     claimed = {name: [c for c in compared[name].changes if c.status in CLAIMED] for name in names}
     shown = {name: {i for c in own for i in (c.id, *c.alternatives)} for name, own in claimed.items()}
     for k, name in enumerate(names):
         before = set().union(*(shown[earlier] for earlier in names[:k]))
-        before |= {value for i in before & shown[name] & set(catalogue()) for value in catalogue()[i].would_change}
+        before |= {value for i in shown[name] & set(catalogue()) for value in catalogue()[i].would_change}
         for change in claimed[name]:
             members = {change.id, *change.alternatives}
             if members & before:

@@ -47,7 +47,7 @@ def test_what_an_earlier_change_brings_about_is_no_event_of_its_own():
         return SimpleNamespace(changes=tuple(Change(i, "established", others, 0.999, ()) for i in ids))
 
     compared = {
-        "a": claims("payload"),
+        "a": claims("payload", "inertia_yy_kg_m2"),
         "b": claims("payload", "inertia_xx_kg_m2"),
         "c": claims("inertia_xx_kg_m2", "com_offset"),
         "d": claims("mass_kg", others=("com_offset", "mass_kg")),
