@@ -47,4 +47,5 @@ EFFECT = Effect(
     separating_manoeuvre="turn the vehicle by hand about each axis in turn while recording",
     kind="mistake",
     fitted=False,
+    contradiction=True,
 )

@@ -340,6 +340,8 @@ class Effect:
     """Ids that on a vehicle heavier than believed may be this one; those after the first only with the first."""
     same_on_commands: str = ""
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
+    contradiction: bool = False
+    """Whether columns that contradict each other show it, whatever force and moment are."""
     curves_thrust: bool = False
     """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
     between_flights: Mapping[str, float] = field(default_factory=dict)

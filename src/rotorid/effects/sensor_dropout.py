@@ -66,4 +66,5 @@ EFFECT = Effect(
     separating_manoeuvre="check the sensor's plug and repeat the flight",
     kind="sensor",
     fitted=False,
+    contradiction=True,
 )

@@ -47,4 +47,5 @@ EFFECT = Effect(
     separating_manoeuvre="hover at rest: the accelerometer must read gravity and the rotors must carry the weight",
     kind="mistake",
     fitted=False,
+    contradiction=True,
 )

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from rotorid.effects.catalogue import ids_of
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
     ChainTerms,
@@ -56,6 +57,8 @@ from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Vehicle
 
 KEYS = {name: key for key, name in NAMES.items()}
+CONTRADICTION_NATS = 32.0
+"""What columns that contradict each other say for a mistake at least: an axis is named from eight standard errors."""
 
 
 @dataclass(frozen=True)
@@ -152,12 +155,12 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
 def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[Option]]:
     """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
 
-    A mistake is one change more: corrected for it the two sets must be alike by more than it costs. So must they be
-    with a payload that swings in the second set. What changed is then known well enough to predict the accelerations
-    in the columns with it.
+    A mistake is one change more: corrected for it the two sets must be alike by more than it costs, less what columns
+    that contradict each other say for it by themselves. So must they be with a payload that swings in the second set.
+    What changed is then known well enough to predict the accelerations in the columns with it.
     """
     both = [(joint, flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
-    joint, options = max(both, key=lambda b: b[1][0].log_posterior - prior.effect_nats * len(b[0].mistakes_of_new))
+    joint, options = max(both, key=lambda b: b[1][0].log_posterior - price_of(b[0].mistakes_of_new, prior))
     if (swinging := carrying(reference, joint)) is not None:
         other, with_it, nats = swinging
         own = flight_options(other, with_it, prior)
@@ -167,6 +170,12 @@ def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[J
         joint = moved_by(reference, joint, changed)
         options = flight_options(reference, joint, prior)
     return joint, options
+
+
+def price_of(mistakes: Sequence[Finding], prior: Prior) -> float:
+    """What mistakes in recordings cost, nats, less what their own columns say for them."""
+    contradictions = ids_of("contradiction")
+    return prior.effect_nats * len(mistakes) - CONTRADICTION_NATS * sum(m.id in contradictions for m in mistakes)
 
 
 def changed_effects(reference: Reference, found: Found) -> Effects:

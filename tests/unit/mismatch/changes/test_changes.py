@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,10 +15,11 @@ from rotorid.cli import app
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes import Changes, as_one, changes_between
-from rotorid.mismatch.changes.compare import Change, in_percent
+from rotorid.mismatch.changes.compare import Change, in_percent, price_of
 from rotorid.mismatch.changes.joint import FARTHER, joints_of, lasting_effects, moved_by, reference_of, slower
 from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
+from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from rotorid.report.page.changes import make_changes_page
@@ -164,6 +166,14 @@ def test_airspeeds_that_the_good_flights_never_had_are_not_compared():
     assert within("run", 8.0) is True and within("run", 12.0) is None
     everywhere = slower(regimes, vehicle, 2.0, {"airspeed_m_s": 40.0 / FARTHER})
     assert everywhere("run", 12.0) is True
+
+
+def test_columns_that_contradict_each_other_speak_for_a_mistake_by_themselves():
+    """A flipped axis is corrected unless force and moment plainly speak against it; exchanged rotors, which they alone
+    show, only where they speak for it."""
+    flipped, exchanged = (SimpleNamespace(id=i) for i in ("axis_sign", "rotor_order"))
+    assert price_of([exchanged], Prior()) == Prior().effect_nats > 0.0 > price_of([flipped], Prior())
+    assert price_of([flipped, exchanged], Prior()) == price_of([flipped], Prior()) + price_of([exchanged], Prior())
 
 
 def test_a_set_that_is_faster_throughout_is_refused():
