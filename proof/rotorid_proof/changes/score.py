@@ -4,7 +4,7 @@ A row is one pair. Its kinds:
 
 - `drawn`: two sets of a concealed simulator; nothing, one or two things changed (`concealed.pairs`).
 - `halves`: the two halves of every run of a concealed set; nothing changed, whatever else is hidden in it.
-- `planted`: a real flight with something planted, against the same flight untouched; `planted, smaller`: half as much.
+- `planted`: a real flight with something planted, against the same flight untouched; `planted, smaller`: by less.
 - `planted in another`: the same against another flight of the vehicle.
 - `labelled`, `unlabelled`: real sets of which the authors say what changed, or that nothing did.
 """

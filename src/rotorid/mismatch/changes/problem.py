@@ -73,14 +73,14 @@ def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pr
     nothing, all_of_it = np.zeros(len(unit)), difference_of(spectra)
     large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
     of_large, of_small = (joint(spectra, found, spread) for found in (large, small))
-    chosen = small if of_small - of_large > prior.leftover_nats else large
+    end = (small, of_small) if of_small - of_large > prior.leftover_nats else (large, of_large)
 
     def at(model: Model, variance: np.ndarray) -> Found:
         posterior = Posterior(problem_of_changes(new, spectra, variance, spread, prior))
         return Found(posterior, model, posterior(model))
 
-    chosen = against_leftover(spectra, chosen, spread, at)
-    return chosen, joint(spectra, chosen, spread) - 0.5 * float(new.square.sum()) - normalisation
+    chosen, value = against_leftover(spectra, *end, spread, at)
+    return chosen, value - 0.5 * float(new.square.sum()) - normalisation
 
 
 def at_own_noise(base: Evidence, new: Evidence) -> tuple[Evidence, float]:
@@ -127,23 +127,27 @@ def settled(
 
 
 def against_leftover(
-    spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray, at: Callable[[Model, np.ndarray], Found]
-) -> Found:
+    spectra: tuple[Spectrum, Spectrum],
+    found: Found,
+    value: float,
+    spread: np.ndarray,
+    at: Callable[[Model, np.ndarray], Found],
+) -> tuple[Found, float]:
     """The most probable changes where each is also compared with the leftover that would explain it.
 
     A change makes the leftover smaller that is learnt next to it, and looks the surer for it. Without the change the
-    leftover is learnt anew. With few environments it may explain as much; then the change is left out. `at` gives the
-    posterior at a model with a variance (C,).
+    leftover is learnt anew. With few environments it may explain as much; then the change is left out. `value` is the
+    log posterior of changes and leftover together (`joint`), as is what is given back next to the changes; `at` gives
+    the posterior at a model with a variance (C,).
     """
-    value = joint(spectra, found, spread)
     others = [with_own_leftover(spectra, without(found.model, k), found, spread, at) for k in found.model]
     best, most = max(others, key=lambda other: other[1], default=(found, value))
     if most > value:
-        return against_leftover(spectra, best, spread, at)
+        return against_leftover(spectra, best, most, spread, at)
     for other, own in others:
         visited = found.posterior.visited
         visited[other.model] = max(visited.get(other.model, -np.inf), found.log_posterior + own - value)
-    return found
+    return found, value
 
 
 def with_own_leftover(

@@ -11,6 +11,7 @@ from rotorid.mismatch.changes.problem import (
     against_leftover,
     at_own_noise,
     decide_changes,
+    joint,
     problem_of_changes,
 )
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
@@ -95,7 +96,7 @@ def test_a_change_is_compared_with_the_leftover_that_would_explain_it(sizes, sta
 
     found = at((DRAG,), np.zeros(1))
     assert found.log_posterior - found.posterior(()) > 5.0
-    compared = against_leftover(spectra, found, spread, at)
+    compared, _ = against_leftover(spectra, found, joint(spectra, found, spread), spread, at)
     assert compared.model == ((DRAG,) if stays else ())
     assert bool(compared.problem.variance.any()) is not stays
 
