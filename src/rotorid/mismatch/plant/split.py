@@ -1,11 +1,11 @@
 """Which runs are fitted and which are held out, where the set does not say.
 
-About a third of the runs is held out. An effect can be shown on runs that excite it alone, so of all choices the one is
-taken in which the runs held out and those fitted share what is done (in flight speeds along each axis, turning, changes
-of the rotors, nearness of the ground, voltage; on a stand or bench loads along each axis, tilts, each rotor, warmth);
-where choices are alike, the runs held out are spread evenly in time. Where a third cannot hold some of everything (a
-bench with two runs along each of three axes) up to a half is held out. Only what was done decides, never how well a
-model describes it.
+About a third of the runs is held out, up to a half where that shares better what is done (in flight speeds along each
+axis, turning, changes of the rotors, nearness of the ground, voltage; on a stand or bench loads along each axis, tilts,
+each rotor, warmth). Of all choices the one is taken with the least cross-entropy between the shares of what is done
+that are held out and fitted and one and two thirds. So what is done in one run alone is fitted: an effect can only be
+found there. Where choices are alike, the runs held out are spread evenly in time. Only what was done decides, never how
+well a model describes it.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from rotorid.recordings import columns as c
 
 HELD_OUT_SHARE = 1 / 3
 MOST_CHOICES = 500
+LEAST_ON_A_SIDE = 0.1
+"""Share of what is done of which a side of the split has hardly any: less is no worse."""
 WORTH_MOVING = 0.05
-"""Gain of a choice over the even one, relative to the best possible score of 1, from which it is taken."""
-LEAST_SHARE = 0.5
-"""Of its even share: with less of some kind held out, or fitted, up to half of the runs are held out instead."""
+"""Gain of a choice over the even one, nats, from which it is taken."""
 NEAR_GROUND_M = 0.3
 GAP_S = 2.0
 """Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
@@ -94,21 +94,16 @@ def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
         return even
 
     def score(choice: tuple[int, ...]) -> float:
-        held = [share[list(choice)].sum() for share in groups]
-        both = [min(h / HELD_OUT_SHARE, 1.0) + min((1.0 - h) / (1.0 - HELD_OUT_SHARE), 1.0) for h in held]
-        return float(np.mean(both)) / 2.0
-
-    def lacking(choice: tuple[int, ...]) -> bool:
-        """Whether hardly anything of some kind is done on one of the two sides."""
         held = np.array([share[list(choice)].sum() for share in groups])
-        return bool(
-            (held < LEAST_SHARE * HELD_OUT_SHARE).any() or (1 - held < LEAST_SHARE * (1 - HELD_OUT_SHARE)).any()
-        )
+        logs = [np.log(np.maximum(x, LEAST_ON_A_SIDE)) for x in (held, 1.0 - held)]
+        return float(np.mean(HELD_OUT_SHARE * logs[0] + (1.0 - HELD_OUT_SHARE) * logs[1]))
 
-    best = max(choices(total, count), key=score)
-    chosen = best if score(best) > score(even) + WORTH_MOVING else even
-    more = (max(choices(total, n), key=score) for n in range(count + 1, total // 2 + 1))
-    return next((choice for choice in (chosen, *more) if not lacking(choice)), chosen)
+    chosen = even
+    for number in range(count, max(count, total // 2) + 1):
+        best = max(choices(total, number), key=score)
+        if score(best) > score(chosen) + WORTH_MOVING:
+            chosen = best
+    return chosen
 
 
 def choices(total: int, count: int) -> list[tuple[int, ...]]:
@@ -133,10 +128,10 @@ def kinds_of_activity(recordings: RecordingSet) -> list[tuple[str, ...]]:
 def activity(recordings: RecordingSet) -> list[np.ndarray]:
     """How much of what is done each run holds, (runs,) of each kind: energies about the mean of all runs.
 
-    In addition to `kinds_of_activity` nearness of the ground.
+    In addition to `kinds_of_activity` nearness of the ground, and time itself.
     """
     vehicle, kinds = recordings.vehicle, kinds_of_activity(recordings)
-    out = []
+    out = [np.array([r.time_s[-1] - r.time_s[0] for r in recordings.runs])]
     for names in kinds:
         if all(run.has(*names) for run in recordings.runs):
             shares = [energies([run.column(n) for run in recordings.runs], recordings.runs) for n in names]

@@ -40,6 +40,19 @@ def test_about_a_third_of_the_runs_is_held_out_spread_in_time():
     assert split_runs(set_of(*"abc", held_out=("c",))) == Split(("a", "b"), ("c",))
 
 
+def test_what_is_done_in_one_run_alone_is_fitted():
+    """Two runs of a slow vehicle and one of a fast one: an effect of speed could be found nowhere else."""
+    time_s = np.arange(0.0, 60.0, 0.1)
+
+    def run(name, speed_m_s):
+        columns = {k: speed_m_s * np.sin(time_s + i) for i, k in enumerate(c.VELOCITY)}
+        return Run(name, pd.DataFrame({"time_s": time_s, **columns}))
+
+    for fast in range(4):
+        runs = tuple(run("abcd"[k], 6.0 if k == fast else 1.0) for k in range(4))
+        assert "abcd"[fast] in split_runs(RecordingSet("s", quad(), runs)).training
+
+
 def test_of_a_single_run_the_last_third_is_held_out_after_a_gap():
     split = split_runs(set_of("a"))
     assert split == Split(("a",), ("a",))
