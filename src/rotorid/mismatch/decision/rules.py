@@ -142,7 +142,10 @@ CANCELS = rule(
 
 # Moves of the search
 
-EXCHANGE = rule("exchange", "An id is replaced by another that explains more in its place.")
+EXCHANGE = rule(
+    "exchange",
+    "An id gives way to another that explains more, a free form of an id to a plain one and another id.",
+)
 FREE_VALUES = rule("free_values", "An effect is significant given believed values that are free.")
 
 # Classes

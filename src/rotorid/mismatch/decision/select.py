@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Reason
 from rotorid.mismatch.plant.regression import (
@@ -172,10 +173,18 @@ class Search:
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         if physical:
-            own, noise = self.regression.own_part(keys, key, beta)
+            # Two forms that are exact differ by what they differ, however little.
+            inexact = [k for k in keys if k == key or not (self.exact(key) and self.exact(k))]
+            own, _ = self.regression.own_part(inexact, key, beta)
+            _, noise = self.regression.own_part(keys, key, beta)
             physical = not rules.OWN_PART(own <= SHARE_OF_LARGEST**2 or noise >= MOST_ATTENUATION)
         physical = physical and not rules.STRAIN(self.strains(fit, base))
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
+
+    def exact(self, key: str) -> bool:
+        """Whether a term's equation is geometry or a definition, so that its form cannot be wrong."""
+        effect = catalogue().get(self.terms[key].effect)
+        return effect is not None and effect.exact
 
     def strains(self, fit: Fit, base: Solution) -> bool:
         """Whether a term needs a believed value far from its belief that the model without it does not need."""
@@ -268,7 +277,8 @@ class Search:
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it explains clearly more: the first to enter may be wrong.
 
-        The newcomer must hold by itself: what it displaces is not looked at again, and would be lost with it.
+        Or with a plainer form of the same id and a further id: the freer form may stand for both. The newcomer must
+        hold by itself: what it displaces is not looked at again, and would be lost with it.
         """
         if not rules.EXCHANGE.on:
             return None
@@ -279,18 +289,26 @@ class Search:
         for gone in active:
             if self.terms[gone].run:
                 continue
-            own = whole - self.regression.explained(self.always + [k for k in active if k != gone])
-            least = present + max(COST_PER_PARAMETER / 2, (2 * VALUE_FLOOR) ** 2 * own)
-            worths = self.worth_with([k for k in active if k != gone], others)
-            trials += [
-                (worth, other.key, [other.key if k == gone else k for k in active])
-                for other, worth in zip(others, worths, strict=True)
-                if worth > least
-            ]
+            rest = [k for k in active if k != gone]
+            # Rivals that explain the same to what estimates are known are equally good.
+            floor = (2 * VALUE_FLOOR) ** 2 * (whole - self.regression.explained(self.always + rest))
+            for kept in (rest, *([*rest, plainer] for plainer in self.plainer_forms(gone))):
+                least = present + max(COST_PER_PARAMETER / 2, floor if kept is rest else 0.0)
+                worths = self.worth_with(kept, others)
+                trials += [
+                    (worth, other.key, [*kept, other.key])
+                    for other, worth in zip(others, worths, strict=True)
+                    if worth > least
+                ]
         for _, new, trial in sorted(trials, key=lambda t: -t[0])[:MOST_TRIALS]:
             if all(self.judge(key, trial).physical for key in trial) and self.failing(new, trial)[0] is None:
                 return trial
         return None
+
+    def plainer_forms(self, key: str) -> list[str]:
+        """Forms of the same id with fewer parameters."""
+        own = self.terms[key]
+        return [t.key for t in self.terms.values() if t.kind == "effect" and t.once == own.once and t.size < own.size]
 
     def beside(self, active: list[str]) -> Fit | None:
         """The model with the strongest further effect that explains more than it costs and is still not stated.
@@ -357,8 +375,8 @@ class Search:
                     active[active.index(key)] = better
             exchanged = None if added else self.swapped(active, dropped)
             if exchanged is not None and rules.EXCHANGE(True):
-                for gone in set(active) - set(exchanged):
-                    dropped[self.terms[gone].once] = Reason("exchange", "another explains more in its place")
+                for gone in {self.terms[k].once for k in active} - {self.terms[k].once for k in exchanged}:
+                    dropped[gone] = Reason("exchange", "another explains more in its place")
                 active = exchanged
             while (weak := self.weak(active)) is not None:
                 key, reason = weak
