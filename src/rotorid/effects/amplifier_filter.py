@@ -1,7 +1,7 @@
 """A low-pass of the amplifier, common to all channels."""
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import bessel, lfilter, sosfilt
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.creep import followed
@@ -34,6 +34,13 @@ def second_order(loading, vehicle, values):
     return Contribution(reading=resonance(load, values[0], np.sqrt(0.5), loading.dt_s) - load)
 
 
+def fourth_order(loading, vehicle, values):
+    """Bessel of fourth order with cutoff f_c, as amplifiers of strain gauges have: nearly a delay, and smooth."""
+    load = since_the_first(loading)
+    sos = bessel(4, values[0], fs=1.0 / loading.dt_s, output="sos", norm="mag")
+    return Contribution(reading=sosfilt(sos, unsmoothed(load), axis=0) - load)
+
+
 def reading_forms(instrument):
     lowest, highest = 1.0 / max(instrument.duration_s, 1.0), 0.4 * instrument.rate_hz
     starts = tuple(f for f in (0.3, 0.8, 2.0, 5.0, 12.0, 30.0) if 3 * lowest < f < highest)
@@ -49,6 +56,7 @@ def reading_forms(instrument):
     return (
         Form("first order", "y = F / (1 + i f/f_c)", (cutoff(first),), first_order),
         Form("second order", "|y| = |F| / √(1 + (f/f_c)⁴)", (cutoff(second),), second_order),
+        Form("fourth order", "y = F / B₄(i f/f_c), B₄ the reverse Bessel polynomial", (cutoff(second),), fourth_order),
     )
 
 

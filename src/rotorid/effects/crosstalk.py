@@ -32,6 +32,9 @@ def reading_forms(instrument):
         if forces and forces != every:
             forms.append(_form("between the forces", forces))
         forms.append(_form("between all", every))
+    if instrument.weighed:
+        whole = (*sources, *instrument.weighed)
+        forms.append(_form("between all, of the weight too", tuple((t, s) for s in whole for t in channels if t != s)))
     return tuple(forms)
 
 

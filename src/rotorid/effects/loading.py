@@ -42,6 +42,8 @@ class Instrument:
     """Those that are fitted."""
     largest: tuple[float, ...] = (1.0,) * 6
     """Largest load of each channel, N and N m."""
+    weighed: tuple[int, ...] = ()
+    """Others that the weight alone loads by as much, because the mount tilts."""
     tilts: bool = False
     """Whether the mount's attitude differs between runs or within one."""
     temperature: bool = False

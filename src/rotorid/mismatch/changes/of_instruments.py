@@ -231,7 +231,7 @@ def refined_on(second: OnColumns, setup: Setup, reference: InstrumentReference) 
     out = []
     for key, _ in chosen:
         active = list(dict.fromkeys([*at_work, key]))
-        found = refined(replace(own, selection=replace(model.selection, active=active)))
+        found, _ = refined(replace(own, selection=replace(model.selection, active=active)))
         values = next(t.values for t in found if t.key == key)
         out.append(replace(terms[key], key=f"{key} as changed", values=values))
     return out

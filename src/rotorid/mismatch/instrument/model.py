@@ -47,6 +47,8 @@ MOST_AT_ONCE = 6
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
+ALIKE = rules.ELSEWHERE["squares"]
+"""Whitened squares within which another form explains as well."""
 UNMOVED = 1e-9
 """Relative change of a believed value that is held."""
 
@@ -209,7 +211,7 @@ def modest(terms: list[Term], most: int) -> np.ndarray:
 
 def whole_reading(terms: list[Term], active) -> list[tuple[Form, np.ndarray]]:
     """Forms at work that change the reading as a whole, gain one: filters, resonances, other clocks."""
-    chosen = [t for t in terms if t.key in (active or ()) and t.kind == "effect" and not t.form.linear]
+    chosen = [t for t in terms if t.key in (active or ()) and changes_whole(t)]
     return [(t.form, np.array(t.values, float)) for t in chosen]
 
 
@@ -278,12 +280,15 @@ def size_function(regression: Regression, of_columns):
     return lambda key, beta: of_columns(regression.columns([key]), beta) / resolution[key]
 
 
-def refined(model: ReadingModel) -> list[Term]:
-    """Terms with the nonlinear parameters of those at work fitted, all linear ones free (variable projection)."""
+def refined(model: ReadingModel) -> tuple[list[Term], float]:
+    """Terms with the nonlinear parameters of those at work fitted, all linear ones free (variable projection).
+
+    Second the sum of whitened squares that is left.
+    """
     setup, search = model.setup, model.search
     moving = [k for k in model.selection.active if search.terms[k].form.nonlinear]
     if not moving:
-        return model.terms
+        return model.terms, np.inf
     timing = [k for k in search.always if search.terms[k].kind == "nuisance"]
     always = kept_values(search, model.selection.active)
     fixed = [k for k in (*always, *model.selection.active) if k not in moving and k not in timing]
@@ -341,7 +346,7 @@ def refined(model: ReadingModel) -> list[Term]:
         residual, start, bounds=(low, high), x_scale=scale, diff_step=1e-3, max_nfev=25, xtol=1e-6, ftol=1e-8
     )
     best = with_values(found.x)
-    return [best.get(t.key, t) for t in model.terms]
+    return [best.get(t.key, t) for t in model.terms], 2.0 * found.cost
 
 
 def fitted_model(
@@ -357,13 +362,47 @@ def fitted_model(
         before, start = model.selection.active, nonlinear_values(model)
         if not len(start):
             break
-        terms = refined(model)
+        terms, _ = refined(model)
         kept = (model.noise, model.regression.filters) if number else None
         model = reading_model(setup, terms, before, loadings, kept, refused)
         values = nonlinear_values(model)
         if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=SETTLED):
             break
-    return model
+    rivals = rivals_refined(model)
+    if not rivals:
+        return model
+    kept = (model.noise, model.regression.filters)
+    terms = [rivals.get(t.key, t) for t in model.terms]
+    return reading_model(setup, terms, model.selection.active, loadings, kept, refused)
+
+
+def rivals_refined(model: ReadingModel) -> dict[str, Term]:
+    """Of the terms that could change the reading in place of one at work those that leave no more, parameters fitted.
+
+    A delay whose length was fitted explains more than any low-pass whose cutoff was not.
+    """
+    search, selection, found = model.search, model.selection, {}
+    for key in selection.active:
+        if not changes_whole(search.terms[key]):
+            continue
+        rest = [k for k in selection.active if k != key]
+        taken = {search.terms[k].effect for k in rest} | set(search.refused)
+        starts: dict[tuple[str, str], list[str]] = {}
+        for term in model.terms:
+            if changes_whole(term) and term.effect not in taken and term.form.name != search.terms[key].form.name:
+                starts.setdefault((term.effect, term.form.name), []).append(term.key)
+        left = refined(model)[1]
+        for keys in starts.values():
+            best = max(keys, key=lambda start: search.worth([*rest, start]))
+            terms, instead = refined(replace(model, selection=replace(selection, active=[*rest, best])))
+            if instead < left + ALIKE:
+                found[best] = next(t for t in terms if t.key == best)
+    return found
+
+
+def changes_whole(term: Term) -> bool:
+    """Whether a term changes the reading as a whole: a filter, a resonance, another clock."""
+    return term.kind == "effect" and not term.form.linear
 
 
 def nonlinear_values(model: ReadingModel) -> np.ndarray:

@@ -500,10 +500,12 @@ def instrument_of(recordings: RecordingSet, how: Preparation, loadings: Sequence
     load = np.concatenate([x.load for x in loadings])
     spread = np.concatenate([x.load - x.rest for x in loadings]).std(axis=0)
     still = load.std(axis=0) < 1e-9
-    loaded = []
+    loaded, weighed = [], []
     for group in ((0, 1, 2), (3, 4, 5)):
         top = max(spread[list(group)].max(), 1e-12)
-        loaded += [k for k in group if spread[k] > LEAST_SHARE * top and not still[k] and k in channels]
+        moved = [k for k in group if not still[k] and k in channels]
+        loaded += [k for k in moved if spread[k] > LEAST_SHARE * top]
+        weighed += [k for k in moved if spread[k] <= LEAST_SHARE * top < load[:, k].std()]
     if not any(k < 3 for k in loaded) and spread[:3].max() > 1e-9:
         loaded.insert(0, int(np.argmax(spread[:3])))
     largest = np.maximum(np.abs(np.concatenate([x.load - x.rest for x in loadings])).max(axis=0), 1e-9)
@@ -519,6 +521,7 @@ def instrument_of(recordings: RecordingSet, how: Preparation, loadings: Sequence
         runs=tuple(r.name for r in recordings.runs),
         run_s=float(max(r.time_s[-1] - r.time_s[0] for r in recordings.runs)),
         largest=tuple(float(v) for v in largest),
+        weighed=tuple(weighed),
         returns=tuple(k for k in loaded if comes_back(loadings, k, float(largest[k]))),
         tilts=any(np.ptp(a) > 0.02 for a in attitudes),
         temperature=all(x.temperature is not None for x in loadings)

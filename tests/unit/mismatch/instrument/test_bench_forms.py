@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import bessel, sosfilt
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
@@ -156,6 +157,20 @@ def test_loads_mixed_anew_in_each_run_are_no_crosstalk():
     assert found == pytest.approx([0.1, 0.0, -0.1])
 
 
+def test_crosstalk_mixes_what_the_weight_loads_where_the_mount_tilts():
+    """5 N along z and, of a weight, 2 N along x: 2 % of the latter are read along z."""
+    plain = {f.name: f for f in forms_of(catalogue()["crosstalk"], instrument(loaded=(2,)))}
+    assert "between all, of the weight too" not in plain
+    mixed = form("crosstalk", "between all, of the weight too", loaded=(2,), weighed=(0,))
+    names = [p.symbol for p in mixed.parameters]
+    assert sorted(names) == ["C_Fx,Fz", "C_Fy,Fx", "C_Fy,Fz", "C_Fz,Fx"]
+    given = loading(np.array([5.0]))
+    given.load[:, 0] = 2.0
+    assert mixed.contribution(given, BENCH, np.eye(4)[names.index("C_Fz,Fx")] * 0.02).reading[0, 2] == pytest.approx(
+        0.04
+    )
+
+
 def recorded(change, runs: int = 5, noise_n: float = 0.05, seed: int = 0, step_n: float = 0.0) -> RecordingSet:
     """A bench loaded in ramps along all axes; `change(load, run, session_s)` is the reading before noise.
 
@@ -241,6 +256,15 @@ def test_a_reading_that_saturates_has_no_wrong_gain():
     """Right up to 15 N of 20 N: its slope is one at small loads, and 0.9 or so over all."""
     analysis = analyse_instrument(recorded(lambda load, run, warmth: np.clip(load, -15.0, 15.0)))
     assert named(analysis) == {"load_nonlinearity"} and not analysis.values
+
+
+def test_an_amplifier_that_is_nearly_a_delay_is_no_delay():
+    """A Bessel filter of fourth order: of all low-passes the one that smooths least for what it delays."""
+    low_pass = bessel(4, 1.2, fs=RATE_HZ, output="sos", norm="mag")
+    analysis = analyse_instrument(recorded(lambda load, run, warmth: sosfilt(low_pass, load, axis=0), noise_n=0.02))
+    (found,) = (f for f in analysis.findings if f.status == "established")
+    assert found.id == "amplifier_filter" and found.form.name == "fourth order"
+    assert found.values[0] == pytest.approx(1.2, rel=0.03)
 
 
 def test_a_wrong_gain_stays_wrong_beside_a_curve():

@@ -113,6 +113,17 @@ def test_a_higher_centre_of_mass_is_not_sold_as_a_mass_and_a_tare() -> None:
     assert "com_offset" in claimed and "tare_offset" not in claimed
 
 
+def test_what_the_weight_loads_is_known_where_the_mount_tilts_with_the_sensor() -> None:
+    """On a sensor that tilts the weight pushes along x and y and turns about them; rotors alike push along z."""
+    runs = [tilted_run(f"r{k}", roll, pitch, (0, 0, 0), k) for k, (roll, pitch) in enumerate(TILTS)]
+    level, tilting = (
+        set_up(RecordingSet("s", four_rotors(sensor_mount=mount), tuple(runs), ())).instrument
+        for mount in ("level", "tilting")
+    )
+    assert tilting.weighed == (0, 1, 3, 4) and tilting.loaded == (2,)
+    assert not {0, 1} & {*level.weighed}
+
+
 def test_which_rotor_is_stronger_cannot_be_seen_without_moments() -> None:
     runs = [tilted_run(f"r{k}", 0, 0, (0, 0, 0), k, moments=False) for k in range(3)]
     terms, reasons = make_terms(set_up(RecordingSet("s", four_rotors(tared=True), tuple(runs), ())))
