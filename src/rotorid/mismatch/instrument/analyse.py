@@ -43,6 +43,7 @@ from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import Setup, set_up
 from rotorid.mismatch.model.absorbed import absorbed_findings
 from rotorid.mismatch.model.delivered import Values, residuals_of
+from rotorid.mismatch.model.fitted import TAKEN_UP
 from rotorid.mismatch.model.leave_one_out import first_s, on_traces
 from rotorid.mismatch.model.next_flight import next_flight
 from rotorid.mismatch.model.values import changed_vehicle, contract_values, stated_of_commands
@@ -63,7 +64,7 @@ def same_curve(chain: ChainResult) -> dict[str, str]:
     """Ids that given a curve of the throttle only say again what it leaves, where speeds are known from it alone."""
     if not any(f.id in ids_of_stage(CURVE) and f.status in CLAIMED for f in chain.findings):
         return {}
-    return dict.fromkeys(sorted(ids_of("curve_of_load")), "the curve between throttle and rotor speed takes it up")
+    return dict.fromkeys(sorted(ids_of("curve_of_load")), TAKEN_UP)
 
 
 def one_load(finding: Finding, setup: Setup) -> Finding:

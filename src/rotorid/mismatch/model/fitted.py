@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import ids_of_stage
+from rotorid.effects.catalogue import ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, Form
 from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch.decision import rules
@@ -50,6 +50,8 @@ from rotorid.mismatch.plant.rows import RUN_SCALE, Term
 from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult
 from rotorid.recordings.signal.kernels import causal
 
+TAKEN_UP = "the curve between throttle and rotor speed takes it up"
+"""Why an effect is not looked for that on commands alone is that curve."""
 RUN_P = 1e-6
 RUN_SPREAD = 0.007
 """Relative spread of the thrust coefficient between runs below which one number serves all."""
@@ -107,13 +109,17 @@ def turning(prepared: Prepared, chain: CommandChain | None = None):
 
 def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, WrenchModel]:
     """The chain and the model where rotor speeds are known from commands alone."""
-    model = refined_model(prepared, *turning(prepared, chain))
+
+    def modelled(chain: CommandChain) -> WrenchModel:
+        return refined_model(without_same_curves(prepared, chain), *turning(prepared, chain))
+
+    model = modelled(chain)
     known, trusted = bool(model.selection.active), strains(model)
     for _ in range(CHAIN_ROUNDS if known or trusted else 0):
         # The wrench effects found change what the commands must explain, and what values beyond their trust made room
         # for is not delivered: once more with the effects known and such values as believed.
         chain = speed_path(prepared, chosen(model), trusted=trusted)
-        model = refined_model(prepared, *turning(prepared, chain))
+        model = modelled(chain)
         if trusted or not (trusted := strains(model)):
             break
     if rules.MERE_SCALE(only_scales(chain.result)):
@@ -122,8 +128,21 @@ def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, W
         reason = Reason("mere_scale", "another thrust coefficient explains as much")
         dropped = {**chain.result.dropped, **dict.fromkeys(curves, reason)}
         chain = chain._replace(result=replace(chain.result, dropped=dropped))
-        model = refined_model(prepared, *turning(prepared, chain))
+        model = modelled(chain)
     return chain, model
+
+
+def without_same_curves(prepared: Prepared, chain: CommandChain) -> Prepared:
+    """The set without the curves of the thrust that on commands alone are a curve of the throttle, where one is found.
+
+    The two would grow against each other without end.
+    """
+    same = {i for key, _ in chain.result.fit.chain for i in ids_of("same_on_commands", key)}
+    if not same:
+        return prepared
+    taken = dict.fromkeys(sorted(same), TAKEN_UP)
+    terms = [t for t in prepared.terms if t.effect not in same]
+    return replace(prepared, terms=terms, not_testable={**prepared.not_testable, **taken})
 
 
 def strains(model: WrenchModel) -> bool:
@@ -138,7 +157,8 @@ def only_scales(result: SpeedResult) -> bool:
         return False
     where = result.fit.slice_of(key)
     sd = np.sqrt(np.diag(result.fit.covariance)[where])
-    away = np.abs(result.fit.values[where] - np.array(form.neutral)) > 1.96 * sd
+    least = np.maximum(1.96 * sd, [p.negligible for p in form.parameters])
+    away = np.abs(result.fit.values[where] - np.array(form.neutral)) > least
     return not any(away[i] for i, p in enumerate(form.parameters) if p.symbol != SLOPE)
 
 

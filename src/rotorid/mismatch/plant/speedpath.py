@@ -218,12 +218,11 @@ class SpeedProblem:
             up[j] += step
             moved = self.whitened(fit.chain, up[:-1], up[-1])
             columns.append([(b - a) / step for a, b in zip(base, moved, strict=True)])
-        per = max(2, int(round(self.rate_hz)))
         gram = np.zeros((len(x), len(x)))
         scores = []
         for k, residual in enumerate(base):
             jacobian = np.stack([c[k] for c in columns], axis=-1)
-            for part in np.array_split(np.arange(len(residual)), max(1, len(residual) // per)):
+            for part in self.seconds(len(residual)):
                 flat = jacobian[part].reshape(-1, len(x))
                 gram += flat.T @ flat
                 scores.append(flat.T @ residual[part].ravel())
@@ -238,6 +237,14 @@ class SpeedProblem:
         ratio = np.diag(covariance)[:-1] / np.maximum(np.diag(inverse)[:-1], 1e-300)
         inflation = float(np.median(ratio)) if len(ratio) else 1.0
         return replace(fit, covariance=covariance[:-1, :-1], inflation=max(1.0, inflation))
+
+    def seconds(self, rows: int) -> list[np.ndarray]:
+        """Rows of each second of a stretch."""
+        return np.array_split(np.arange(rows), max(1, rows // max(2, int(round(self.rate_hz)))))
+
+    def largest_second(self, base: SpeedFit, fit: SpeedFit) -> float:
+        """What must not decide of what a fit explains more than another, whitened squares: nothing here."""
+        return 0.0
 
 
 class MeasuredSpeed(SpeedProblem):
@@ -293,6 +300,19 @@ class WrenchOnly(SpeedProblem):
 
     def raw(self, chain, values, shift_s):
         return [self.residual_of(s, self.path(s, chain, values, shift_s), False)[0] for s in self.segments]
+
+    def largest_second(self, base: SpeedFit, fit: SpeedFit) -> float:
+        """What a fit explains more than another in the second that speaks most for it, whitened squares.
+
+        A limit shows in speeds that are measured; in the forces of one moment anything may be taken for one.
+        """
+        before, after = (self.whitened(f.chain, f.values, f.shift_s) for f in (base, fit))
+        gains = [
+            float((x[part] ** 2 - y[part] ** 2).sum())
+            for x, y in zip(before, after, strict=True)
+            for part in self.seconds(len(x))
+        ]
+        return max(0.0, *gains)
 
     def whitened(self, chain, values, shift_s):
         parts = self.raw(chain, values, shift_s)
@@ -430,15 +450,16 @@ class SpeedSearch:
         return best
 
     def judge(self, base: SpeedFit, fit: SpeedFit, key: str) -> tuple[float, float, float]:
-        """p-value, score and inflation of an id that `fit` has and `base` has not."""
+        """p-value, score and inflation of an id that `fit` has and `base` has not: no single second decides."""
         own = fit.slice_of(key)
         count = own.stop - own.start
         inflation = fit.inflation
         gain = (base.cost - fit.cost) / inflation
+        lasting = gain - self.problem.largest_second(base, fit) / inflation
         # What the fit gains and what its parameters are sure of must agree: the shift in time bends the first.
         away = fit.values[own] - self.neutral(fit.of(key)[0])
-        sure = gain if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
-        return float(chi2.sf(max(min(gain, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
+        sure = lasting if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
+        return float(chi2.sf(max(min(lasting, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
 
     def neutral(self, form: SpeedForm) -> np.ndarray:
         """Parameter values that change nothing; of a limit, the outermost command."""

@@ -198,6 +198,27 @@ def test_a_curve_without_thrust_costs_as_much_as_the_weight_is_sure():
         assert cost == pytest.approx(((1.0 - lift) / LIFT_SD) ** 2, rel=1e-3, abs=0.01)
 
 
+@pytest.mark.parametrize("times", [1, 6])
+def test_where_only_forces_are_known_no_single_second_shows_a_limit(times):
+    """Commands of 1650 rad/s for a fifth of a second, of which rotors follow 1450."""
+    segment = recorded(7)
+    command = np.minimum(segment.command, 1450.0)
+    for k in range(times):
+        command[200 + 300 * k : 220 + 300 * k] = 1650.0
+    rng = np.random.default_rng(8)
+    force = 1.5e-6 * (np.minimum(command, 1450.0) ** 2).sum(axis=1) + 0.02 * rng.standard_normal(len(command))
+
+    def residual_of(moving, speed, columns):
+        left = np.zeros((len(force), 3))
+        left[:, 2] = 1.5e-6 * (np.broadcast_to(speed, command.shape) ** 2).sum(axis=1) - force
+        return left + 1e-9 * rng.standard_normal(left.shape), np.zeros((len(force), 3, 1))
+
+    flown = [replace(segment, command=command)]
+    problem = WrenchOnly(flown, FULL, None, RATE_HZ, residual_of, np.ones(1))
+    found = SpeedSearch(problem, [(k, f) for k, f in candidate_forms(flown) if k == "command_saturation"]).run()
+    assert [k for k, _ in found.fit.chain] == ["command_saturation"] * (times > 1)
+
+
 @pytest.mark.parametrize("holds", [True, False])
 def test_commands_hold_or_are_smooth_as_the_recording_says(holds):
     """At 25 Hz, what a lag of 60 ms makes of 2.3 and 4.1 Hz on a clock 40 times faster."""
