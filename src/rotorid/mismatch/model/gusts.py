@@ -307,11 +307,26 @@ def gust_of(term: Term, wind: np.ndarray, covariance: np.ndarray) -> Gust:
 
 
 def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
-    """Those beyond chance that are strong, and with them the weaker ones; nothing where none is strong."""
-    sizes = [(g, size_of(g, model)) for g in gusts if g.p_value < GUST_P]
+    """Those beyond chance that are strong, and with them the weaker ones; nothing where none is strong.
+
+    A wind that is a small share of the airspeed is what the drag's form is wrong by.
+    """
+    share = rules.OVERSHADOWED["share_of_burst"]
+    known = [g for g in gusts if g.p_value < GUST_P]
+    sizes = [(g, size_of(g, model)) for g in known if not rules.OVERSHADOWED(share_of_airspeed(g, model) < share)]
     if max((size for _, size in sizes), default=0.0) <= rules.OVERSHADOWED["times_for_burst"]:
         return []
     return [g for g, size in sizes if size > BESIDE_A_BURST]
+
+
+def share_of_airspeed(gust: Gust, model: WrenchModel) -> float:
+    """Root mean square of a gust's wind over that of the velocity over ground in its window."""
+    first, last, wind, flown = gust.knots_s[0], gust.knots_s[-1], 0.0, 0.0
+    for motion in (s.motion for s in model.segments if s.run == gust.run):
+        inside = (motion.time_s >= first) & (motion.time_s <= last)
+        wind += float((blowing(gust.knots_s, gust.wind_m_s, motion.time_s[inside]) ** 2).sum())
+        flown += float((motion.velocity[inside] ** 2).sum())
+    return float(np.sqrt(wind / max(flown, 1e-12)))
 
 
 def chance(wind: np.ndarray, covariance: np.ndarray) -> float:

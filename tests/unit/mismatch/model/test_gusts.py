@@ -1,6 +1,7 @@
 """A gust found as a wind, through the drag it is felt by."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -47,10 +48,23 @@ def test_a_weaker_gust_beside_a_strong_one_is_kept(monkeypatch):
     sizes = {"a": 5.0, "b": 2.0, "c": 2.0, "d": 0.5}
     found = [Gust(run, np.arange(3.0), np.ones((3, 2)), np.eye(6), 1e-9) for run in sizes]
     monkeypatch.setattr(gusts, "size_of", lambda gust, model: sizes[gust.run])
+    monkeypatch.setattr(gusts, "share_of_airspeed", lambda gust, model: 1.0)
     assert [g.run for g in gusts.believed(found, None)] == ["a", "b", "c"]
     assert gusts.believed(found[1:], None) == []
     doubtful = replace(found[0], p_value=1e-3)
     assert gusts.believed([doubtful, *found[1:]], None) == []
+
+
+def test_a_wind_of_a_small_share_of_the_airspeed_is_what_the_drag_is_wrong_by(monkeypatch):
+    """A wind of 1.4 m/s north and east: met at 10 m/s it is a seventh, at 5 m/s more than a quarter."""
+    time_s = np.linspace(0.0, 2.0, 201)
+    gust = Gust("a", np.arange(3.0), np.ones((3, 2)), np.eye(6), 1e-9)
+    monkeypatch.setattr(gusts, "size_of", lambda gust, model: 5.0)
+    for speed_m_s, kept in ((10.0, []), (5.0, [gust])):
+        motion = SimpleNamespace(time_s=time_s, velocity=np.tile([0.0, speed_m_s, 0.0], (201, 1)))
+        model = SimpleNamespace(segments=[SimpleNamespace(run="a", motion=motion)])
+        assert gusts.share_of_airspeed(gust, model) == pytest.approx(np.sqrt(2.0) / speed_m_s)
+        assert gusts.believed([gust], model) == kept
 
 
 def test_of_too_many_windows_the_strongest_are_looked_at():
