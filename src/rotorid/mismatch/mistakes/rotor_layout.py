@@ -31,6 +31,8 @@ LEAST_ADVANTAGE = 1.5
 """What the right layout explains over what the believed one explains, at least."""
 LEAST_STEP = 0.6
 P_LIMIT = 1e-6
+LATER_S = np.arange(0.005, 0.1001, 0.005)
+"""By how much longer the torque of rotors may lag behind their commands than the delay that roll shows."""
 TIED_LIKELIHOOD, TIED_SHARE = 12.0, 0.02
 """Layouts within this log-likelihood, or this share of what is explained, are not distinguished."""
 
@@ -158,13 +160,14 @@ def find(recordings: ReadSet) -> Result:
     yaw = _yaw_moments(signals, vehicle, sensor, free)
     believed = vehicle.yaw_signs()
     senses = np.array(list(product((1.0, -1.0), repeat=vehicle.rotor_count))) if yaw else believed[None]
-    yaw_rows = [_yaw_row(yaw, s) for s in senses] if yaw else []
-    yaw_losses = np.array([loss(yaw, row) for row in yaw_rows]) if yaw else np.zeros(1)
+    # Every layout with the delay that suits it best: half a period of an oscillation late is the other sense.
+    by_lag = np.array([[loss(m, _yaw_row(m, s)) for s in senses] for m in yaw]) if yaw else np.zeros((1, 1))
+    yaw_losses = by_lag.min(axis=0)
     losses = losses_of_orders(parts, rows, orders)[:, None] + yaw_losses[None, :]
     if not np.isfinite(losses).all():
         # Rotors that all turn alike make no moment that distinguishes them.
         return Result(recordings)
-    whole = float(sum(m.square.sum() for m in parts) + (yaw.square.sum() if yaw else 0.0))
+    whole = float(sum(m.square.sum() for m in parts) + (yaw[0].square.sum() if yaw else 0.0))
     costs = np.array([moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
     least = float(losses.min())
     tied = np.argwhere(losses <= tie(whole, least))
@@ -180,14 +183,16 @@ def find(recordings: ReadSet) -> Result:
             now.append(best_gain(m, rows[a]))
             then.append(best_gain(m, rows[a][orders[order]]))
     same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
+    as_believed, best = (sum(loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then))
     if yaw and spun != same:
-        contested.append(yaw)
-        now.append(yaw_rows[same])
-        then.append(yaw_rows[spun])
+        own = yaw[int(by_lag[:, spun].argmin())]
+        contested.append(own)
+        now.append(_yaw_row(own, senses[same]))
+        then.append(_yaw_row(own, senses[spun]))
+        as_believed, best = as_believed + yaw_losses[same], best + yaw_losses[spun]
     step, p_value = contest(contested, now, then)
     p_value = min(1.0, p_value * losses.size)
     disputed = float(sum(m.square.sum() for m in contested))
-    as_believed, best = (sum(loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then))
     likely = (as_believed - best) / OVERLAP > LEAST_LIKELIHOOD
     explains = disputed - best > LEAST_ADVANTAGE * (disputed - as_believed)
     if not (likely and explains and step > LEAST_STEP and p_value < P_LIMIT):
@@ -219,7 +224,7 @@ def _turned_gyroscope(
     recordings: ReadSet,
     parts: list[Moments],
     rows: np.ndarray,
-    yaw: Moments | None,
+    yaw: list[Moments],
     believed: np.ndarray,
     enough: float,
     cost: int,
@@ -234,7 +239,7 @@ def _turned_gyroscope(
     for source, signs in product(((0, 1, 2), (1, 0, 2)), product((1, -1), repeat=3)):
         true = [signs[i] * rows[source[i]] for i in (0, 1)]
         total = sum(loss(m, best_gain(m, row)) for m, row in zip(parts, true, strict=True))
-        total += loss(yaw, _yaw_row(yaw, signs[2] * believed)) if yaw else 0.0
+        total += min((loss(m, _yaw_row(m, signs[2] * believed)) for m in yaw), default=0.0)
         changes = sum(s < 0 for s in signs) + (source != (0, 1, 2))
         if total <= enough and 0 < changes <= cost and (best is None or changes < best[0]):
             best = (changes, Turn(source, signs))
@@ -288,10 +293,13 @@ def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool
     return Result(recordings if ambiguous else replace_columns(recordings, change), (finding,))
 
 
-def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> Moments | None:
-    """Yaw acceleration against every rotor's torque (k) and acceleration (k); None without a torque coefficient."""
+def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> list[Moments]:
+    """Yaw acceleration against every rotor's torque (k) and acceleration (k); none without a torque coefficient.
+
+    Measured rotors are as late as roll says. Commands may be later: of rotors that lag, torque and acceleration are.
+    """
     if not np.any(vehicle.torque_coefficients_n_m_s2()):
-        return None
+        return []
 
     def make(s: Signals):
         rate = s.values["gyroscope"]
@@ -304,7 +312,8 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
     sharp = roll.lag_sd < 0.005
     late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))
-    return moments(blocks, 0, late, free.weight[0]) if free else None
+    lags = [late] if sensor == "rotors" else [late, *(late + LATER_S)]
+    return [moments(blocks, 0, lag, free.weight[0]) for lag in lags] if free else []
 
 
 def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: bool) -> Result:

@@ -450,6 +450,26 @@ def test_reversed_spins_in_short_runs(short):
     assert fixed.vehicle == short.vehicle
 
 
+@pytest.mark.parametrize("lag_s", [0.0, 0.045])
+def test_a_yaw_oscillation_that_follows_its_commands_late_says_nothing_of_turning_senses(lag_s):
+    """At 9 Hz torque that is late by 45 ms is nearly that of rotors which spin the other way, without a lag."""
+    calm = recorded(1, 2, flight={"excitation": 0.2})
+    vehicle = calm.vehicle
+    signs, torque = vehicle.yaw_signs(), vehicle.torque_coefficients_n_m_s2()
+
+    def shake(table):
+        t = table["time_s"].to_numpy()
+        own = table[list(COLUMNS["rotors"])].to_numpy()
+        more = 60.0 * signs * np.sin(2 * np.pi * 9.0 * t)[:, None]
+        turned = ((own + more) ** 2 - own**2) @ (signs * torque) / vehicle.inertia_kg_m2.zz
+        commands = own + 60.0 * signs * np.sin(2 * np.pi * 9.0 * (t + lag_s))[:, None]
+        changed = {COLUMNS["gyroscope"][2]: table[COLUMNS["gyroscope"][2]] + np.cumsum(turned) * np.gradient(t)}
+        changed |= {n.replace("speed", "command"): commands[:, k] for k, n in enumerate(COLUMNS["rotors"])}
+        return table.assign(**changed).drop(columns=list(COLUMNS["rotors"]))
+
+    assert "spin_direction" not in ids(find_mistakes(with_table(calm, shake))[1])
+
+
 @pytest.mark.parametrize("pair", [(0, 1), (1, 2), (0, 2)])
 def test_two_rotors_exchanged_in_short_runs(short, pair):
     """Neighbours on one side leave one axis as it was: the other alone has to tell."""
