@@ -47,7 +47,10 @@ def lag(recordings: RecordingSet, tau_s: float, rng: np.random.Generator):
     out, driver = commanded(recordings)
     out = of_sensor(out, driver, lambda run, v: smooth(run, v) + tau_s * smooth(run, v, slope=True))
     sizes = ((Size("motor_lag", "tau", tau_s),),)
-    return out, named("motor_lag", sizes=sizes, first_only=CHAIN)
+    throttles = [run.array(names_of(out, driver)) for run in out.runs] if driver == "throttle" else []
+    beyond = any(np.nanmin(u) < 0.0 or np.nanmax(u) > 1.0 for u in throttles)
+    unseen = "the planted throttle leaves the range from 0 to 1" if beyond else ""
+    return out, named("motor_lag", sizes=sizes, first_only=CHAIN, unseen=unseen)
 
 
 def dead_time(recordings: RecordingSet, late_s: float, rng: np.random.Generator):
@@ -68,7 +71,7 @@ def dead_time(recordings: RecordingSet, late_s: float, rng: np.random.Generator)
 def curve(recordings: RecordingSet, b: float, rng: np.random.Generator):
     """Throttle u' for which u² = b u' + (1 − b) u'²: thrust is less square in the throttle than believed."""
     out, driver = commanded(recordings)
-    full = _full(recordings, driver)
+    full = _full(out, driver)
 
     def change(run, values):
         u = np.maximum(values / full, 0.0)

@@ -186,6 +186,21 @@ def test_a_lag_brings_the_planted_command_back(recorded: RecordingSet) -> None:
     assert np.abs(error).max() < 0.01 * 60
 
 
+def test_a_throttle_that_no_pilot_could_give_says_nothing(recorded: RecordingSet) -> None:
+    """A lag of 40 ms before a throttle that goes up in steps asks for more than all of it."""
+    names = c.rotor_columns("throttle", 4)
+    steps = np.repeat([0.2, 0.9] * 20, 100)
+
+    def with_throttle(run: Run, u: np.ndarray) -> Run:
+        own = run.table.drop(columns=[*SPEEDS, *COMMANDS], errors="ignore")
+        return Run(run.name, own.assign(**dict.fromkeys(names, u)))
+
+    for u, unseen in ((steps, True), (0.5 + 0.01 * np.sin(np.arange(4000) / 200.0), False)):
+        flown = replace(recorded, runs=tuple(with_throttle(run, u) for run in recorded.runs))
+        _, (truth,) = sow.plant(flown, plan.parsed("x/commands/motor_lag/large/0"))
+        assert bool(truth.unseen) == unseen
+
+
 def test_a_curve_of_the_throttle_brings_the_planted_command_back(recorded: RecordingSet) -> None:
     out, truth = planted(recorded, "throttle_curve")
     full = max(float(run.array(COMMANDS).max()) for run in recorded.runs)
@@ -194,6 +209,17 @@ def test_a_curve_of_the_throttle_brings_the_planted_command_back(recorded: Recor
         speed, full_speed = out.runs[0].array(COMMANDS), full
 
     np.testing.assert_allclose(root(Path, [sizes(truth)["b"]]), recorded.runs[0].array(COMMANDS), rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["motor_lag", "dead_time", "throttle_curve"])
+def test_commands_that_are_made_are_numbers(recorded: RecordingSet, kind: str) -> None:
+    """Where no limit of the speed is believed the curve is over the largest command that was made."""
+    silent = replace(
+        recorded, runs=tuple(Run(r.name, r.table.drop(columns=list(COMMANDS), errors="ignore")) for r in recorded.runs)
+    )
+    planted, _ = sow.plant(silent, plan.parsed(f"x/commands/{kind}/large/0"))
+    for run in planted.runs:
+        assert np.isfinite(run.array(COMMANDS)).mean() > 0.9
 
 
 def test_a_flight_without_commands_is_given_some(recorded: RecordingSet) -> None:
