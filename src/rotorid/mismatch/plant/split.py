@@ -3,9 +3,9 @@
 About a third of the runs is held out, up to a half where that shares better what is done (in flight speeds along each
 axis, turning, changes of the rotors, nearness of the ground, voltage; on a stand or bench loads along each axis, tilts,
 each rotor, warmth). Of all choices the one is taken with the least cross-entropy between the shares of what is done
-that are held out and fitted and one and two thirds. So what is done in one run alone is fitted: an effect can only be
-found there. Where choices are alike, the runs held out are spread evenly in time. Only what was done decides, never how
-well a model describes it.
+that are held out and fitted and one and two thirds. What one run does alone is fitted: an effect can only be found
+there. Where choices are alike, the runs held out are spread evenly in time. Only what was done decides, never how well
+a model describes it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ from rotorid.recordings import columns as c
 
 HELD_OUT_SHARE = 1 / 3
 MOST_CHOICES = 500
-LEAST_ON_A_SIDE = 0.1
+MOST_OF_A_KIND = 2 / 3
+"""Share of what is done of some kind from which a run does it alone: it cannot be shared, and is fitted."""
+LEAST_ON_A_SIDE = 0.05
 """Share of what is done of which a side of the split has hardly any: less is no worse."""
 WORTH_MOVING = 0.05
 """Gain of a choice over the even one, nats, from which it is taken."""
@@ -90,13 +92,15 @@ def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
     if total < 3:
         return even
     groups = [g / g.sum() for g in activity(recordings) if g.sum() > 0]
-    if not groups:
-        return even
+    alone = {int(np.argmax(g)) for g in groups if g.max() > MOST_OF_A_KIND}
+    shared = [g for g in groups if g.max() <= MOST_OF_A_KIND]
 
     def score(choice: tuple[int, ...]) -> float:
-        held = np.array([share[list(choice)].sum() for share in groups])
+        if alone.intersection(choice):
+            return -np.inf
+        held = np.array([share[list(choice)].sum() for share in shared])
         logs = [np.log(np.maximum(x, LEAST_ON_A_SIDE)) for x in (held, 1.0 - held)]
-        return float(np.mean(HELD_OUT_SHARE * logs[0] + (1.0 - HELD_OUT_SHARE) * logs[1]))
+        return float(np.sum(HELD_OUT_SHARE * logs[0] + (1.0 - HELD_OUT_SHARE) * logs[1])) / max(len(groups), 1)
 
     chosen = even
     for number in range(count, max(count, total // 2) + 1):
