@@ -173,10 +173,11 @@ class Search:
         inflation = max(1.0, gain / max(statistic, 1e-9)) if gain > 0 else 1.0
         physical = self.physical(self.terms[key], beta, np.sqrt(np.diag(covariance)))
         if physical:
-            # Two forms that are exact differ by what they differ, however little.
-            inexact = [k for k in keys if k == key or not (self.exact(key) and self.exact(k))]
-            own, _ = self.regression.own_part(inexact, key, beta)
-            _, noise = self.regression.own_part(keys, key, beta)
+            own, noise = self.regression.own_part(keys, key, beta)
+            if own <= SHARE_OF_LARGEST**2 and self.exact(key):
+                # Two forms that are exact differ by what they differ, however little.
+                others = [k for k in keys if k == key or not self.exact(k)]
+                own, _ = self.regression.own_part(others, key, beta)
             physical = not rules.OWN_PART(own <= SHARE_OF_LARGEST**2 or noise >= MOST_ATTENUATION)
         physical = physical and not rules.STRAIN(self.strains(fit, base))
         return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)

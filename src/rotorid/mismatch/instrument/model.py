@@ -47,8 +47,6 @@ MOST_AT_ONCE = 6
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
-ALIKE = rules.ELSEWHERE["squares"]
-"""Whitened squares within which another form explains as well."""
 UNMOVED = 1e-9
 """Relative change of a believed value that is held."""
 
@@ -382,20 +380,20 @@ def rivals_refined(model: ReadingModel) -> dict[str, Term]:
     A delay whose length was fitted explains more than any low-pass whose cutoff was not.
     """
     search, selection, found = model.search, model.selection, {}
-    for key in selection.active:
-        if not changes_whole(search.terms[key]):
-            continue
+    whole = [k for k in selection.active if changes_whole(search.terms[k])]
+    most = refined(model)[1] + rules.ELSEWHERE["squares"] if whole else 0.0
+    for key in whole:
         rest = [k for k in selection.active if k != key]
         taken = {search.terms[k].effect for k in rest} | set(search.refused)
+        own = search.terms[key].effect, search.terms[key].form.name
         starts: dict[tuple[str, str], list[str]] = {}
         for term in model.terms:
-            if changes_whole(term) and term.effect not in taken and term.form.name != search.terms[key].form.name:
+            if changes_whole(term) and term.effect not in taken and (term.effect, term.form.name) != own:
                 starts.setdefault((term.effect, term.form.name), []).append(term.key)
-        left = refined(model)[1]
         for keys in starts.values():
             best = max(keys, key=lambda start: search.worth([*rest, start]))
-            terms, instead = refined(replace(model, selection=replace(selection, active=[*rest, best])))
-            if instead < left + ALIKE:
+            terms, left = refined(replace(model, selection=replace(selection, active=[*rest, best])))
+            if left < most:
                 found[best] = next(t for t in terms if t.key == best)
     return found
 

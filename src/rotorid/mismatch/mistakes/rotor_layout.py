@@ -8,7 +8,7 @@ compete: each predicts roll, pitch and yaw acceleration from all squared speeds 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -48,6 +48,7 @@ class Moments:
     gram: np.ndarray
     """(n, k, k)."""
 
+    @cached_property
     def whole(self) -> tuple[float, np.ndarray, np.ndarray]:
         """The three summed over the pieces."""
         return float(self.square.sum()), self.cross.sum(axis=0), self.gram.sum(axis=0)
@@ -78,14 +79,14 @@ def rows_of(vehicle: Vehicle) -> np.ndarray:
 
 def best_gain(m: Moments, row: np.ndarray) -> np.ndarray:
     """A row (k,) times its best positive gain."""
-    _, cross, gram = m.whole()
+    _, cross, gram = m.whole
     size = row @ gram @ row
     return row * (max(cross @ row / size, 0.0) if size > 0 else 0.0)
 
 
 def loss(m: Moments, row: np.ndarray) -> float:
     """What a row (k,) leaves of an axis."""
-    square, cross, gram = m.whole()
+    square, cross, gram = m.whole
     return float(square - 2 * cross @ row + row @ gram @ row)
 
 
@@ -99,7 +100,7 @@ def losses_of_orders(m: list[Moments], rows: np.ndarray, orders: np.ndarray) -> 
     total = np.zeros(len(orders))
     for axis, part in enumerate(m):
         b = rows[axis][orders]
-        square, cross, gram = part.whole()
+        square, cross, gram = part.whole
         size = np.einsum("hk,kl,hl->h", b, gram, b)
         gain = np.where(size > 0, np.maximum(b @ cross, 0.0), 0.0)
         total += square - gain**2 / np.maximum(size, 1e-300)
@@ -345,7 +346,7 @@ def _yaw_row(m: Moments, signs: np.ndarray) -> np.ndarray:
     k = len(signs)
     basis = np.zeros((2 * k, 2))
     basis[:k, 0], basis[k:, 1] = signs, signs
-    _, cross, gram = m.whole()
+    _, cross, gram = m.whole
     gram, cross = basis.T @ gram @ basis, basis.T @ cross
     scale = 1 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))

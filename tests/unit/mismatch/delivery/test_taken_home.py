@@ -128,7 +128,7 @@ def test_a_wind_and_an_error_of_a_sensor_are_no_properties_of_the_vehicle():
     assert not improved_vehicle(taken("gyroscope")[1]).effects
 
 
-def test_a_thrust_coefficient_that_makes_the_vertical_force_worse_is_not_in_the_file():
+def test_a_fault_of_the_run_that_is_held_out_moves_no_value_of_the_file():
     """A tachometer at fault in the run that is held out asks for 36 % more thrust there, and there alone."""
     names = list(c.rotor_columns("rotor_speed", 4))
     sound = recorded(1, 2, 3, 4, flight={"duration_s": 10, "drag": 0.35}, vehicle=quad(**LIMITS))
