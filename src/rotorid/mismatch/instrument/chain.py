@@ -20,8 +20,8 @@ from rotorid.effects.contract import CURVE, DELAY, SUPPLY, SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Finding, Trace
-from rotorid.mismatch.instrument.setup import SHORT, Setup, averaged, loaded_by, pieces_of, with_speed
-from rotorid.mismatch.plant.readings import form_reading
+from rotorid.mismatch.instrument.setup import SHORT, Setup, averaged, loaded_by, pieces_of, rotor_wrench, with_speed
+from rotorid.mismatch.plant.readings import form_reading, forms_reading
 from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
 from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE
 from rotorid.mismatch.posterior.status import Estimate
@@ -39,6 +39,8 @@ SUB_SAMPLE = 1.2
 """Offsets in time up to so many samples are a nuisance."""
 LEAST_SPAN = 0.02
 """Relative span of the voltage below which its effect cannot be tested."""
+REMEMBERED = 24
+"""Speeds of each stretch that are remembered: those of one Jacobian."""
 BLOCK_S = 1.0
 LEAST_BLOCKS = 12
 MOST_BLOCKS = 400
@@ -136,37 +138,23 @@ def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, f
 
 @dataclass(frozen=True)
 class Commanded:
-    """What a chain starts from: a stretch's command (n, k), rad/s, voltage, V, and time on the clock of the chain."""
+    """What a chain starts from, on the clock of the chain: a stretch's commands, voltage, V, and time.
+
+    Rotors commanded alike turn alike: of each such command (n, u), rad/s, there is one, and of each rotor which.
+    """
 
     command: np.ndarray
+    which: np.ndarray
     time_s: np.ndarray
     voltage: np.ndarray | None
-    dt_s: float
-    """Between the samples of the recording."""
-    finer: int
 
 
 def commanded(loading: Loading, finer: int, holds: bool) -> Commanded:
     """A stretch's command on a clock `finer` times faster: between samples it is smooth, or `holds` until the next."""
-    command = held(loading.command, finer) if holds else between(loading.command, finer)
+    command, which = np.unique(loading.command, axis=1, return_inverse=True)
+    command = held(command, finer) if holds else between(command, finer)
     voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
-    return Commanded(command, between(loading.time_s, finer), voltage, loading.dt_s, finer)
-
-
-def applied(start: Commanded, chain: Chain, values, full_speed: float, first_full: float, volts, holds: bool = False):
-    """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed.
-
-    `values` are those of the forms, then what `unknown_courses` names.
-    """
-    speed = start.command * (full_speed / first_full)
-    at = 0
-    for _, form in chain:
-        path = SpeedPath(speed, start.time_s, full_speed, start.voltage, volts, holds)
-        # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
-        with np.errstate(invalid="ignore"):
-            speed = np.nan_to_num(form.apply(path, np.asarray(values[at : at + len(form.parameters)])))
-        at += len(form.parameters)
-    return moved_between_samples(speed, np.asarray(values[at:]), start.dt_s, start.finer)
+    return Commanded(command, which.ravel(), between(loading.time_s, finer), voltage)
 
 
 def held(values: np.ndarray, finer: int) -> np.ndarray:
@@ -204,7 +192,7 @@ class Problem:
         self.volts = setup.full_voltage
         self.measured = all(x.measured for x in setup.loadings)
         self.fitted = thinned(list(setup.loadings))
-        self.others = others or []
+        self.others = list(others or [])
         # A lag of some hundredths of a second must still show: few stretches at a fine rate rather than all coarse.
         finest = max(1, int(setup.instrument.rate_hz / RATE_HZ))
         self.average = 1 if self.measured else min(setup.average, finest)
@@ -213,14 +201,68 @@ class Problem:
         self.short = np.median([x.size for x in self.fitted]) < SHORT
         self.plain = self.short or (self.measured and setup.steady_points)
         self.taps: list[np.ndarray] = []
+        if not self.measured:
+            self.leave_to_rotors()
         self._starts: dict[tuple[int, int, bool], Commanded] = {}
+        self._made: dict[tuple, np.ndarray] = {}
 
-    def start_of(self, loading: Loading, chain: Chain) -> Commanded:
+    def start_of(self, loading: Loading, finer: int) -> Commanded:
         """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
-        key = (id(loading), FINER if takes_time(chain) else 1, self.holds)
+        key = (id(loading), finer, self.holds)
         if key not in self._starts:
-            self._starts[key] = commanded(loading, key[1], self.holds)
+            self._starts[key] = commanded(loading, finer, self.holds)
         return self._starts[key]
+
+    def made(self, loading: Loading, chain: Chain, values: tuple[float, ...], finer: int) -> np.ndarray:
+        """Speeds (n, u), rad/s, that a chain's forms make of a stretch's commands, on a clock `finer` times faster.
+
+        Remembered for a while: a Jacobian moves one value after another, and what the forms before it make stays.
+        """
+        start = self.start_of(loading, finer)
+        if not chain:
+            return start.command
+        key = (id(loading), finer, self.holds, values, *(id(form) for _, form in chain))
+        if key not in self._made:
+            form, own = chain[-1][1], len(values) - len(chain[-1][1].parameters)
+            speed = self.made(loading, chain[:-1], values[:own], finer)
+            path = SpeedPath(speed, start.time_s, self.first_full, start.voltage, self.volts, self.holds)
+            # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
+            with np.errstate(invalid="ignore"):
+                speed = form.apply(path, np.array(values[own:]))
+            if len(self._made) > REMEMBERED * len(self.fitted):
+                del self._made[next(iter(self._made))]
+            self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
+        return self._made[key]
+
+    def speed(self, loading: Loading, chain: Chain, values, full_speed: float) -> np.ndarray:
+        """Rotor speeds (n, k), rad/s, that a chain makes of a stretch's commands; they scale with the full speed.
+
+        `values` are those of the forms, then what `unknown_courses` names.
+        """
+        finer = FINER if takes_time(chain) else 1
+        own = sum(len(form.parameters) for _, form in chain)
+        speed = self.made(loading, chain, tuple(float(v) for v in values[:own]), finer)
+        speed = moved_between_samples(speed, np.asarray(values[own:]), loading.dt_s, finer)
+        return speed[:, self.start_of(loading, finer).which] * (full_speed / self.first_full)
+
+    def leave_to_rotors(self) -> None:
+        """Take off the readings that are fitted what effects add at any speed alike, and off the loads the rotors' own.
+
+        What depends on no speed is so made once, and not in every evaluation.
+        """
+        vehicle, own, other = self.setup.vehicle, self.fitted, []
+        for x in own:
+            speed = 0.5 * x.command + 0.25 * self.first_full
+            other.append(loaded_by(replace(x, motion=with_speed(x.motion, speed)), vehicle))
+        acting = []
+        for pair in self.others:
+            added = [form_reading(*pair, x, vehicle) for x in own]
+            if all(np.array_equal(a, form_reading(*pair, x, vehicle)) for a, x in zip(added, other, strict=True)):
+                own = [replace(x, reading=x.reading - a) for a, x in zip(added, own, strict=True)]
+            else:
+                acting.append(pair)
+        self.others = acting
+        self.fitted = [replace(x, load=x.load - rotor_wrench(x.motion, vehicle)) for x in own]
 
     def raw(self, chain: Chain, theta, loadings=None) -> list[np.ndarray]:
         """Measured minus modelled response of every stretch, (rows, channels or rotors), not whitened."""
@@ -228,16 +270,14 @@ class Problem:
         accelerating = any("rotor_acceleration" in form.requires for form, _ in self.others)
         out = []
         for x in self.fitted if loadings is None else loadings:
-            speed = applied(self.start_of(x, chain), chain, values, full, self.first_full, self.volts, self.holds)
+            speed = self.speed(x, chain, values, full)
             if self.measured:
                 read = x.motion.rotor_speed if x.speed_read is None else x.speed_read
                 out.append(read - speed)
                 continue
             motion = with_speed(x.motion, speed) if accelerating else replace(x.motion, rotor_speed=speed)
-            moved = loaded_by(replace(x, motion=motion), self.setup.vehicle)
-            left = moved.reading - moved.load
-            for form, given in self.others:
-                left = left - form_reading(form, given, moved, self.setup.vehicle)
+            moved = replace(x, motion=motion, load=x.load + rotor_wrench(motion, self.setup.vehicle))
+            left = moved.reading - moved.load - forms_reading(self.others, moved, self.setup.vehicle)
             rows = averaged(left[:, self.channels], self.average)
             out += [rows[p] for p in pieces_of(moved, self.average)]
         return out
@@ -639,13 +679,10 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
 
 def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
     """Loadings with the speeds that the chain makes of the commands (where none are measured)."""
-    problem = Problem(setup)
-    values = result.fit.values
+    problem, fit = Problem(setup, holds=result.holds), result.fit
     out = []
     for x in setup.loadings:
-        chain = result.fit.chain
-        start = commanded(x, FINER if takes_time(chain) else 1, result.holds)
-        speed = applied(start, chain, values, result.full_speed, problem.first_full, problem.volts, result.holds)
+        speed = problem.speed(x, fit.chain, fit.values, result.full_speed)
         command = x.command * (result.full_speed / problem.first_full)
         out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
     return tuple(out)
