@@ -133,17 +133,17 @@ def rotation_of(roll: np.ndarray, pitch: np.ndarray) -> np.ndarray:
 
 
 def turned(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """R v at every instant, (n, 3)."""
-    return _turned(rotation, np.broadcast_to(np.asarray(vectors, float), (len(rotation), 3)))
+    """R v at every instant, (n, 3); of wrenches R F and R M, (n, 6)."""
+    return _turned(rotation, np.broadcast_to(np.asarray(vectors, float), (len(rotation), np.shape(vectors)[-1])))
 
 
 @compiled()
 def _turned(rotation, vectors):
     out = np.empty(vectors.shape)
     for n in range(len(vectors)):
-        x, y, z = vectors[n]
-        for i in range(3):
-            out[n, i] = rotation[n, i, 0] * x + rotation[n, i, 1] * y + rotation[n, i, 2] * z
+        for i in range(vectors.shape[1]):
+            row, first = rotation[n, i % 3], i - i % 3
+            out[n, i] = row[0] * vectors[n, first] + row[1] * vectors[n, first + 1] + row[2] * vectors[n, first + 2]
     return out
 
 
@@ -152,13 +152,15 @@ def at_sensor(force: np.ndarray | None, moment: np.ndarray | None, motion: Motio
 
     M_s = M − r_s × F, r_s = `sensor_position_m` in body axes.
     """
-    force = np.zeros((motion.size, 3)) if force is None else force
-    moment = np.zeros((motion.size, 3)) if moment is None else moment
-    # r × F of the three unit forces: many times faster than a cross product at each instant.
-    moment = moment - force @ np.cross(vehicle.sensor_position_m, np.eye(3))
-    if vehicle.sensor_mount == "level" and motion.rotation is not None:
-        force, moment = turned(motion.rotation, force), turned(motion.rotation, moment)
-    return np.concatenate([force, moment], axis=1)
+    wrench = np.zeros((motion.size, 6))
+    if moment is not None:
+        wrench[:, 3:] = moment
+    if force is not None:
+        wrench[:, :3] = force
+        # r × F of the three unit forces: many times faster than a cross product at each instant.
+        wrench[:, 3:] -= force @ np.cross(vehicle.sensor_position_m, np.eye(3))
+    level = vehicle.sensor_mount == "level" and motion.rotation is not None
+    return turned(motion.rotation, wrench) if level else wrench
 
 
 def weight(motion: Motion, vehicle: Vehicle, arm_m: np.ndarray | None = None) -> np.ndarray:

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import catalogue, ids_of
-from rotorid.effects.contract import CURVE, DELAY, SUPPLY, SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, DELAY, SUPPLY, Form, SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Finding, Trace
@@ -30,7 +30,8 @@ from rotorid.recordings.signal.kernels import causal
 MOST_SAMPLES = 12_000
 RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
-QUICK_FIT = 6
+MOST_STEPS, QUICK_FIT = 30, 6
+"""Evaluations of the Jacobian at most: of a fit, and of one that is to say whether another is worth it."""
 MOST = 4
 """Forms of a chain, forms that are fitted to the end before the next one enters, and starts of each, at most."""
 MOST_DOUBT = 3.0
@@ -325,7 +326,7 @@ class Problem:
         reach = MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
-    def fit(self, chain: Chain, start: np.ndarray, most: int = 30) -> ChainFit:
+    def fit(self, chain: Chain, start: np.ndarray, most: int = MOST_STEPS) -> ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
         low, high = self.bounds(chain)
         if not len(start):
@@ -346,10 +347,18 @@ class Problem:
         )
         return ChainFit(chain, found.x, float(2 * found.cost), self.scaled)
 
-    def fit_if_near(self, chain: Chain, start: np.ndarray, cost: float) -> ChainFit:
-        """As `fit`, but left after a few steps where these end far above a cost that is to be reached."""
-        quick = self.fit(chain, start, QUICK_FIT)
-        return self.fit(chain, quick.theta) if quick.cost < (1 + FAR) * cost + ALIKE else quick
+    def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> ChainFit:
+        """As `fit`, but left where a cost is reached, or where it would not be at the pace of the last few steps."""
+        fit = self.fit(chain, start, QUICK_FIT)
+        if fit.cost > (1 + FAR) * cost:
+            return fit
+        for more in reversed(range(MOST_STEPS // QUICK_FIT)):
+            if fit.cost < cost:
+                break
+            before, fit = fit, self.fit(chain, fit.theta, QUICK_FIT)
+            if fit.cost - more * (before.cost - fit.cost) >= cost:
+                break
+        return fit
 
     def covariance(self, fit: ChainFit) -> tuple[np.ndarray, int]:
         """Block-robust covariance of the parameters, and the number of blocks."""
@@ -440,16 +449,10 @@ def start_of(problem: Problem, chain: Chain, fit: ChainFit, new: str = "", value
     return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def fitted_with(
-    problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm], most: int | None = None
-) -> ChainFit:
-    """A chain with a new form fitted from what is known of the others, from that start which already explains most.
-
-    `most` evaluations of the Jacobian at most; None where a fit that ends far above the known one need not be ended.
-    """
+def start_with(problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+    """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
     options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
-    start = min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
-    return problem.fit_if_near(chain, start, fit.cost) if most is None else problem.fit(chain, start, most)
+    return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
 
 
 def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
@@ -522,7 +525,7 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
             if pair[0] in {k for k, _ in best.chain} or pair[0] in dropped:
                 continue
             chain = ordered((*best.chain, pair))
-            fit = fitted_with(problem, chain, best, pair, QUICK_FIT)
+            fit = problem.fit(chain, start_with(problem, chain, best, pair), QUICK_FIT)
             tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
         tried.sort(key=lambda t: -t[0])
         entered = False
@@ -642,8 +645,8 @@ def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]
     for pair in forms:
         if pair[0] == key or pair[0] in taken or pair[0] in out or len(pair[1].parameters) > size + 1:
             continue
-        fit = fitted_with(problem, ordered((*rest, pair)), best, pair)
-        if fit.cost < best.cost + ALIKE:
+        chain = ordered((*rest, pair))
+        if problem.fit_to(chain, start_with(problem, chain, best, pair), best.cost + ALIKE).cost < best.cost + ALIKE:
             out.append(pair[0])
     if not problem.measured:
         out += reading_alternatives(problem, best, rest, key)
@@ -654,26 +657,29 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
+
+    def explains(form: Form, value: float) -> bool:
+        first, with_it = form.parameters[0], copy(problem)
+
+        def white(theta):
+            with_it.others = [*problem.others, (form, theta[:1])]
+            return with_it.white(rest, theta[1:])
+
+        start, bounds = np.append(value, known), (np.append(first.low, low), np.append(first.high, high))
+        found = least_squares(
+            white,
+            np.clip(start, *bounds),
+            bounds=bounds,
+            x_scale=np.maximum(np.abs(start), 1e-3),
+            diff_step=1e-4,
+            max_nfev=15,
+        )
+        return 2 * found.cost < best.cost + ALIKE
+
     for name in catalogue()[key].like_of_reading:
-        for form in forms_of(catalogue()[name], problem.setup.instrument):
-            first, with_it = form.parameters[0], copy(problem)
-
-            def white(theta, form=form, with_it=with_it):
-                with_it.others = [*problem.others, (form, theta[:1])]
-                return with_it.white(rest, theta[1:])
-
-            for p in first.starts:
-                start, bounds = np.append(p, known), (np.append(first.low, low), np.append(first.high, high))
-                found = least_squares(
-                    white,
-                    np.clip(start, *bounds),
-                    bounds=bounds,
-                    x_scale=np.maximum(np.abs(start), 1e-3),
-                    diff_step=1e-4,
-                    max_nfev=15,
-                )
-                if 2 * found.cost < best.cost + ALIKE and name not in out:
-                    out.append(name)
+        forms = forms_of(catalogue()[name], problem.setup.instrument)
+        if name not in out and any(explains(f, value) for f in forms for value in f.parameters[0].starts):
+            out.append(name)
     return out
 
 
