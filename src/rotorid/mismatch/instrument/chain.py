@@ -16,12 +16,12 @@ from scipy.optimize import least_squares
 from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import catalogue, ids_of
-from rotorid.effects.contract import CURVE, DELAY, SUPPLY, SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, DELAY, SUPPLY, Form, SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Finding, Trace
-from rotorid.mismatch.instrument.setup import SHORT, Setup, averaged, loaded_by, pieces_of, with_speed
-from rotorid.mismatch.plant.readings import form_reading
+from rotorid.mismatch.instrument.setup import SHORT, Setup, averaged, loaded_by, pieces_of, rotor_wrench, with_speed
+from rotorid.mismatch.plant.readings import form_reading, forms_reading
 from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
 from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE
 from rotorid.mismatch.posterior.status import Estimate
@@ -30,7 +30,8 @@ from rotorid.recordings.signal.kernels import causal
 MOST_SAMPLES = 12_000
 RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
-QUICK_FIT = 6
+MOST_STEPS, QUICK_FIT = 30, 6
+"""Evaluations of the Jacobian at most: of a fit, and of one that is to say whether another is worth it."""
 MOST = 4
 """Forms of a chain, forms that are fitted to the end before the next one enters, and starts of each, at most."""
 MOST_DOUBT = 3.0
@@ -39,6 +40,8 @@ SUB_SAMPLE = 1.2
 """Offsets in time up to so many samples are a nuisance."""
 LEAST_SPAN = 0.02
 """Relative span of the voltage below which its effect cannot be tested."""
+REMEMBERED = 24
+"""Speeds of each stretch that are remembered: those of one Jacobian."""
 BLOCK_S = 1.0
 LEAST_BLOCKS = 12
 MOST_BLOCKS = 400
@@ -136,37 +139,23 @@ def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, f
 
 @dataclass(frozen=True)
 class Commanded:
-    """What a chain starts from: a stretch's command (n, k), rad/s, voltage, V, and time on the clock of the chain."""
+    """What a chain starts from, on the clock of the chain: a stretch's commands, voltage, V, and time.
+
+    Rotors commanded alike turn alike: of each such command (n, u), rad/s, there is one, and of each rotor which.
+    """
 
     command: np.ndarray
+    which: np.ndarray
     time_s: np.ndarray
     voltage: np.ndarray | None
-    dt_s: float
-    """Between the samples of the recording."""
-    finer: int
 
 
 def commanded(loading: Loading, finer: int, holds: bool) -> Commanded:
     """A stretch's command on a clock `finer` times faster: between samples it is smooth, or `holds` until the next."""
-    command = held(loading.command, finer) if holds else between(loading.command, finer)
+    command, which = np.unique(loading.command, axis=1, return_inverse=True)
+    command = held(command, finer) if holds else between(command, finer)
     voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
-    return Commanded(command, between(loading.time_s, finer), voltage, loading.dt_s, finer)
-
-
-def applied(start: Commanded, chain: Chain, values, full_speed: float, first_full: float, volts, holds: bool = False):
-    """Rotor speeds (n, k) that the chain makes of a stretch's commands; commands scale with the full speed.
-
-    `values` are those of the forms, then what `unknown_courses` names.
-    """
-    speed = start.command * (full_speed / first_full)
-    at = 0
-    for _, form in chain:
-        path = SpeedPath(speed, start.time_s, full_speed, start.voltage, volts, holds)
-        # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
-        with np.errstate(invalid="ignore"):
-            speed = np.nan_to_num(form.apply(path, np.asarray(values[at : at + len(form.parameters)])))
-        at += len(form.parameters)
-    return moved_between_samples(speed, np.asarray(values[at:]), start.dt_s, start.finer)
+    return Commanded(command, which.ravel(), between(loading.time_s, finer), voltage)
 
 
 def held(values: np.ndarray, finer: int) -> np.ndarray:
@@ -204,7 +193,7 @@ class Problem:
         self.volts = setup.full_voltage
         self.measured = all(x.measured for x in setup.loadings)
         self.fitted = thinned(list(setup.loadings))
-        self.others = others or []
+        self.others = list(others or [])
         # A lag of some hundredths of a second must still show: few stretches at a fine rate rather than all coarse.
         finest = max(1, int(setup.instrument.rate_hz / RATE_HZ))
         self.average = 1 if self.measured else min(setup.average, finest)
@@ -213,14 +202,68 @@ class Problem:
         self.short = np.median([x.size for x in self.fitted]) < SHORT
         self.plain = self.short or (self.measured and setup.steady_points)
         self.taps: list[np.ndarray] = []
+        if not self.measured:
+            self.leave_to_rotors()
         self._starts: dict[tuple[int, int, bool], Commanded] = {}
+        self._made: dict[tuple, np.ndarray] = {}
 
-    def start_of(self, loading: Loading, chain: Chain) -> Commanded:
+    def start_of(self, loading: Loading, finer: int) -> Commanded:
         """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
-        key = (id(loading), FINER if takes_time(chain) else 1, self.holds)
+        key = (id(loading), finer, self.holds)
         if key not in self._starts:
-            self._starts[key] = commanded(loading, key[1], self.holds)
+            self._starts[key] = commanded(loading, finer, self.holds)
         return self._starts[key]
+
+    def made(self, loading: Loading, chain: Chain, values: tuple[float, ...], finer: int) -> np.ndarray:
+        """Speeds (n, u), rad/s, that a chain's forms make of a stretch's commands, on a clock `finer` times faster.
+
+        Remembered for a while: a Jacobian moves one value after another, and what the forms before it make stays.
+        """
+        start = self.start_of(loading, finer)
+        if not chain:
+            return start.command
+        key = (id(loading), finer, self.holds, values, *(id(form) for _, form in chain))
+        if key not in self._made:
+            form, own = chain[-1][1], len(values) - len(chain[-1][1].parameters)
+            speed = self.made(loading, chain[:-1], values[:own], finer)
+            path = SpeedPath(speed, start.time_s, self.first_full, start.voltage, self.volts, self.holds)
+            # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
+            with np.errstate(invalid="ignore"):
+                speed = form.apply(path, np.array(values[own:]))
+            if len(self._made) > REMEMBERED * len(self.fitted):
+                del self._made[next(iter(self._made))]
+            self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
+        return self._made[key]
+
+    def speed(self, loading: Loading, chain: Chain, values, full_speed: float) -> np.ndarray:
+        """Rotor speeds (n, k), rad/s, that a chain makes of a stretch's commands; they scale with the full speed.
+
+        `values` are those of the forms, then what `unknown_courses` names.
+        """
+        finer = FINER if takes_time(chain) else 1
+        own = sum(len(form.parameters) for _, form in chain)
+        speed = self.made(loading, chain, tuple(float(v) for v in values[:own]), finer)
+        speed = moved_between_samples(speed, np.asarray(values[own:]), loading.dt_s, finer)
+        return speed[:, self.start_of(loading, finer).which] * (full_speed / self.first_full)
+
+    def leave_to_rotors(self) -> None:
+        """Take off the readings that are fitted what effects add at any speed alike, and off the loads the rotors' own.
+
+        What depends on no speed is so made once, and not in every evaluation.
+        """
+        vehicle, own, other = self.setup.vehicle, self.fitted, []
+        for x in own:
+            speed = 0.5 * x.command + 0.25 * self.first_full
+            other.append(loaded_by(replace(x, motion=with_speed(x.motion, speed)), vehicle))
+        acting = []
+        for pair in self.others:
+            added = [form_reading(*pair, x, vehicle) for x in own]
+            if all(np.array_equal(a, form_reading(*pair, x, vehicle)) for a, x in zip(added, other, strict=True)):
+                own = [replace(x, reading=x.reading - a) for a, x in zip(added, own, strict=True)]
+            else:
+                acting.append(pair)
+        self.others = acting
+        self.fitted = [replace(x, load=x.load - rotor_wrench(x.motion, vehicle)) for x in own]
 
     def raw(self, chain: Chain, theta, loadings=None) -> list[np.ndarray]:
         """Measured minus modelled response of every stretch, (rows, channels or rotors), not whitened."""
@@ -228,16 +271,14 @@ class Problem:
         accelerating = any("rotor_acceleration" in form.requires for form, _ in self.others)
         out = []
         for x in self.fitted if loadings is None else loadings:
-            speed = applied(self.start_of(x, chain), chain, values, full, self.first_full, self.volts, self.holds)
+            speed = self.speed(x, chain, values, full)
             if self.measured:
                 read = x.motion.rotor_speed if x.speed_read is None else x.speed_read
                 out.append(read - speed)
                 continue
             motion = with_speed(x.motion, speed) if accelerating else replace(x.motion, rotor_speed=speed)
-            moved = loaded_by(replace(x, motion=motion), self.setup.vehicle)
-            left = moved.reading - moved.load
-            for form, given in self.others:
-                left = left - form_reading(form, given, moved, self.setup.vehicle)
+            moved = replace(x, motion=motion, load=x.load + rotor_wrench(motion, self.setup.vehicle))
+            left = moved.reading - moved.load - forms_reading(self.others, moved, self.setup.vehicle)
             rows = averaged(left[:, self.channels], self.average)
             out += [rows[p] for p in pieces_of(moved, self.average)]
         return out
@@ -285,7 +326,7 @@ class Problem:
         reach = MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
-    def fit(self, chain: Chain, start: np.ndarray, most: int = 30) -> ChainFit:
+    def fit(self, chain: Chain, start: np.ndarray, most: int = MOST_STEPS) -> ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
         low, high = self.bounds(chain)
         if not len(start):
@@ -306,10 +347,18 @@ class Problem:
         )
         return ChainFit(chain, found.x, float(2 * found.cost), self.scaled)
 
-    def fit_if_near(self, chain: Chain, start: np.ndarray, cost: float) -> ChainFit:
-        """As `fit`, but left after a few steps where these end far above a cost that is to be reached."""
-        quick = self.fit(chain, start, QUICK_FIT)
-        return self.fit(chain, quick.theta) if quick.cost < (1 + FAR) * cost + ALIKE else quick
+    def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> ChainFit:
+        """As `fit`, but left where a cost is reached, or where it would not be at the pace of the last few steps."""
+        fit = self.fit(chain, start, QUICK_FIT)
+        if fit.cost > (1 + FAR) * cost:
+            return fit
+        for more in reversed(range(MOST_STEPS // QUICK_FIT)):
+            if fit.cost < cost:
+                break
+            before, fit = fit, self.fit(chain, fit.theta, QUICK_FIT)
+            if fit.cost - more * (before.cost - fit.cost) >= cost:
+                break
+        return fit
 
     def covariance(self, fit: ChainFit) -> tuple[np.ndarray, int]:
         """Block-robust covariance of the parameters, and the number of blocks."""
@@ -400,16 +449,10 @@ def start_of(problem: Problem, chain: Chain, fit: ChainFit, new: str = "", value
     return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def fitted_with(
-    problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm], most: int | None = None
-) -> ChainFit:
-    """A chain with a new form fitted from what is known of the others, from that start which already explains most.
-
-    `most` evaluations of the Jacobian at most; None where a fit that ends far above the known one need not be ended.
-    """
+def start_with(problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+    """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
     options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
-    start = min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
-    return problem.fit_if_near(chain, start, fit.cost) if most is None else problem.fit(chain, start, most)
+    return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
 
 
 def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
@@ -482,7 +525,7 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
             if pair[0] in {k for k, _ in best.chain} or pair[0] in dropped:
                 continue
             chain = ordered((*best.chain, pair))
-            fit = fitted_with(problem, chain, best, pair, QUICK_FIT)
+            fit = problem.fit(chain, start_with(problem, chain, best, pair), QUICK_FIT)
             tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
         tried.sort(key=lambda t: -t[0])
         entered = False
@@ -602,8 +645,8 @@ def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]
     for pair in forms:
         if pair[0] == key or pair[0] in taken or pair[0] in out or len(pair[1].parameters) > size + 1:
             continue
-        fit = fitted_with(problem, ordered((*rest, pair)), best, pair)
-        if fit.cost < best.cost + ALIKE:
+        chain = ordered((*rest, pair))
+        if problem.fit_to(chain, start_with(problem, chain, best, pair), best.cost + ALIKE).cost < best.cost + ALIKE:
             out.append(pair[0])
     if not problem.measured:
         out += reading_alternatives(problem, best, rest, key)
@@ -614,38 +657,38 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
+
+    def explains(form: Form, value: float) -> bool:
+        first, with_it = form.parameters[0], copy(problem)
+
+        def white(theta):
+            with_it.others = [*problem.others, (form, theta[:1])]
+            return with_it.white(rest, theta[1:])
+
+        start, bounds = np.append(value, known), (np.append(first.low, low), np.append(first.high, high))
+        found = least_squares(
+            white,
+            np.clip(start, *bounds),
+            bounds=bounds,
+            x_scale=np.maximum(np.abs(start), 1e-3),
+            diff_step=1e-4,
+            max_nfev=15,
+        )
+        return 2 * found.cost < best.cost + ALIKE
+
     for name in catalogue()[key].like_of_reading:
-        for form in forms_of(catalogue()[name], problem.setup.instrument):
-            first, with_it = form.parameters[0], copy(problem)
-
-            def white(theta, form=form, with_it=with_it):
-                with_it.others = [*problem.others, (form, theta[:1])]
-                return with_it.white(rest, theta[1:])
-
-            for p in first.starts:
-                start, bounds = np.append(p, known), (np.append(first.low, low), np.append(first.high, high))
-                found = least_squares(
-                    white,
-                    np.clip(start, *bounds),
-                    bounds=bounds,
-                    x_scale=np.maximum(np.abs(start), 1e-3),
-                    diff_step=1e-4,
-                    max_nfev=15,
-                )
-                if 2 * found.cost < best.cost + ALIKE and name not in out:
-                    out.append(name)
+        forms = forms_of(catalogue()[name], problem.setup.instrument)
+        if name not in out and any(explains(f, value) for f in forms for value in f.parameters[0].starts):
+            out.append(name)
     return out
 
 
 def moved(setup: Setup, result: ChainResult) -> tuple[Loading, ...]:
     """Loadings with the speeds that the chain makes of the commands (where none are measured)."""
-    problem = Problem(setup)
-    values = result.fit.values
+    problem, fit = Problem(setup, holds=result.holds), result.fit
     out = []
     for x in setup.loadings:
-        chain = result.fit.chain
-        start = commanded(x, FINER if takes_time(chain) else 1, result.holds)
-        speed = applied(start, chain, values, result.full_speed, problem.first_full, problem.volts, result.holds)
+        speed = problem.speed(x, fit.chain, fit.values, result.full_speed)
         command = x.command * (result.full_speed / problem.first_full)
         out.append(loaded_by(replace(x, command=command, motion=with_speed(x.motion, speed)), setup.vehicle))
     return tuple(out)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
@@ -40,6 +39,8 @@ LEAST_WARMTH_K = 0.1
 """A temperature that changes by less says nothing."""
 STEADY_HZ = 5.0
 """Below this rate a recording is a list of steady points: nothing that takes time can be seen."""
+QUARTIC = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]])
+"""Twelve times the slope at the first two of five samples of the quartic through them, per step."""
 
 
 @dataclass(frozen=True)
@@ -309,8 +310,10 @@ def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
         return motion
     acceleration = None
     if motion.size >= 7:
-        dt_s = float(np.median(np.diff(motion.time_s)))
-        acceleration = savgol_filter(speed, 5, 4, deriv=1, delta=dt_s, axis=0)
+        step = 12.0 * float(np.median(np.diff(motion.time_s)))
+        middle = (speed[:-4] - speed[4:] + 8.0 * (speed[3:-1] - speed[1:-3])) / step
+        first, last = QUARTIC @ speed[:5] / step, -QUARTIC[::-1, ::-1] @ speed[-5:] / step
+        acceleration = np.concatenate([first, middle, last])
     return replace(motion, rotor_speed=speed, rotor_acceleration=acceleration)
 
 
