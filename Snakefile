@@ -47,8 +47,11 @@ rule all:
         rules.report.input,
 
 
-# All rules have asked for their code by now.
-CODE.remember()
+onstart:
+    # For its limit on jobs a second Snakemake looks at the input of every waiting job each second, a tenth of a core.
+    # A cluster needs the limit, one machine does not.
+    if workflow.local_exec:
+        workflow.scheduler.job_rate_limiter = None
 
 
 onsuccess:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from copied_project import ROOT, Project
 
+from rotorid.io.public_list import read_manifest
 from rotorid.recordings.importers import overview
-from rotorid.recordings.importers.manifest import read_manifest
 from rotorid.report import prose
 from workflow.scripts import import_public
 

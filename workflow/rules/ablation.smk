@@ -24,7 +24,7 @@ rule record_ablation:
         answers=directory("results/ablation/sealed"),
     params:
         cases=ABLATION_CASES,
-        concealing=[CODE.of(path) for path in CONCEALING],
+        concealing=code_that_conceals,
         code=code_of("conceal"),
     log:
         "results/logs/ablation/record.log",

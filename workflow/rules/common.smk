@@ -1,5 +1,6 @@
 """What every stage uses: the checked configuration and the code of the library as a parameter."""
 
+import atexit
 import os
 import sys
 import time
@@ -19,6 +20,7 @@ for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 STARTED = time.time()
 ROOT = Path(workflow.basedir)
 CODE = Code(ROOT, memory=".snakemake/code.json")
+atexit.register(CODE.remember)
 
 
 def refuse(sentence):
@@ -48,14 +50,13 @@ except InputError as error:
 
 
 def code_of(script):
-    """Hash of the code that a script (its name without .py) or a notebook (its path) runs."""
-    path = script if script.endswith(".ipynb") else f"workflow/scripts/{script}.py"
-    return CODE.of(path)
+    """Hash of the code that a script (its name without .py) runs, once a job asks for it: most rules have none today."""
+    return lambda wildcards: CODE.of(f"workflow/scripts/{script}.py")
 
 
 def code_of_chapter(name):
-    """Hash of the code of a chapter's notebook and of what runs it."""
-    return code_of("run_notebook") + code_of(f"notebooks/{name}.ipynb")
+    """The same of a chapter's notebook and of what runs it."""
+    return lambda wildcards: CODE.of("workflow/scripts/run_notebook.py") + CODE.of(f"notebooks/{name}.ipynb")
 
 
 @cache

@@ -30,13 +30,17 @@ if not KEPT_ITEMS:
 JUDGING = ["analyse", "instrument/analyse", "tell/verdict"]
 
 
-def hashes_of_evidence():
+def hash_of_engine(wildcards):
+    """Hash of the code that judges the sets."""
+    return bench.joint([CODE.of(f"src/rotorid/mismatch/{name}.py") for name in JUDGING])
+
+
+def hashes_of_evidence(wildcards):
     """Hashes of the code that draws, plants and judges the sets."""
-    judging = [CODE.of(f"src/rotorid/mismatch/{name}.py") for name in JUDGING]
     return {
-        "drawing": bench.joint([CODE.of(path) for path in CONCEALING]),
+        "drawing": bench.joint(code_that_conceals(wildcards)),
         "planting": CODE.of("proof/rotorid_proof/plantings/sow.py"),
-        "engine": bench.joint(judging),
+        "engine": hash_of_engine(wildcards),
     }
 
 
@@ -55,7 +59,7 @@ rule collect_evidence:
         wanted=KEPT_ITEMS,
         folder=EVIDENCE,
         public="results/recordings",
-        hashes=hashes_of_evidence(),
+        hashes=hashes_of_evidence,
         code=code_of("collect_evidence"),
     log:
         "results/logs/collect_evidence.log",
@@ -75,7 +79,7 @@ rule score_decisions:
         sets="results/decisions/sets.csv",
     params:
         folder=EVIDENCE,
-        engine=hashes_of_evidence()["engine"],
+        engine=hash_of_engine,
         code=code_of("score_decisions"),
     threads: workflow.cores
     log:
@@ -102,7 +106,7 @@ rule decisions_so_far:
         sets="results/decisions/so_far/sets.csv",
     params:
         folder=EVIDENCE,
-        engine=hashes_of_evidence()["engine"],
+        engine=hash_of_engine,
         kept=len(list(Path(EVIDENCE).glob("*.json"))),
         code=code_of("score_decisions"),
     threads: workflow.cores

@@ -31,7 +31,7 @@ rule judge_examples:
         real=EXAMPLE_FLIGHTS,
         cases=EXAMPLE_CASES,
         folder="results/examples",
-        concealing=[CODE.of(path) for path in CONCEALING],
+        concealing=code_that_conceals,
         code=code_of("judge_examples"),
     log:
         "results/logs/judge_examples.log",

@@ -33,15 +33,17 @@ except InputError as error:
 BATCHES = plan.batches(CHOSEN + RELEASED, CONFIG.proof.batch)
 # Concealed sets whose delivered vehicle is put to the test: as many, evenly over the whole list.
 DELIVERED = plan.batches(plan.spread(CASES, CONFIG.proof.delivered), CONFIG.proof.batch)
-# Recordings come from code outside the library: its hash stands next to that of the script.
-CONCEALING = [
-    str(path.relative_to(ROOT)) for path in sorted((ROOT / "proof/rotorid_proof/concealed").rglob("*.py"))
-]
 STUDIES = [study.name for study in real.STUDIES] if CONFIG.proof.real else []
 
 if "proof" in sys.argv:
     judged = [name for name in BATCHES if Path(f"results/proof/verdicts/{name}").is_dir()]
     print(plan.announcement(BATCHES, judged, CONFIG.proof.peers), file=sys.stderr)
+
+
+def code_that_conceals(wildcards):
+    """Hashes of the code that recordings come from: outside the library, they stand next to that of the script."""
+    files = sorted((ROOT / "proof/rotorid_proof/concealed").rglob("*.py"))
+    return [CODE.of(path.relative_to(ROOT)) for path in files]
 
 
 def cases_of(wildcards):
@@ -63,7 +65,7 @@ rule conceal:
         answers=directory("results/sealed/{batch}"),
     params:
         cases=cases_of,
-        concealing=[CODE.of(path) for path in CONCEALING],
+        concealing=code_that_conceals,
         code=code_of("conceal"),
     log:
         "results/logs/conceal/{batch}.log",
@@ -181,7 +183,7 @@ rule prove_next_flight:
         summary="results/proof/next_flight_summary.csv",
     params:
         so_far="results/next_flight/rows.csv",
-        concealing=[CODE.of(path) for path in CONCEALING],
+        concealing=code_that_conceals,
         code=code_of("prove_next_flight"),
     log:
         "results/logs/prove_next_flight.log",
@@ -203,7 +205,7 @@ rule prove_changes:
         so_far="results/changes/rows.csv",
         recordings="results/recordings",
         seed=CONFIG.proof.release or "development",
-        concealing=[CODE.of(path) for path in CONCEALING],
+        concealing=code_that_conceals,
         code=code_of("prove_changes"),
     log:
         "results/logs/prove_changes.log",
@@ -220,7 +222,7 @@ rule prove_fleet:
     params:
         so_far="results/changes/fleet.csv",
         seed=CONFIG.proof.release or "development",
-        concealing=[CODE.of(path) for path in CONCEALING],
+        concealing=code_that_conceals,
         code=code_of("prove_fleet"),
     log:
         "results/logs/prove_fleet.log",
@@ -238,7 +240,7 @@ rule prove_next_session:
     params:
         so_far="results/next_flight/rows_stands.csv",
         release=CONFIG.proof.release or "development",
-        concealing=[CODE.of(path) for path in CONCEALING],
+        concealing=code_that_conceals,
         code=code_of("prove_next_session"),
     log:
         "results/logs/prove_next_session.log",

@@ -59,7 +59,7 @@ NOTICE = (
 )
 
 
-ORIGIN = in_words(ROOT, code_of("judge"))
+ORIGIN = in_words(ROOT, CODE.of("workflow/scripts/judge.py"))
 
 
 def kinds_lacking(chapter):

@@ -50,6 +50,8 @@ rule simulate_attitude:
         code=code_of("simulate_attitude"),
     log:
         "results/logs/simulate_attitude.log",
+    # First of all: the simulator is compiled once, and kept for whatever else flies.
+    priority: 1
     script:
         "../scripts/simulate_attitude.py"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.identify.blackbox import models
 from rotorid.identify.blackbox.compare import TrainingRange, conformal_coverage, folds, out_of_fold, scores
@@ -82,7 +82,7 @@ def main(
             "mean_coverage": float(coverage.mean()),
         }
     _, effects, errors = models.fit_white_box_effects(vehicle, table)
-    half = student_t.ppf(0.975, found["experiments"] - 1) * errors
+    half = student_quantile(found["experiments"] - 1, 0.975) * errors
     found["effects"] = {
         name: {"value": value, "interval_95": [value - width, value + width]}
         for name, value, width in zip(models.EFFECT_PARAMETERS, effects.tolist(), half.tolist(), strict=True)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtr
 
 from rotorid.identify.rotor.campaign import COLUMNS, thrust_points, torque_points
 from rotorid.identify.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
@@ -49,7 +49,7 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "thesis": believed,
         "difference": plain.value / believed - 1,
         "standard_errors_off": (plain.value - believed) / plain.standard_error,
-        "p_value": float(2 * student_t.sf(abs(plain.value - believed) / plain.standard_error, plain.freedom)),
+        "p_value": float(2 * stdtr(plain.freedom, -(abs(plain.value - believed) / plain.standard_error))),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
         "interval_95_own_noise": own_noise.interval_95,
         "noise": asdict(sample_noise(points)),

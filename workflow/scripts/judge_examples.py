@@ -37,14 +37,17 @@ def piece(recordings: RecordingSet, flights: Sequence[str], start_s: float, stop
     return RecordingSet(recordings.name, recordings.vehicle, tuple(runs), (flights[-1],))
 
 
-def recorded(case: str) -> RecordingSet:
-    """A set recorded by the simulators of `proof/rotorid_proof/concealed`; the answer is thrown away."""
+def recorded(wanted: Mapping[str, str]) -> dict[str, RecordingSet]:
+    """Sets recorded by the simulators of `proof/rotorid_proof/concealed`, cases by name; answers are thrown away."""
     from rotorid_proof.concealed import build, cases
 
-    wanted = {known.name: known for known in cases.all_cases()}[case]
+    known = {case.name: case for case in cases.all_cases()}
+    sets = {}
     with tempfile.TemporaryDirectory() as folder:
-        answer = build.build(wanted, Path(folder) / "sets", Path(folder) / "answers")
-        return read_set(Path(folder) / "sets" / answer.stem)
+        for name, case in wanted.items():
+            answer = build.build(known[case], Path(folder) / "sets", Path(folder) / "answers")
+            sets[name] = read_set(Path(folder) / "sets" / answer.stem)
+    return sets
 
 
 def rows_of(example: str, verdict: Mapping[str, Any]) -> tuple[list[dict], list[dict], list[dict]]:
@@ -72,7 +75,7 @@ def main(flights: str, real: Mapping[str, Any], cases: Mapping[str, str], out: M
     channels, effects, locations, traces = [], [], [], []
     report = read_report(Path(flights))
     state["real_available"], state["real_missing"] = report["available"], report["reason"]
-    sets = {name: recorded(case) for name, case in cases.items()}
+    sets = recorded(cases)
     if report["available"]:
         sets = {"real": piece(read_set(Path(flights)), **real)} | sets
     for name, recordings in sets.items():

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify.bench import matrix, static
-from rotorid.identify.bench.prepare import CELLS, FORCES
+from rotorid.identify.bench.channels import CELLS, FORCES
 from rotorid.identify.bench.recalibrate import line_of
 from rotorid.identify.bench.reconstruct import read_geometry
 from rotorid.io.tables import read_sessions

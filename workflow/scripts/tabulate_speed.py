@@ -20,7 +20,7 @@ COLUMNS = {
     "selection": ["hidden", "flights", "columns", "making", "pysindy", "search", "analysis", "found_by", "found"],
     "importing": ["log", "size_mb", "plain", "ours", "beyond", "outcome"],
     "mismatch": ["recording", "samples", "analysis_s", "per_second", "memory_mb", "found"],
-    "rebuild": ["what", "processor", "wall"],
+    "rebuild": ["what", "processor_before", "processor", "wall_before", "wall"],
     "fleet": ["what", "amount"],
     "fem": ["what", "coarse", "full"],
 }

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from rotorid.identify.estimate.consistency import check_consistency
 from rotorid.identify.estimate.inertial import (
@@ -48,7 +48,7 @@ def consistency(weights, covariance) -> dict:
         "z": (found.gap / found.sigma).tolist(),
         "statistic": found.statistic,
         # Only noise so many times larger than assumed would leave the relations in doubt at 5 %.
-        "noise_factor": float(np.sqrt(found.statistic / chi2.ppf(0.95, 3))),
+        "noise_factor": float(np.sqrt(found.statistic / chdtri(3, 1 - 0.95))),
         "p_value": found.p_value,
     }
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -209,11 +210,11 @@ class Form:
             out[self.linear.index(index)] /= 1.0 - fitted[self.linear.index(scale)]
         return out
 
-    @property
+    @cached_property
     def linear(self) -> tuple[int, ...]:
         return tuple(i for i, p in enumerate(self.parameters) if not p.nonlinear)
 
-    @property
+    @cached_property
     def nonlinear(self) -> tuple[int, ...]:
         return tuple(i for i, p in enumerate(self.parameters) if p.nonlinear)
 

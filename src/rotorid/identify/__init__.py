@@ -3,6 +3,7 @@
 OPEN = (
     "autopilot.parameters",
     "bench.calibration_flags",
+    "bench.channels",
     "bench.dynamic",
     "bench.loadcell",
     "bench.matrix",

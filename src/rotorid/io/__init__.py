@@ -9,6 +9,7 @@ OPEN = (
     "logs",
     "metadata_checksum",
     "models",
+    "public_list",
     "rawlog",
     "sequence",
     "session",

@@ -39,7 +39,6 @@ OPEN = (
     "importers.guessing.guess",
     "importers.guessing.text",
     "importers.logfile",
-    "importers.manifest",
     "importers.mapping",
     "importers.neurobem",
     "importers.obtain",

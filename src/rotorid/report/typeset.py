@@ -71,12 +71,17 @@ def without_gaps(document: Document, out: str | Path) -> None:
     Each chapter begins a page of its own, so that one figure of each is tried in every round; what fills most stays.
     """
     later: dict[str, int] = {}
+    written: dict[str, int] | None = None
+    found: list[Gap] = []
     seen: dict[str, dict[int, float]] = {}
     settled: set[str] = set()
     for _ in range(ROUNDS):
-        typst_source(document, out, later)
+        moved = {name: steps for name, steps in later.items() if steps}
+        if moved != written:
+            typst_source(document, out, moved)
+            written, found = moved, gaps(out)
         tried: set[int] = set()
-        for gap in gaps(out):
+        for gap in found:
             name, steps = gap.identifier, later.get(gap.identifier, 0)
             if name in settled or gap.chapter in tried:
                 continue

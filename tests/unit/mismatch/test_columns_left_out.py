@@ -7,10 +7,10 @@ import functools
 import pytest
 
 from rotorid.errors import InputError
+from rotorid.io.public_list import of_one_motor
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.manifest import of_one_motor
 from rotorid.recordings.importers.obtain import obtain
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build
 from rotorid.report.deliver import judge

@@ -76,7 +76,7 @@ def fly(
     size = physics.state_size(n)
     out = np.zeros((k, size + 10 + 3 * n))
     done = physics.fly(
-        physics.to_tuple(values),
+        physics.to_record(values),
         airframe.step_s,
         reference.position_m,
         reference.velocity_m_s,

@@ -66,7 +66,7 @@ def rotor_drag(w, x, h, rng) -> Truth:
         w.values["blade_sideforce"] = x
         _blades(w)
         v, s = 3.0, a.hover_speed_rad_s
-        k = x * physics.blade_forces(s, 0.0, v, physics.to_tuple(w.values))[1] / (s * v)
+        k = x * physics.blade_forces(s, 0.0, v, physics.to_record(w.values))[1] / (s * v)
         return [("k_d", k, "N/(rad/s m/s)")]
     k = 0.35 * a.mass_kg / (a.n * a.hover_speed_rad_s) * x
     w.values["drag_w"] = k
@@ -82,7 +82,7 @@ def _blades(w) -> None:
     low, high = 0.0, 1.0
     for _ in range(50):
         w.values["blade_pitch"] = 0.5 * (low + high)
-        thrust, _ = physics.blade_forces(s, 0.0, 0.0, physics.to_tuple(w.values))
+        thrust, _ = physics.blade_forces(s, 0.0, 0.0, physics.to_record(w.values))
         low, high = (
             (w.values["blade_pitch"], high) if thrust < a.thrust_coefficient * s * s else (low, w.values["blade_pitch"])
         )
@@ -102,7 +102,7 @@ def translational_lift(w, x, h, rng) -> Truth:
         w.values["blade_edge"] = x
         _blades(w)
         v, s = 5.0, w.airframe.hover_speed_rad_s
-        thrust, _ = physics.blade_forces(s, 0.0, v, physics.to_tuple(w.values))
+        thrust, _ = physics.blade_forces(s, 0.0, v, physics.to_record(w.values))
         return [("k_h", x * (thrust - w.airframe.thrust_coefficient * s * s) / v**2, "N/(m/s)^2")]
     k = 0.009 * w.airframe.mass_kg / w.airframe.n * x
     w.values["lift"] = k
@@ -115,7 +115,7 @@ def axial_inflow(w, x, h, rng) -> Truth:
         w.values["blade_inflow"] = x
         _blades(w)
         v, s = 1.0, a.hover_speed_rad_s
-        values = physics.to_tuple(w.values)
+        values = physics.to_record(w.values)
         rise = physics.blade_forces(s, v, 0.0, values)[0] - physics.blade_forces(s, -v, 0.0, values)[0]
         return [("k_z", x * rise / (2 * v * s), "N/(rad/s m/s)")]
     k = 0.5 * a.mass_kg / (a.n * a.hover_speed_rad_s) * x

@@ -6,8 +6,6 @@ effects are zero by default: then the vehicle is a rigid body with F = C_F w^2, 
 equal to the command at once.
 """
 
-from collections import namedtuple
-
 import numpy as np
 from numba import njit
 
@@ -80,27 +78,8 @@ _VECTORS = dict(
     field=3,
     anchor=3,
 )
-_FIELDS = (
-    [
-        "mass",
-        "inertia",
-        "gravity",
-        "position",
-        "axis",
-        "spin",
-        "cf",
-        "cq",
-        "radius",
-        "jr",
-        "tau_up",
-        "tau_down",
-        "cells",
-    ]
-    + ["believed_mass", "believed_inertia", "mixer", "max_speed", "hover_speed", "hover_inflow"]
-    + list(_SCALARS)
-    + list(_VECTORS)
-)
-Physics = namedtuple("Physics", _FIELDS)
+MOST_ROTORS = 8
+_OF_ROTORS = ("position", "axis", "spin", "cf", "cq", "tau_up", "tau_down", "mixer")
 
 
 def clean_physics(a: Airframe) -> dict:
@@ -140,6 +119,31 @@ def clean_physics(a: Airframe) -> dict:
 @njit(cache=True)
 def _cross(a, b):
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@njit(cache=True)
+def _times(m, v):
+    """A 3 by 3 matrix times a vector: to compile in a linear-algebra library for it takes longer than to fly."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = m[i, 0] * v[0] + m[i, 1] * v[1] + m[i, 2] * v[2]
+    return out
+
+
+@njit(cache=True)
+def _solve(m, v):
+    """x of m x = v, for a symmetric positive 3 by 3 matrix."""
+    l10, l20 = m[1, 0] / m[0, 0], m[2, 0] / m[0, 0]
+    d1 = m[1, 1] - l10 * m[0, 1]
+    l21 = (m[2, 1] - l20 * m[0, 1]) / d1
+    m12 = m[1, 2] - l10 * m[0, 2]
+    d2 = m[2, 2] - l20 * m[0, 2] - l21 * m12
+    y1 = v[1] - l10 * v[0]
+    x = np.empty(3)
+    x[2] = (v[2] - l20 * v[0] - l21 * y1) / d2
+    x[1] = (y1 - m12 * x[2]) / d1
+    x[0] = (v[0] - m[0, 1] * x[1] - m[0, 2] * x[2]) / m[0, 0]
+    return x
 
 
 @njit(cache=True)
@@ -228,7 +232,7 @@ def _rates(y, target, late_target, wind, ring, slide, phase, P, dy, aux):
     aux: specific force (3), angular acceleration (3), rotor speeds (n), their derivatives (n), current,
     saturated, ground gain, in vortex ring.
     """
-    n = P.spin.shape[0]
+    n = P.rotors
     p, v, q, om = y[0:3], y[3:6], y[6:10], y[10:13]
     o = 13
     wc, wcd = y[o : o + n], y[o + n : o + 2 * n]
@@ -241,7 +245,7 @@ def _rates(y, target, late_target, wind, ring, slide, phase, P, dy, aux):
     bv = y[e + 12 : e + 15]
     R = rotation(q)
     cut = 2 * np.pi * P.command_cut_hz
-    vair = R.T @ (v - wind)
+    vair = _times(R.T, v - wind)
     force = np.zeros(3)
     moment = np.zeros(3)
     current = P.idle_current_a
@@ -341,21 +345,21 @@ def _rates(y, target, late_target, wind, ring, slide, phase, P, dy, aux):
         along_k = abs(vair[k]) if P.frame_per_axis > 0 else speed
         force[k] -= 0.5 * AIR_DENSITY * P.frame_area_m2[k] * along_k * vair[k]
         moment[k] -= P.damping[k] * om[k]
-    moment += _cross(P.magnet, R.T @ P.field)
+    moment += _cross(P.magnet, _times(R.T, P.field))
     # things hanging on the vehicle: forces in world axes at a body point
     for k in range(e + 2, e + 15):
         dy[k] = 0.0
     if P.slung_mass > 0:
         arm = P.slung_point - P.centre_m
-        at = p + R @ arm
-        at_v = v + R @ _cross(om, arm)
+        at = p + _times(R, arm)
+        at_v = v + _times(R, _cross(om, arm))
         d = sp - at
         length = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2) + 1e-9
         unit = d / length
         closing = unit[0] * (sv[0] - at_v[0]) + unit[1] * (sv[1] - at_v[1]) + unit[2] * (sv[2] - at_v[2])
         stiff = P.slung_mass * 6400.0
         tension = max(0.0, stiff * (length - P.slung_length) + P.slung_mass * 40.0 * closing)
-        pull = R.T @ (tension * unit)
+        pull = _times(R.T, tension * unit)
         force += pull
         moment += _cross(arm, pull)
         dy[e + 2 : e + 5] = sv
@@ -368,12 +372,12 @@ def _rates(y, target, late_target, wind, ring, slide, phase, P, dy, aux):
         pull_w[2] = P.tether_weight * max(0.0, -p[2])
         if reach > P.tether_slack:
             pull_w[0:2] = -P.tether_spring * (reach - P.tether_slack) * out / reach
-        pull = R.T @ pull_w
+        pull = _times(R.T, pull_w)
         force += pull
         moment += _cross(P.tether_point - P.centre_m, pull)
     if P.banner > 0:
         size = np.sqrt(bv[0] ** 2 + bv[1] ** 2 + bv[2] ** 2)
-        pull = R.T @ (-P.banner * size * bv)
+        pull = _times(R.T, -P.banner * size * bv)
         force += pull
         moment += _cross(P.banner_point - P.centre_m, pull)
         dy[e + 12 : e + 15] = (v - wind - bv) / P.banner_lag_s
@@ -385,7 +389,7 @@ def _rates(y, target, late_target, wind, ring, slide, phase, P, dy, aux):
         moment[0] += sl[1] * (-P.slosh_mass * acc[2]) - P.slosh_z * spring[1]
         moment[1] += -sl[0] * (-P.slosh_mass * acc[2]) + P.slosh_z * spring[0]
         # the tank sits below the centre of mass and is swung by turning too
-        swing = np.linalg.solve(P.inertia, moment)
+        swing = _solve(P.inertia, moment)
         dy[e + 8 : e + 10] = sld
         dy[e + 10] = -spring[0] / P.slosh_mass - acc[0] - P.slosh_z * swing[1]
         dy[e + 11] = -spring[1] / P.slosh_mass - acc[1] + P.slosh_z * swing[0]
@@ -395,9 +399,9 @@ def _rates(y, target, late_target, wind, ring, slide, phase, P, dy, aux):
         moved = np.zeros(3)
         moved[0] = P.slide_fraction * slide
         moment -= _cross(moved, force)
-    alpha = np.linalg.solve(P.inertia, moment - _cross(om, P.inertia @ om))
+    alpha = _solve(P.inertia, moment - _cross(om, _times(P.inertia, om)))
     dy[0:3] = v
-    dy[3:6] = R @ acc
+    dy[3:6] = _times(R, acc)
     dy[5] += P.gravity
     dy[6] = 0.5 * (-q[1] * om[0] - q[2] * om[1] - q[3] * om[2])
     dy[7] = 0.5 * (q[0] * om[0] + q[2] * om[2] - q[3] * om[1])
@@ -429,7 +433,7 @@ def _rk4(y, h, target, late_target, wind, ring, slide, phase, P, k1, k2, k3, k4,
 def fly(P, h, pref, vref, aref, yawref, att, frac, wind, ring, charge0, out):
     """Closed-loop flight along a reference; out has one row a step: state, aux, rotor phases (n)."""
     steps = pref.shape[0]
-    n = P.spin.shape[0]
+    n = P.rotors
     size = 13 + 5 * n + 17
     y = np.zeros(size)
     y[0:3] = pref[0]
@@ -480,19 +484,15 @@ def fly(P, h, pref, vref, aref, yawref, att, frac, wind, ring, charge0, out):
         right = _cross(down, heading)
         right /= np.sqrt(right[0] ** 2 + right[1] ** 2 + right[2] ** 2)
         ahead = _cross(right, down)
-        Rd = np.zeros((3, 3))
-        Rd[:, 0] = ahead
-        Rd[:, 1] = right
-        Rd[:, 2] = down
-        E = R.T @ Rd
-        err = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]]) + att[k]
+        a1, a2, a3 = _times(R.T, ahead), _times(R.T, right), _times(R.T, down)
+        err = 0.5 * np.array([a2[2] - a3[1], a3[0] - a1[2], a1[1] - a2[0]]) + att[k]
         thrust = -P.believed_mass * (want[0] * R[0, 2] + want[1] * R[1, 2] + want[2] * R[2, 2])
         turn = np.empty(3)
         for a in range(3):
             r = rate if a < 2 else 0.5 * rate
             moment_sum[a] += J[a, a] * r**3 * 0.15 * err[a] * h
             turn[a] = J[a, a] * (r * r * err[a] - 1.7 * r * (om[a] - yaw_rate * R[2, a])) + moment_sum[a]
-        turn += _cross(om, J @ om)
+        turn += _cross(om, _times(J, om))
         authority = 0.25 * P.cq[0] / P.cf[0] * max(thrust, 0.2 * P.believed_mass * P.gravity)
         turn[2] = min(max(turn[2], -authority), authority)
         for i in range(n):
@@ -520,9 +520,20 @@ def fly(P, h, pref, vref, aref, yawref, att, frac, wind, ring, charge0, out):
     return steps
 
 
-def to_tuple(values: dict) -> Physics:
-    """Freeze a parameter dict for the compiled code."""
-    return Physics(**{k: np.ascontiguousarray(x, float) if np.ndim(x) else float(x) for k, x in values.items()})
+def to_record(values: dict) -> np.void:
+    """Freeze a parameter dict for the compiled code: as a record, which is handed on by its address."""
+    found = {}
+    for name, value in values.items():
+        value = np.asarray(value, float)
+        if name in _OF_ROTORS:  # one layout for vehicles with any number of rotors
+            value = np.concatenate([value, np.zeros((MOST_ROTORS - len(value), *value.shape[1:]))])
+        found[name] = value
+    layout = [("rotors", "i8")] + [(name, "f8", value.shape) for name, value in found.items()]
+    record = np.zeros(1, np.dtype(layout, align=True))
+    for name, value in found.items():
+        record[name] = value
+    record["rotors"] = len(values["spin"])
+    return record[0]
 
 
 def state_size(n: int) -> int:

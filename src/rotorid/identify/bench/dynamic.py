@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.io.tables import by_recording
@@ -138,7 +138,7 @@ def ratios(levels: pd.DataFrame, base: str = "al") -> list[dict]:
         slope = float(x @ y / (x @ x))
         freedom = len(x) - len(means) - 1
         error = np.sqrt(np.sum((y - slope * x) ** 2) / freedom / (x @ x))
-        half = float(student_t.ppf(0.975, freedom) * error)
+        half = float(student_quantile(freedom, 0.975) * error)
         out.append(
             {
                 "platform": platform,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 
@@ -37,7 +37,7 @@ class LineFit:
 
     def interval(self, which: int, level: float = 0.95) -> tuple[float, float]:
         """Confidence interval of a0 (`which` 0) or a1 (`which` 1)."""
-        half = student_t.ppf(0.5 + level / 2, self.degrees_of_freedom) * np.sqrt(self.covariance[which][which])
+        half = student_quantile(self.degrees_of_freedom, 0.5 + level / 2) * np.sqrt(self.covariance[which][which])
         centre = (self.a0, self.a1)[which]
         return float(centre - half), float(centre + half)
 
@@ -158,5 +158,5 @@ def shared_weight_error(
             raise InputError("the weight in question must be part of some loads and not of others")
         found.append(float(solution[2]))
     mean = float(np.mean(found))
-    half = student_t.ppf(0.975, len(found) - 1) * np.std(found, ddof=1) / np.sqrt(len(found))
+    half = student_quantile(len(found) - 1, 0.975) * np.std(found, ddof=1) / np.sqrt(len(found))
     return SharedWeightError(mean, (mean - float(half), mean + float(half)), tuple(found))

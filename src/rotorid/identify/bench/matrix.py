@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 
@@ -36,7 +36,7 @@ class Calibration:
 
     def response_interval(self, level: float = 0.95) -> np.ndarray:
         """Half widths of the intervals of R, V/N, shape (6, 3)."""
-        quantile = student_t.ppf(0.5 + level / 2, self.degrees_of_freedom)
+        quantile = student_quantile(self.degrees_of_freedom, 0.5 + level / 2)
         return quantile * np.outer(self.residual_v, np.sqrt(np.diag(self.response_covariance)))
 
     def force_covariance(self, force_n: np.ndarray, noise_v: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.identify.bench.loadcell import LineFit, fit_line
 
@@ -72,7 +72,7 @@ def find(x: Sequence[float], y: Sequence[float], tests: int, level: float = LEVE
 
 def _limit(freedom: int, tests: int, level: float) -> float:
     """Student's t that none of `tests` residuals exceeds but in a share `level` of cases."""
-    return float(student_t.isf(level / (2 * tests), freedom))
+    return float(-student_quantile(freedom, level / (2 * tests)))
 
 
 def _studentised(x: np.ndarray, y: np.ndarray, kept: np.ndarray, floor: float) -> np.ndarray:

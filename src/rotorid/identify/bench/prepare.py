@@ -12,14 +12,13 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
+from rotorid.identify.bench.channels import CELLS, FORCES
 from rotorid.io.tables import by_recording
 from rotorid.recordings.signal import filters
 
 SPIKE = 16
 SETTLING_SAMPLES = 10
 """Fig. 2.35: so many samples let the spikes of switching on dissipate."""
-CELLS = tuple(f"cell_{i}_v" for i in range(1, 7))
-FORCES = ("force_x_n", "force_y_n", "force_z_n")
 
 
 @dataclass(frozen=True)

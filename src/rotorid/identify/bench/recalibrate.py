@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
+from rotorid.identify.bench.channels import CELLS
 from rotorid.identify.bench.loadcell import LineFit, fit_line
-from rotorid.identify.bench.prepare import CELLS
 from rotorid.io.tables import by_recording
 
 FEWEST_STEADY = 50
@@ -97,7 +97,7 @@ def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> Metrolog
     volts = reading * 1e-5
     share = float(growth @ volts / (volts @ volts))
     left = growth - share * volts
-    half = student_t.ppf(0.975, len(volts) - 1) * np.sqrt(left @ left / (len(volts) - 1) / (volts @ volts))
+    half = student_quantile(len(volts) - 1, 0.975) * np.sqrt(left @ left / (len(volts) - 1) / (volts @ volts))
     return Metrology(
         line=line,
         linearity_gf=float(np.abs(off).max()),
@@ -116,7 +116,7 @@ def _mean_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
     values = np.asarray(values, float)
     if len(values) < 2:
         return float("nan"), (float("nan"), float("nan"))
-    half = student_t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
+    half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
     return float(values.mean()), (float(values.mean() - half), float(values.mean() + half))
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench.prepare import CELLS, FORCES
+from rotorid.identify.bench.channels import CELLS, FORCES
 from rotorid.identify.bench.reconstruct import GF_N, Geometry, cell_forces, forces
 from rotorid.io.tables import by_recording
 from rotorid.recordings import columns as c
@@ -62,7 +62,7 @@ def bench_set(
     Parameters
     ----------
     prepared, sessions
-        Of that platform, from `rotorid.identify.bench.prepare` and `rotorid.io.tables`.
+        Of that platform, from `rotorid.identify.bench.channels` and `rotorid.io.tables`.
     force_of
         Force (n, 3), N, of a prepared recording, see `bench_force`.
     noise_n

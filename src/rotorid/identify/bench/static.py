@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.identify.bench.loadcell import LineFit, fit_line
@@ -130,7 +130,7 @@ def by_load(table: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (platform, axis, method, load), part in table.groupby(["platform", "axis", "method", "load_n"]):
         n, spread = len(part), part["error_n"].std(ddof=1)
-        half = student_t.ppf(0.975, n - 1) * spread / np.sqrt(n)
+        half = student_quantile(n - 1, 0.975) * spread / np.sqrt(n)
         mean = part["error_n"].mean()
         rows.append(
             {

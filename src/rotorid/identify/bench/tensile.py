@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.identify.bench.loadcell import fit_line
@@ -166,7 +166,7 @@ def by_infill(table: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
         row = {"infill_percent": infill, "specimens": len(part)}
         for name in ("modulus_gpa", "strength_mpa", "yield_mpa"):
             values = part[name]
-            half = student_t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
+            half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
             row |= {
                 name: values.mean(),
                 f"{name}_low_95": values.mean() - half,

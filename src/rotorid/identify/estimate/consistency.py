@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 
 @dataclass(frozen=True)
@@ -52,4 +52,4 @@ def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> Consistenc
     slope = _slope(weights)
     spread = slope @ covariance @ slope.T
     statistic = float(gap @ np.linalg.solve(spread, gap))
-    return Consistency(weights[:3], implied, gap, np.sqrt(np.diag(spread)), statistic, float(chi2.sf(statistic, 3)))
+    return Consistency(weights[:3], implied, gap, np.sqrt(np.diag(spread)), statistic, float(chdtrc(3, statistic)))

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.effects.compiling import compiled
 from rotorid.identify.estimate.inertial import weights_of_inertias
@@ -131,7 +131,8 @@ class OutputErrorFit:
     @property
     def inertia_intervals_95(self) -> np.ndarray:
         """(3, 2), kg m2."""
-        half = student_t.ppf(0.975, max(self.windows - len(self.parameters), 1)) * np.sqrt(np.diag(self.covariance)[:3])
+        freedom = max(self.windows - len(self.parameters), 1)
+        half = student_quantile(freedom, 0.975) * np.sqrt(np.diag(self.covariance)[:3])
         return np.exp(self.parameters[:3, None] + half[:, None] * np.array([-1.0, 1.0]))
 
 

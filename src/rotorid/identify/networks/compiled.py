@@ -22,10 +22,12 @@ def batch_epochs(
     biases = tuple(np.zeros(0) if b is None else b.copy() for b in network.biases)
     masks = tuple(np.zeros((0, 0)) if m is None else np.ascontiguousarray(m.T, dtype=float) for m in network.masks)
     codes = tuple(CODES[a.name] for a in network.activations)
-    values = tuple(np.empty((len(inputs), w.shape[1])) for w in weights)
+    # A layer's values lie sample next to sample, so that one instruction works on several samples.
+    inputs, targets = np.ascontiguousarray(inputs.T), np.ascontiguousarray(targets.T)
+    values = tuple(np.empty((w.shape[1], inputs.shape[1])) for w in weights)
     deltas = tuple(np.empty_like(v) for v in values)
     kept = len(range(-(-first // every) * every, first + epochs, every))
-    history = np.empty((kept + 1, targets.shape[1]))
+    history = np.empty((kept + 1, len(targets)))
     _epochs(weights, biases, masks, codes, inputs, targets, rate, epochs, every, first, values, deltas, history)
     for w, trained in zip(network.weights, weights, strict=True):
         w[...] = trained.T
@@ -37,32 +39,32 @@ def batch_epochs(
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _epochs(weights, biases, masks, codes, inputs, targets, rate, epochs, every, first, values, deltas, history):
-    last, rows, row = len(weights) - 1, len(inputs), 0
+    last, rows, row = len(weights) - 1, inputs.shape[1], 0
     for epoch in range(first, first + epochs):
         for layer in range(last + 1):
             w, b, out = weights[layer], biases[layer], values[layer]
             below = inputs if layer == 0 else values[layer - 1]
-            for i in range(rows):
-                for j in range(w.shape[1]):
-                    out[i, j] = b[j] if len(b) else 0.0
+            for j in range(w.shape[1]):
+                own = out[j]
+                own[:] = b[j] if len(b) else 0.0
                 for k in range(w.shape[0]):
-                    own = below[i, k]
-                    for j in range(w.shape[1]):
-                        out[i, j] += own * w[k, j]
+                    step, given = w[k, j], below[k]
+                    for i in range(rows):
+                        own[i] += step * given[i]
                 if codes[layer] == 1:
-                    for j in range(w.shape[1]):
-                        out[i, j] = 1.0 / (1.0 + np.exp(-out[i, j]))
+                    for i in range(rows):
+                        own[i] = 1.0 / (1.0 + np.exp(-own[i]))
         delta, out = deltas[last], values[last]
-        for j in range(targets.shape[1]):
-            history[-1, j] = 0.0
-        for i in range(rows):
-            for j in range(targets.shape[1]):
-                error = targets[i, j] - out[i, j]
-                history[-1, j] += error * error / rows
-                slope = out[i, j] * (1.0 - out[i, j]) if codes[last] == 1 else 1.0
-                delta[i, j] = error * slope
+        for j in range(targets.shape[0]):
+            summed = 0.0
+            for i in range(rows):
+                error = targets[j, i] - out[j, i]
+                summed += error * error
+                slope = out[j, i] * (1.0 - out[j, i]) if codes[last] == 1 else 1.0
+                delta[j, i] = error * slope
+            history[-1, j] = summed / rows
         if epoch % every == 0:
-            for j in range(targets.shape[1]):
+            for j in range(targets.shape[0]):
                 history[row, j] = history[-1, j]
             row += 1
         for layer in range(last, -1, -1):
@@ -70,21 +72,29 @@ def _epochs(weights, biases, masks, codes, inputs, targets, rate, epochs, every,
             below = inputs if layer == 0 else values[layer - 1]
             if layer > 0:
                 lower = deltas[layer - 1]
-                for i in range(rows):
-                    for k in range(w.shape[0]):
-                        passed = 0.0
-                        for j in range(w.shape[1]):
-                            passed += delta[i, j] * w[k, j]
-                        y = below[i, k]
-                        lower[i, k] = passed * y * (1.0 - y) if codes[layer - 1] == 1 else passed
-            step = rate / rows
-            for i in range(rows):
                 for k in range(w.shape[0]):
-                    own = step * below[i, k]
+                    own, y = lower[k], below[k]
+                    own[:] = 0.0
                     for j in range(w.shape[1]):
-                        w[k, j] += own * delta[i, j]
-                for j in range(len(b)):
-                    b[j] += step * delta[i, j]
+                        back, passed = w[k, j], delta[j]
+                        for i in range(rows):
+                            own[i] += back * passed[i]
+                    if codes[layer - 1] == 1:
+                        for i in range(rows):
+                            own[i] *= y[i] * (1.0 - y[i])
+            step = rate / rows
+            for j in range(w.shape[1]):
+                own = delta[j]
+                for k in range(w.shape[0]):
+                    given, summed = below[k], 0.0
+                    for i in range(rows):
+                        summed += given[i] * own[i]
+                    w[k, j] += step * summed
+                if len(b):
+                    summed = 0.0
+                    for i in range(rows):
+                        summed += own[i]
+                    b[j] += step * summed
             for k in range(len(mask)):
                 for j in range(w.shape[1]):
                     w[k, j] *= mask[k, j]

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.recordings.lost_speeds import lost_speed
@@ -195,7 +195,7 @@ def fit_coefficient(
             force_sd = brentq(lambda sd: fit_at(sd)[2] - freedom, force_sd, ceiling, rtol=1e-3)
         values, covariance, _ = fit_at(force_sd)
         freedoms = np.full(unknowns, float(freedom))
-    half = student_t.ppf(0.975, freedoms) * np.sqrt(np.diag(covariance))
+    half = student_quantile(freedoms, 0.975) * np.sqrt(np.diag(covariance))
     intervals = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
     return CoefficientFit(
         value=float(values[0]),
@@ -227,7 +227,7 @@ def fit_exponent(runs: Sequence[Points]) -> tuple[float, tuple[float, float]]:
     freedom = len(x) - len(group) - 1
     exponent = np.sum(x * y) / np.sum(x**2)
     error = np.sqrt(np.sum((y - exponent * x) ** 2) / freedom / np.sum(x**2))
-    half = student_t.ppf(0.975, freedom) * error
+    half = student_quantile(freedom, 0.975) * error
     return float(exponent), (float(exponent - half), float(exponent + half))
 
 
@@ -254,8 +254,8 @@ def pool(values: Sequence[float], standard_errors: Sequence[float]) -> Pooled:
     tau2 = brentq(excess, 0.0, ceiling, xtol=1e-12 * ceiling) if excess(0.0) > 0 else 0.0
     mean, weight = mean_of(tau2)
     spread = np.sum(weight * (values - mean) ** 2) / ((k - 1) * np.sum(weight))
-    half = student_t.ppf(0.975, k - 1) * np.sqrt(spread)
-    ahead = student_t.ppf(0.975, k - 1) * np.sqrt(tau2 + spread)
+    half = student_quantile(k - 1, 0.975) * np.sqrt(spread)
+    ahead = student_quantile(k - 1, 0.975) * np.sqrt(tau2 + spread)
     return Pooled(
         value=float(mean),
         interval_95=(float(mean - half), float(mean + half)),
@@ -280,7 +280,7 @@ def rest_reading(thrust_n: Sequence[float]) -> dict:
     thrust_n = np.asarray(thrust_n, float)
     if len(thrust_n) < 2:
         return {"mean_n": None, "interval_95_n": None, "points": len(thrust_n)}
-    half = student_t.ppf(0.975, len(thrust_n) - 1) * thrust_n.std(ddof=1) / np.sqrt(len(thrust_n))
+    half = student_quantile(len(thrust_n) - 1, 0.975) * thrust_n.std(ddof=1) / np.sqrt(len(thrust_n))
     mean = float(thrust_n.mean())
     return {
         "mean_n": mean,

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import chi2
-from scipy.stats import f as fisher
+from scipy.special import chdtrc, fdtri
 
 
 @dataclass(frozen=True)
@@ -45,14 +44,14 @@ def sample_noise(points: pd.DataFrame) -> SampleNoise:
     each = variance * (1 / counts + 1 / rest)
     left = value - square * np.sum(square * value / each) / np.sum(square**2 / each)
     total, freedom = float(np.sum(left**2 / each)), len(tests) - 1
-    low, high = fisher.ppf([0.975, 0.025], freedoms[1], freedoms[0])
+    low, high = fdtri(freedoms[1], freedoms[0], [0.975, 0.025])
     return SampleNoise(
         sd=variance**0.5,
         growth=(fast / slow) ** 0.5,
         growth_interval_95=(float((fast / slow / low) ** 0.5), float((fast / slow / high) ** 0.5)),
         chi_square=total,
         freedom=freedom,
-        p_value=float(chi2.sf(total, freedom)),
+        p_value=float(chdtrc(freedom, total)),
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from scipy.optimize import least_squares
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 
@@ -46,7 +46,7 @@ def speed_law(points: pd.DataFrame) -> dict:
     )
     freedom = len(kept) - len(PARAMETERS)
     covariance = np.linalg.inv(fit.jac.T @ fit.jac) * 2 * fit.cost / freedom
-    half = student_t.ppf(0.975, freedom) * np.sqrt(np.diag(covariance))
+    half = student_quantile(freedom, 0.975) * np.sqrt(np.diag(covariance))
     relative = fit.fun * error / speed
     out = {"mean_voltage_v": voltage_v, "residual_rms_relative": float(np.sqrt(np.mean(relative**2)))}
     for name, value, width in zip(PARAMETERS, fit.x.tolist(), half.tolist(), strict=True):

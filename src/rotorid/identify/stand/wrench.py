@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t as student_t
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.identify.stand import plateaus
@@ -52,7 +52,7 @@ class Steady:
     @property
     def half_width_95(self) -> np.ndarray:
         """Half width of the 95 % intervals, shape (6,)."""
-        return student_t.ppf(0.975, self.blocks - 1) * self.error
+        return student_quantile(self.blocks - 1, 0.975) * self.error
 
 
 def steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = None) -> Steady:
@@ -174,7 +174,7 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
     if freedom < 3:
         raise InputError(f"a weight under tilt needs at least four experiments, found {len(rest)}")
     mass = rest[:, 2].mean() / gravity_m_s2
-    mass_half = student_t.ppf(0.975, freedom) * rest[:, 2].std(ddof=1) / np.sqrt(len(rest)) / gravity_m_s2
+    mass_half = student_quantile(freedom, 0.975) * rest[:, 2].std(ddof=1) / np.sqrt(len(rest)) / gravity_m_s2
     pull = mass * gravity_m_s2
     # (R c) × (0, 0, W) = W (c_y', −c_x', 0) with c' = R c
     rows = np.concatenate([pull * np.array([r[1], -r[0]]) for r in rotations])
@@ -185,7 +185,7 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
     # The moments give W c; that the weight itself is known so well only adds to the arm along c.
     mass_share = rest[:, 2].std(ddof=1) / np.sqrt(len(rest)) / pull
     covariance += mass_share**2 * np.outer(centre, centre)
-    half = student_t.ppf(0.975, len(left) - 3) * np.sqrt(np.diag(covariance))
+    half = student_quantile(len(left) - 3, 0.975) * np.sqrt(np.diag(covariance))
 
     def rms(m: float, place: np.ndarray) -> np.ndarray:
         return np.sqrt(((rest - weights(evaluated, m, place, gravity_m_s2)) ** 2).mean(axis=0))

@@ -125,9 +125,10 @@ def _mixture_of_each(runs, loaded, channels):
 
     def contribution(loading, vehicle, values):
         reading = np.zeros((loading.size, 6))
-        for (run, i, j), value in zip(entries, values, strict=True):
+        for at in np.flatnonzero(values):
+            run, i, j = entries[at]
             if loading.run in (run, runs[-1]):
-                reading[:, i] += (value if loading.run == run else -value) * loading.load[:, j]
+                reading[:, i] += (values[at] if loading.run == run else -values[at]) * loading.load[:, j]
         return Contribution(reading=reading)
 
     parameters = tuple(Parameter(f"M_{AXES[i]},{AXES[j]}({run})", "1") for run, i, j in entries)

@@ -6,7 +6,8 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.bench import recalibrate, static
-from rotorid.identify.bench.prepare import CELLS, SPIKE, Filter, prepare
+from rotorid.identify.bench.channels import CELLS
+from rotorid.identify.bench.prepare import SPIKE, Filter, prepare
 from rotorid.identify.bench.reconstruct import GF_N, forces_by_matrix
 from rotorid.identify.bench.recordings import bench_force, bench_set
 from rotorid.io.session import Ended, Setup

@@ -38,7 +38,7 @@ def rates_at(changes, speeds=(1000.0,) * 4, v=(0.0, 0.0, 0.0), omega=(0.0, 0.0, 
     y[13 + 5 * n + 1] = inputs.get("voltage", values["voltage_reference_v"])
     dy, aux = np.zeros_like(y), np.zeros(10 + 2 * n)
     w = np.array(speeds, float)
-    p = physics.to_tuple(values)
+    p = physics.to_record(values)
     wind = np.array(inputs.get("wind", (0.0, 0.0, 0.0)), float)
     physics._rates(y, w, w, wind, np.zeros(n), 0.0, np.zeros(n), p, dy, aux)
     omega = np.array(omega, float)
@@ -82,7 +82,7 @@ def test_free_fall_feels_nothing_and_gains_g():
 
 def _tumble(step_s, duration_s=2.0):
     values = physics.clean_physics(THESIS)
-    p = physics.to_tuple(values)
+    p = physics.to_record(values)
     n, size = 4, physics.state_size(4)
     y = np.zeros(size)
     y[6] = 1.0
@@ -215,7 +215,7 @@ def test_blade_elements_carry_the_vehicle_and_behave_like_a_rotor(vehicle):
     a = AIRFRAMES[vehicle]
     w = World.clean(a)
     CAUSES["rotor_drag"].apply(w, 1.0, Hidden("rotor_drag", form="blade"), np.random.default_rng(0))
-    p, s = physics.to_tuple(w.values), a.hover_speed_rad_s
+    p, s = physics.to_record(w.values), a.hover_speed_rad_s
     still, drag = physics.blade_forces(s, 0.0, 0.0, p)
     assert still == pytest.approx(a.mass_kg * G / a.n, rel=1e-6)
     assert drag == pytest.approx(0.0, abs=1e-9 * still)

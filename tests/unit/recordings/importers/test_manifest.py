@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
+from rotorid.io.public_list import read_manifest
 from rotorid.recordings.importers import public_sets
-from rotorid.recordings.importers.manifest import read_manifest
 
 MANIFEST = Path(__file__).parents[4] / "workflow" / "public_data.yaml"
 

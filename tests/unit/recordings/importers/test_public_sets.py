@@ -12,10 +12,10 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from rotorid.io.public_list import of_one_motor, read_manifest
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
 from rotorid.recordings.importers import overview
-from rotorid.recordings.importers.manifest import of_one_motor, read_manifest
 from rotorid.recordings.importers.obtain import address, obtain, sha256
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build, sets_of
 from rotorid.recordings.importers.report import read_report
