@@ -19,6 +19,8 @@ from rotorid.recordings.importers.manifest import of_one_motor, read_manifest
 from rotorid.recordings.importers.obtain import address, obtain, sha256
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build, sets_of
 from rotorid.recordings.importers.report import read_report
+from rotorid_proof.plantings import sow
+from rotorid_proof.plantings.flights import FLIGHTS as PLANTED
 
 ROOT = Path(__file__).parents[4]
 MANIFEST = read_manifest(ROOT / "workflow" / "public_data.yaml")
@@ -282,3 +284,10 @@ def test_the_tables_of_the_report_count_runs_not_sets_twice(real, tmp_path: Path
     pitch = table[table["fault"] == "pitch not recorded"]
     assert pitch[["source", "runs"]].to_numpy().tolist() == [["crazypad", 16]]
     assert overview.recordings(folders)["runs"].tolist() == [2, 10, 6]
+
+
+@needs_data
+def test_the_list_of_plantings_is_that_of_the_public_sets(real) -> None:
+    for flight in PLANTED:
+        real(flight.set)
+    assert sow.list_text(real.parent) == (ROOT / "workflow/plantings.tsv").read_text()
