@@ -18,7 +18,7 @@ SOURCES := $(shell find Snakefile config.yaml mkdocs.yml pyproject.toml README.m
 	src proof acquire firmware workflow notebooks tests raw docs \
 	-type f ! -path '*/__pycache__/*' ! -path 'firmware/build/*' ! -name '* *' 2>/dev/null)
 
-.PHONY: help report site proof plantings campaign test test-slow check environment lock sbom licences
+.PHONY: help report site proof plantings campaign test test-slow test-tree check environment lock sbom licences
 .DEFAULT_GOAL := help
 
 help: ## say what there is
@@ -58,6 +58,14 @@ $(TESTED): $(READY) $(SOURCES)
 	@$(MAKE) --no-print-directory check
 	@$(BIN)/pytest -m "not slow" -n 2 --dist loadfile
 	@touch $@
+
+# Those that copy the tree, list it or start programs in it, and those of what public sets become.
+TREE := tests/test_tree.py tests/workflow tests/acquire/test_at_the_bench.py tests/unit/cli/test_pages.py \
+	tests/unit/proof/test_plantings.py tests/unit/proof/test_changes_rows.py \
+	tests/unit/recordings/importers/test_public_sets.py
+
+test-tree: $(READY) ## of the checks those that could see what a report leaves in the tree; tests/tree.py holds the others
+	@$(BIN)/pytest -m "not slow" -n 2 --dist loadfile $(TREE)
 
 test-slow: $(READY) ## the tests on whole recordings and whole builds that `make test` leaves out
 	@$(BIN)/pytest -m slow -n 2 --dist loadfile

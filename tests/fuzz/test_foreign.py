@@ -6,9 +6,8 @@ import bz2
 import gzip
 import os
 import struct
-import subprocess
-import sys
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,6 +17,7 @@ from hypothesis import strategies as st
 from rotorid.recordings.importers.guessing.guess import guess
 from rotorid.recordings.importers.logfile import read_log
 from rotorid.recordings.importers.mapping import read_columns
+from tests.forked import Commands, commands
 from tests.fuzz.foreign import SOUND, look, sound
 
 NEEDS = {"log.bbl": "orangebox", "log.bin": "pymavlink", "log.bag": "rosbags", "log.mcap": "rosbags"}
@@ -119,14 +119,13 @@ def bag_bomb() -> bytes:
     return b"#ROSBAG V2.0\n" + record(fields, b" " * (4096 - bare)) + chunk + index + connection + info
 
 
-IMPORT = """
-import re, sys
-from rotorid.cli import app
-try:
-    app(["import", sys.argv[1], "-o", sys.argv[2], "--like", "five-inch"])
-finally:
-    print(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1])
-"""
+@pytest.fixture(scope="module")
+def command(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
+    """The command line, ready to import a log."""
+    folder = tmp_path_factory.mktemp("command")
+    (folder / "log.csv").write_text("time_s,x\n0,0\n")
+    with commands(folder, "import", folder / "log.csv", "-o", folder / "set", "--like", "five-inch") as ready:
+        yield ready
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system says nothing of a process's memory")
@@ -139,16 +138,14 @@ finally:
         ("wide.csv.gz", lambda: gzip.compress(b"time_s,x\n" + b"0,%b\n" % (b"0" * 1000) * 300_000, 1), "unpacks to"),
     ],
 )
-def test_a_bomb_is_refused_with_little_memory(name: str, make, said: str, tmp_path: Path) -> None:
+def test_a_bomb_is_refused_with_little_memory(name: str, make, said: str, tmp_path: Path, command) -> None:
     """Before: a MATLAB file or bag of some megabytes filled three thousand million bytes."""
     pytest.importorskip(NEEDS.get(name, "rotorid"))
     path = tmp_path / name
     path.write_bytes(make())
     assert path.stat().st_size < 10_000_000
-    done = subprocess.run(
-        [sys.executable, "-c", IMPORT, str(path), str(tmp_path / "set")], capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 1 and len(done.stderr.strip().splitlines()) == 1, done.stderr
-    assert str(path) in done.stderr and said in done.stderr, done.stderr
-    assert int(done.stdout) * 1024 < 1_600_000_000
+    done = command.run("import", path, "-o", tmp_path / "set", "--like", "five-inch")
+    assert done.code == 1 and len(done.said.strip().splitlines()) == 1, done.said
+    assert str(path) in done.said and said in done.said, done.said
+    assert done.most_bytes < 1_600_000_000
     assert not (tmp_path / "set").exists()

@@ -5,7 +5,10 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+
+from tests.tree import GUARD
 
 ROOT = Path(__file__).parents[2]
 PARTS = (
@@ -24,6 +27,11 @@ PARTS = (
 )
 
 
+def left_out(folder: str, names: Iterable[str]) -> set[str]:
+    """What is not copied: compiled modules, and sets that somebody has put under raw."""
+    return {name for name in names if name == "__pycache__" or GUARD.output(os.path.join(folder, name))}
+
+
 class Project:
     """The pipeline in a folder of its own, with the small configuration."""
 
@@ -35,7 +43,7 @@ class Project:
             if source.is_symlink():
                 target.symlink_to(os.readlink(source))
             elif source.is_dir():
-                shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+                shutil.copytree(source, target, ignore=left_out)
             elif source.exists():
                 shutil.copy2(source, target)
 

@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -50,11 +51,21 @@ def room(name: str) -> str:
     return ".".join(name.split(".")[: 1 if name.startswith("rotorid_proof") else 2])
 
 
-def imported(path: Path) -> Iterator[str]:
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def imported(path: Path) -> tuple[str, ...]:
     """Modules of the project that a file imports, wherever the import stands, relative ones made absolute."""
+    return tuple(_imported(path))
+
+
+def _imported(path: Path) -> Iterator[str]:
     name = dotted(path)
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in MODULES)
         elif isinstance(node, ast.ImportFrom):
@@ -66,9 +77,10 @@ def imported(path: Path) -> Iterator[str]:
             yield from (name if name in MODULES else base for name in inside if name in MODULES or base in MODULES)
 
 
+@cache
 def stated(name: str, what: str) -> tuple[str, ...]:
     """A tuple of names that a package states, `OPEN` or `ROOMS`; empty where it states none."""
-    for node in ast.parse(MODULES[name].read_text(encoding="utf-8")).body:
+    for node in parsed(MODULES[name]).body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == what:
             return ast.literal_eval(node.value)
     return ()
@@ -113,7 +125,7 @@ def part(name: str) -> str:
 def test_every_part_of_the_mismatch_stage_has_its_place_in_the_order() -> None:
     assert sorted(stated(MISMATCH, "ROOMS")) == sorted({part(name) for name in INSIDE})
     packages = {name for name in INSIDE if MODULES[name].name == "__init__.py"}
-    assert all(ast.get_docstring(ast.parse(MODULES[name].read_text(encoding="utf-8"))) for name in packages)
+    assert all(ast.get_docstring(parsed(MODULES[name])) for name in packages)
 
 
 @pytest.mark.parametrize("name", INSIDE)
@@ -156,15 +168,16 @@ def at_import_time(tree: ast.Module) -> Iterator[str]:
             yield node.module.split(".")[0]
 
 
-def anywhere(tree: ast.Module) -> set[str]:
+@cache
+def anywhere(tree: ast.Module) -> frozenset[str]:
     """Top-level packages that a module imports, wherever the import stands."""
     nodes = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
-    return set(at_import_time(ast.Module(nodes, [])))
+    return frozenset(at_import_time(ast.Module(nodes, [])))
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))
 def test_the_library_knows_neither_workflow_nor_proof_nor_matplotlib(name: str) -> None:
-    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
+    tree = parsed(MODULES[name])
     names = anywhere(tree)
     if not name.startswith("rotorid.acquire"):
         assert not names & {"snakemake", "serial", "papermill", "workflow", "tests"}
@@ -176,7 +189,7 @@ def test_the_library_knows_neither_workflow_nor_proof_nor_matplotlib(name: str) 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "workflow" / "scripts").glob("*.py")), ids=lambda path: path.stem)
 def test_a_script_touches_snakemake_only_when_run_by_it(path: Path) -> None:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = parsed(path)
     outside = [node for node in tree.body if not isinstance(node, ast.If)]
     used = {node.id for part in outside for node in ast.walk(part) if isinstance(node, ast.Name)}
     assert "snakemake" not in used

@@ -33,14 +33,15 @@ def test_no_script_but_these_and_no_module_knows_of_the_sealed_folder(name: str)
 
 
 def test_the_mismatch_stage_does_not_know_that_there_are_answers() -> None:
-    reached = Code(ROOT).reached_modules(ROOT / "workflow/scripts/mismatch.py")
+    code = Code(ROOT)
+    reached = code.reached_modules(ROOT / "workflow/scripts/mismatch.py")
     assert len(reached) > 50
     for path in reached:
         text = path.read_text()
         assert "sealed" not in text and "concealed" not in text, path
-    judging = Code(ROOT).reached_modules(ROOT / "workflow/scripts/judge.py")
+    judging = code.reached_modules(ROOT / "workflow/scripts/judge.py")
     assert {path.stem for path in judging if path.parent.name == "rotorid_proof"} == {"__init__", "judge"}
-    ablating = Code(ROOT).reached_modules(ROOT / "workflow/scripts/ablate.py")
+    ablating = code.reached_modules(ROOT / "workflow/scripts/ablate.py")
     assert {path.stem for path in ablating if path.parent.name == "rotorid_proof"} == {"__init__", "without_rules"}
 
 

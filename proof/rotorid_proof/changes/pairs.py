@@ -114,7 +114,7 @@ def planted(recordings: Path, plantings: Path) -> Iterator[Pair]:
         return Made(base, new, sought, tuple(i for t in truths for i in (*t.names, *t.fair)))
 
     for one in read_list(plantings):
-        if one.family == "pair" or not (recordings / flight(one.flight).set).is_dir():
+        if one.family == "pair" or not (recordings / flight(one.flight).set / "vehicle.yaml").is_file():
             continue
         kind = "planted" if one.size == "large" else "planted, smaller"
         yield Pair(f"{kind}/{one.name}", kind, partial(made, one, None), one.flight)

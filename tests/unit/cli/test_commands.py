@@ -91,7 +91,7 @@ def test_init_writes_any_name_so_that_it_is_read_back(tmp_path: Path, name: str)
     assert name_as_read(tmp_path, name) == name
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.text(min_size=1).filter(str.strip))
 def test_init_writes_every_text_so_that_it_is_read_back(name: str) -> None:
     with TemporaryDirectory() as folder:

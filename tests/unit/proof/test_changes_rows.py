@@ -1,5 +1,7 @@
 """Scoring of comparisons: what counts as named, as wrong and as inside, and the shares by kind."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from rotorid.mismatch.changes.compare import Change, Changes
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run
+from rotorid_proof.changes import pairs
 from rotorid_proof.changes.score import Sought, halves, row_of, some_runs, summary, table
 from tests.unit.mismatch.flights import Flight
 
@@ -68,3 +71,14 @@ def test_halves_hold_every_row_once() -> None:
         assert np.array_equal(np.concatenate([a.time_s, b.time_s]), run.time_s)
         assert abs(len(a.time_s) - len(b.time_s)) <= 1
     assert [type(r) for r in some_runs(whole, ["b"]).runs] == [Run]
+
+
+def test_a_flight_that_could_not_be_had_gives_no_pair(tmp_path: Path) -> None:
+    """Before: the folder that holds the reason alone was taken for a set."""
+    plantings = tmp_path / "plantings.tsv"
+    plantings.write_text("planting\narpl-10/values/mass/large/0\narpl-15/values/mass/large/0\n")
+    for name in ("crazyflie-arpl-log10", "crazyflie-arpl-log15"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "import_report.json").write_text('{"available": false}')
+    (tmp_path / "crazyflie-arpl-log15" / "vehicle.yaml").write_text("name: x\n")
+    assert {pair.name.split("/")[1] for pair in pairs.planted(tmp_path, plantings)} == {"arpl-15"}

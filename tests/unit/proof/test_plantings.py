@@ -265,13 +265,6 @@ def test_the_list_is_long_drawn_once_and_read_as_it_was_written(tmp_path: Path) 
         assert sow.planned(flight(flight_name), kinds) == own
 
 
-@pytest.mark.skipif(
-    not all((ROOT / "results/recordings" / f.set).is_dir() for f in FLIGHTS), reason="not all public sets are imported"
-)
-def test_the_list_is_that_of_the_public_sets() -> None:
-    assert sow.list_text(ROOT / "results/recordings") == (ROOT / "workflow/plantings.tsv").read_text()
-
-
 def test_a_flight_takes_the_middle_of_its_runs(recorded: RecordingSet) -> None:
     short = taken(recorded, replace(flight("neurobem"), seconds=4.0, runs=("run1",)))
     assert [r.name for r in short.runs] == ["run1"]

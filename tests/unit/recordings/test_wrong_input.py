@@ -1,9 +1,7 @@
 """The table of wrong inputs: each is one sentence with file, line or column, what was found and what was expected."""
 
-import resource
-import subprocess
-import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +9,7 @@ import pytest
 from rotorid.errors import InputError
 from rotorid.recordings import read_set
 from rotorid.recordings.sufficient import sufficient
+from tests.forked import Commands, commands
 from tests.unit.recordings.wrong_inputs import Wrong, all_wrong, sound
 
 TABLE = all_wrong()
@@ -53,30 +52,30 @@ BY_COMMAND = (
     "jump of 1e6 s",
     *(wrong.name for wrong in TABLE if " large " in wrong.name),
 )
-CHECK = """
-import re, sys
-from rotorid.cli import app
-try:
-    app(["check", sys.argv[1]])
-finally:
-    # Not resource.getrusage: its maximum is inherited from the process that started this one.
-    print(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1])
-"""
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
+    """The command line, ready to check a set."""
+    folder = tmp_path_factory.mktemp("command")
+    with commands(folder, "check", sound(folder / "set")) as ready:
+        yield ready
 
 
 @pytest.mark.parametrize("name", BY_COMMAND)
-def test_the_command_ends_soon_with_one_sentence_and_little_memory(name: str, tmp_path: Path) -> None:
+def test_the_command_ends_soon_with_one_sentence_and_little_memory(
+    name: str, tmp_path: Path, command: Commands
+) -> None:
     wrong = next(w for w in TABLE if name in w.name)
     folder = sound(tmp_path / "set")
     wrong.spoil(folder)
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    done = subprocess.run([sys.executable, "-c", CHECK, folder], capture_output=True, text=True, timeout=60)
-    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < MOST_S
-    assert done.returncode == 1
-    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    done = command.run("check", folder)
+    assert done.user_s < MOST_S
+    assert done.code == 1
+    assert len(done.said.strip().splitlines()) == 1, done.said
     for words in wrong.said:
-        assert words in done.stderr
-    assert int(done.stdout) * 1024 < MOST_BYTES
+        assert words in done.said
+    assert done.most_bytes < MOST_BYTES
 
 
 NAMES = (

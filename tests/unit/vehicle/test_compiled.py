@@ -165,7 +165,7 @@ def test_all_together_with_wind_and_disturbance(motors):
     how = dict(motors=motors, wind_m_s=np.array([3.0, -1.0, 0.5]), disturbance=Disturbance(0.2, 1e-3, 0.05))
     fast, slow = (
         simulate(
-            VEHICLE, commands(), 0.4, 0.004, start(), effects=several(), rng=np.random.default_rng(2), **how, compiled=c
+            VEHICLE, commands(), 0.2, 0.004, start(), effects=several(), rng=np.random.default_rng(2), **how, compiled=c
         )
         for c in (True, False)
     )
@@ -194,7 +194,7 @@ def test_a_controller_flies_compiled_as_it_is_called(kind):
         simulate(
             VEHICLE,
             pilot,
-            1.0,
+            0.5,
             0.004,
             begin,
             Motors(0.03),
@@ -218,7 +218,7 @@ def test_a_controller_whose_command_was_replaced_is_called():
     np.testing.assert_array_equal(trace.rotor_command, 900.0)
 
 
-def recorded(n=301, dt=0.004):
+def recorded(n=151, dt=0.004):
     """A flight of the array code as a recording."""
     trace = simulate(VEHICLE, Commands(dt * np.arange(n), commands_of(n, dt)), (n - 1) * dt, dt, START_HIGH)
     given = Inputs(trace.rotor_speed[0], wind=np.array([1.0, 2.0, 0.0]))

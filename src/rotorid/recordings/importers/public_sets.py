@@ -221,7 +221,8 @@ PUBLIC_SETS = _public_sets()
 def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: Path) -> Path:
     """Write the set `name` below `parent`; returns its folder.
 
-    Where a file could not be had, the folder holds `import_report.json` alone, which says so.
+    Where a file could not be had, the folder holds `import_report.json` alone, which says so. Until all files are read
+    there is no folder.
 
     Parameters
     ----------
@@ -234,7 +235,6 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
     """
     recipe = PUBLIC_SETS[name]
     folder = Path(parent) / name
-    folder.mkdir(parents=True, exist_ok=True)
     origin = {
         "source": f"https://github.com/{source['repository']} at {source['commit']}",
         "licence": source["licence"],
@@ -243,6 +243,7 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
     lost = [file for file in recipe.files if file not in obtained.files]
     if lost:
         reason = obtained.missing.get(lost[0], f"{lost[0]} is not in the manifest")
+        folder.mkdir(parents=True, exist_ok=True)
         ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(folder)
         return folder
     runs, faults = [], []

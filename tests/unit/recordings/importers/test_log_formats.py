@@ -2,7 +2,10 @@
 formats' own writers, come back in the contract's axes and units."""
 
 import json
+import shutil
 import struct
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -228,30 +231,33 @@ def ros_messages(truth: pd.DataFrame, types, two: bool):
     def vector(kind: str, xyz):
         return made[f"geometry_msgs/msg/{kind}"](x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2]))
 
-    def turned(q):  # FRD to NED into FLU to z up
-        matrix = FLU @ Rotation.from_quat(q[[1, 2, 3, 0]]).as_matrix() @ FLU
-        x, y, z, w = Rotation.from_matrix(matrix).as_quat()
-        return made["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w), matrix
-
+    # FRD to NED into FLU to z up
+    turns = FLU @ Rotation.from_quat(truth[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]]).as_matrix() @ FLU
+    quaternions = Rotation.from_matrix(turns).as_quat()
+    places, moving, rates, forces = (
+        truth[list(names)].to_numpy() @ FLU for names in (c.POSITION, c.VELOCITY, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE)
+    )
+    own = np.einsum("nji,nj->ni", turns, moving)
+    speeds = np.ascontiguousarray(truth[list(SPEEDS)])
     nine, thirty_six = np.zeros(9), np.zeros(36)
-    for _, row in truth.iterrows():
-        ns = int(round((row[c.TIME] + 1_700_000_000) * 1e9))
-        turn, matrix = turned(row[list(c.QUATERNION)].to_numpy())
-        rates, force = FLU @ row[list(c.ANGULAR_VELOCITY)].to_numpy(), FLU @ row[list(c.SPECIFIC_FORCE)].to_numpy()
+    for k, time_s in enumerate(truth[c.TIME]):
+        ns = int(round((time_s + 1_700_000_000) * 1e9))
+        x, y, z, w = (float(v) for v in quaternions[k])
+        turn = made["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)
         yield "/imu", "sensor_msgs/msg/Imu", ns, made["sensor_msgs/msg/Imu"](
-            header=header(ns), orientation=turn, orientation_covariance=nine, angular_velocity=vector("Vector3", rates),
-            angular_velocity_covariance=nine, linear_acceleration=vector("Vector3", force),
+            header=header(ns), orientation=turn, orientation_covariance=nine,
+            angular_velocity=vector("Vector3", rates[k]),
+            angular_velocity_covariance=nine, linear_acceleration=vector("Vector3", forces[k]),
             linear_acceleration_covariance=nine,
         )  # fmt: skip
         pose = made["geometry_msgs/msg/PoseWithCovariance"](
-            pose=made["geometry_msgs/msg/Pose"](
-                position=vector("Point", FLU @ row[list(c.POSITION)].to_numpy()), orientation=turn
-            ),
+            pose=made["geometry_msgs/msg/Pose"](position=vector("Point", places[k]), orientation=turn),
             covariance=thirty_six,
         )
-        own = matrix.T @ FLU @ row[list(c.VELOCITY)].to_numpy()
         twist = made["geometry_msgs/msg/TwistWithCovariance"](
-            twist=made["geometry_msgs/msg/Twist"](linear=vector("Vector3", own), angular=vector("Vector3", rates)),
+            twist=made["geometry_msgs/msg/Twist"](
+                linear=vector("Vector3", own[k]), angular=vector("Vector3", rates[k])
+            ),
             covariance=thirty_six,
         )
         yield (
@@ -265,7 +271,7 @@ def ros_messages(truth: pd.DataFrame, types, two: bool):
             "actuator_msgs/msg/Actuators",
             ns,
             made["actuator_msgs/msg/Actuators"](
-                header=header(ns), position=np.zeros(0), velocity=row[list(SPEEDS)].to_numpy(), normalized=np.zeros(0)
+                header=header(ns), position=np.zeros(0), velocity=speeds[k], normalized=np.zeros(0)
             ),
         )
 
@@ -299,23 +305,38 @@ def write_bag(path: Path, kind: str, truth: pd.DataFrame) -> Path:
     return next(path.glob("*.mcap")) if kind == "mcap" else path
 
 
-@pytest.mark.parametrize("kind", ["bag", "mcap", "folder"])
-def test_ros(tmp_path: Path, kind: str) -> None:
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The bag of the flight in each of its forms, written once."""
     pytest.importorskip("rosbags")
-    path = write_bag(tmp_path / ("flight.bag" if kind == "bag" else "flight"), kind, flown())
+
+    @cache
+    def written(kind: str) -> Path:
+        return write_bag(tmp_path_factory.mktemp(kind) / ("flight.bag" if kind == "bag" else "flight"), kind, flown())
+
+    return written
+
+
+@pytest.mark.parametrize("kind", ["bag", "mcap", "folder"])
+def test_ros(bag, kind: str) -> None:
+    path = bag(kind)
     found = read_log(path)
     assert found.format == "ros"
     (run,) = found.runs.values()
     check_against(run, flown(), (*BODY, *STATE, *SPEEDS), 1e-4)
 
 
+def copied(path: Path, folder: Path) -> None:
+    """A bag's folder once more; of MCAP the file inside is what is imported."""
+    shutil.copytree(path.parent if path.suffix == ".mcap" else path, folder)
+
+
 @pytest.mark.parametrize("kind", ["mcap", "folder"])
-def test_the_folder_of_a_bag_becomes_a_set(tmp_path: Path, monkeypatch, kind: str) -> None:
+def test_the_folder_of_a_bag_becomes_a_set(bag, tmp_path: Path, monkeypatch, kind: str) -> None:
     """Of MCAP and SQLite alike; by default the set does not land among the bag's files."""
-    pytest.importorskip("rosbags")
     from rotorid.recordings import read_set
 
-    write_bag(tmp_path / "flight", kind, flown())
+    copied(bag(kind), tmp_path / "flight")
     before = sorted((tmp_path / "flight").iterdir())
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["import", "flight", "--like", "five-inch", "--mass-kg", "0.7"])
@@ -327,9 +348,8 @@ def test_the_folder_of_a_bag_becomes_a_set(tmp_path: Path, monkeypatch, kind: st
     assert sorted(listed) == [f"flight/{p.name}" for p in before]
 
 
-def test_verdict_takes_the_folder_of_a_bag_for_a_log(tmp_path: Path, monkeypatch) -> None:
-    pytest.importorskip("rosbags")
-    write_bag(tmp_path / "flight", "folder", flown())
+def test_verdict_takes_the_folder_of_a_bag_for_a_log(bag, tmp_path: Path, monkeypatch) -> None:
+    copied(bag("folder"), tmp_path / "flight")
     made = tmp_path / "answer" / "flight" / "vehicle.yaml"
     words = [
         "verdict",

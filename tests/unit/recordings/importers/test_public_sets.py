@@ -5,6 +5,7 @@ import hashlib
 import http.server
 import os
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,11 @@ from rotorid.io.public_list import of_one_motor, read_manifest
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
 from rotorid.recordings.importers import overview
-from rotorid.recordings.importers.obtain import address, obtain, sha256
+from rotorid.recordings.importers.obtain import Obtained, address, obtain, sha256
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build, sets_of
 from rotorid.recordings.importers.report import read_report
+from rotorid_proof.plantings import sow
+from rotorid_proof.plantings.flights import FLIGHTS as PLANTED
 
 ROOT = Path(__file__).parents[4]
 MANIFEST = read_manifest(ROOT / "workflow" / "public_data.yaml")
@@ -117,6 +120,20 @@ def test_a_set_that_cannot_be_had_says_so(tmp_path: Path) -> None:
     assert report["available"] is False
     assert report["reason"].startswith("4 files could not be had: ")
     assert report["licence"].startswith("none stated")
+
+
+def test_an_import_that_stops_while_it_reads_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before: an empty folder stayed, which was taken for a set."""
+
+    def stopped(*_) -> None:
+        assert not (tmp_path / "sets").exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(PUBLIC_SETS, "neurobem", replace(PUBLIC_SETS["neurobem"], read=stopped))
+    found = Obtained("neurobem", tmp_path, PUBLIC_SETS["neurobem"].files, {})
+    with pytest.raises(KeyboardInterrupt):
+        build("neurobem", found, MANIFEST["neurobem"], VEHICLES, tmp_path / "sets")
+    assert not (tmp_path / "sets").exists()
 
 
 def test_the_manifest_and_the_recipes_agree() -> None:
@@ -282,3 +299,10 @@ def test_the_tables_of_the_report_count_runs_not_sets_twice(real, tmp_path: Path
     pitch = table[table["fault"] == "pitch not recorded"]
     assert pitch[["source", "runs"]].to_numpy().tolist() == [["crazypad", 16]]
     assert overview.recordings(folders)["runs"].tolist() == [2, 10, 6]
+
+
+@needs_data
+def test_the_list_of_plantings_is_that_of_the_public_sets(real) -> None:
+    for flight in PLANTED:
+        real(flight.set)
+    assert sow.list_text(real.parent) == (ROOT / "workflow/plantings.tsv").read_text()
