@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-Path = tuple[str, ...]
-"""Names of the steps that are open, the outermost first."""
-Listener = Callable[[Path], None]
+Listener = Callable[[tuple[str, ...]], None]
+"""Takes the names of the steps that are open, the outermost first."""
 
-_open: ContextVar[Path] = ContextVar("open", default=())
+_open: ContextVar[tuple[str, ...]] = ContextVar("open", default=())
 _listener: ContextVar[Listener] = ContextVar("listener", default=lambda path: None)
 
 
@@ -27,11 +26,11 @@ def heard_by(listener: Listener) -> Iterator[None]:
 @contextmanager
 def step(name: str) -> Iterator[None]:
     """A step of that name, as a block or on a function: `@step("searching")`."""
-    path, tell = _open.get(), _listener.get()
-    token = _open.set((*path, name))
-    tell((*path, name))
+    tell, outer = _listener.get(), _open.get()
+    token = _open.set((*outer, name))
+    tell((*outer, name))
     try:
         yield
     finally:
         _open.reset(token)
-        tell(path)
+        tell(outer)

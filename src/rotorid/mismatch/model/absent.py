@@ -21,10 +21,8 @@ from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings import Vehicle
-from rotorid.steps import step
 
 
-@step("how large what was not found may be")
 def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
     """Upper limits of the ids that the fitted runs were tested for and that are not at work, the largest first.
 

@@ -22,10 +22,8 @@ from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import CHANNELS, Rows
 from rotorid.mismatch.plant.speedpath import CommandChain, commanded_path
 from rotorid.mismatch.posterior.status import CLAIMED
-from rotorid.steps import step
 
 
-@step("what each effect explains")
 def without_each(
     found: Fitted, seen: WrenchModel, values: Values, fit: Fit, findings: list[Finding], traces: tuple[Trace, ...]
 ) -> dict[str, tuple[np.ndarray, ...]]:

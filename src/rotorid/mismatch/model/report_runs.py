@@ -22,13 +22,11 @@ from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import RUN_SCALE, Rows, Term
 from rotorid.recordings import RecordingSet, Split
-from rotorid.steps import step
 
 COMPARED = ("rotor_speed", "specific_force", "angular_velocity", "rotation", "velocity", "height", "voltage")
 """Quantities of a stretch that a model may need."""
 
 
-@step("the recordings held out")
 def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: RecordingSet) -> WrenchModel:
     """The model with the rows of every run: those fitted as they were, those held out by the same equations.
 

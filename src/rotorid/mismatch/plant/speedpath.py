@@ -409,7 +409,7 @@ class SpeedSearch:
         outermost = float(self.neutral(form)[0])
         return [np.array([middle + way * (outermost - middle)]) for way in LIMIT_WAYS]
 
-    @step("noise")
+    @step("how large the noise is")
     def rich_noise(self) -> None:
         """Learn the noise from the richest chain: one form of every id, of commands that hold or of smooth ones.
 

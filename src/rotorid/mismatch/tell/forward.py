@@ -100,7 +100,6 @@ def delivered_model(analysis: Analysis) -> Model:
     return model_of(improved_vehicle(analysis), conditions_of(analysis), instruments_of(analysis))
 
 
-@step("reading the vehicle back")
 def prove(analysis: Analysis, reloaded: Model, forward: Forward) -> None:
     """Simulate a model read back from its files; RuntimeError unless it makes the errors stated as `after`."""
     segments = _segments(analysis)

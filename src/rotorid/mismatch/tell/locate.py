@@ -36,7 +36,6 @@ from rotorid.mismatch.plant.regression import autoregression
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.tell.verdict import Location, Regime
 from rotorid.recordings.signal.kernels import causal
-from rotorid.steps import step
 
 FAMILY_ERROR = 0.002
 """Chance of any false interval in a whole set."""
@@ -95,7 +94,6 @@ class Interval:
     """Whether it is the run that matters, and no regime."""
 
 
-@step("where it shows")
 def locate(analysis: Analysis) -> list[Location]:
     """Locations of the mismatch, in the order of channels, runs and time; empty where there is none."""
     segments = segments_of(analysis)
