@@ -45,7 +45,7 @@ def main(out: Path | None, seconds: float) -> None:
         took["reading the set"] = time.process_time() - begin
         begin = time.process_time()
         names = ("verdict.json", "report.html", "improved_vehicle.yaml")
-        stage.deliver(recordings, *(Path(folder) / "out" / name for name in names), progress=lambda text: None)
+        stage.deliver(recordings, *(Path(folder) / "out" / name for name in names))
         whole = time.process_time() - begin
     took["writing, and what is not named"] = whole - sum(took.get(words, 0.0) for words in STEPS.values())
     total = whole + took["starting Python and imports"] + took["reading the set"]

@@ -1,4 +1,4 @@
-"""One thread for linear algebra, and a guard that ends a test which reads the tree's outputs."""
+"""One thread for linear algebra, a guard that ends a test which reads the tree's outputs, no record of the user."""
 
 from __future__ import annotations
 
@@ -31,3 +31,9 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator:
     """Watch a test and its fixtures."""
     with GUARD.watching(item.path):
         return (yield)
+
+
+@pytest.fixture(autouse=True)
+def no_record_of_the_user(monkeypatch, tmp_path_factory) -> None:
+    """Commands run by a test neither read nor write the user's record of earlier runs."""
+    monkeypatch.setattr("rotorid.cli.waiting.record_file", lambda: tmp_path_factory.getbasetemp() / "waiting.json")

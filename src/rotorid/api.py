@@ -24,6 +24,7 @@ from rotorid.recordings.files import check_rotors, usable_runs
 from rotorid.recordings.proposed import proposed_in
 from rotorid.recordings.tables import check_table, numbers
 from rotorid.report.result import FILES, OTHERS, Result
+from rotorid.steps import heard_by
 from rotorid.vehicle.exports import Exported, export_vehicle
 
 Believed = Vehicle | Mapping | str | Path
@@ -61,7 +62,7 @@ def verdict(
     mass_kg, like, mapping
         For logs, as the options of `rotorid import`.
     progress
-        Takes a line for each step.
+        Takes the name of the step whenever it changes.
 
     Returns
     -------
@@ -76,15 +77,14 @@ def verdict(
     # The effects bring a compiler along, whose start takes seconds.
     from rotorid.report.deliver import analysis_of, write_files
 
-    say = progress or (lambda text: None)
     recordings = recording_set(data, vehicle, name=name, held_out=held_out, mass_kg=mass_kg, like=like, mapping=mapping)
-    say(f"{recordings.name}: analysing {len(recordings.runs)} runs")
     # What a module warns of goes to no log here; the verdict itself says what a reader must know.
-    with warnings.catch_warnings(), TemporaryDirectory() as folder:
+    hears = heard_by(lambda path: progress(path[-1]) if progress and path else None)
+    with warnings.catch_warnings(), TemporaryDirectory() as folder, hears:
         warnings.simplefilter("ignore")
         analysis = analysis_of(recordings)
         paths = [Path(folder) / file for file in FILES]
-        found = write_files(analysis, *paths[:3], progress=say)
+        found = write_files(analysis, *paths[:3])
         there = [path for name in (*FILES, *OTHERS) if (path := Path(folder) / name).exists()]
         texts = {path.name: path.read_text(encoding="utf-8") for path in there}
     return Result(found, texts, analysis)

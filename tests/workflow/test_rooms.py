@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[2]
 HOMES = {"rotorid": ROOT / "src", "rotorid_proof": ROOT / "proof"}
 ORDER = (
     "rotorid.errors",
+    "rotorid.steps",
     "rotorid.io",
     "rotorid.recordings",
     "rotorid.effects",

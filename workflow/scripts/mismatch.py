@@ -15,7 +15,7 @@ from rotorid.report.deliver import deliver
 
 def main(folder: str, verdict: str, page: str, improved: str, off: list[str]) -> None:
     """Analyse the set in `folder`, without the rules named in `off`, and write the three files."""
-    deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), log.progress, off)
+    log.progress(deliver(read_set(Path(folder)), Path(verdict), Path(page), Path(improved), off).sentence)
 
 
 if __name__ == "__main__":

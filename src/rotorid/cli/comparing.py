@@ -12,6 +12,7 @@ import typer
 from rotorid.cli.console import one_sentence, progress
 from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set
 from rotorid.errors import InputError
+from rotorid.steps import step
 
 if TYPE_CHECKING:
     from rotorid.recordings import RecordingSet
@@ -59,14 +60,12 @@ def compare(
             raise InputError(
                 f"{sets[0]}: nothing to compare it with; expected two sets or more, the last one in question"
             )
-        with progress(None, quiet) as step:
-            step(f"reading {', '.join(path.name for path in sets)}")
+        with progress("compare", quiet):
             from rotorid.mismatch.changes import as_one, changes_between, words
 
             *known, second = read(sets, mass_kg, like, vehicle, mapping)
-            first = as_one(known)
-            step(f"comparing {second.name} with {first.name}")
-            found = changes_between(first, second)
+            with step("comparing"):
+                found = changes_between(as_one(known), second)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         if out is not None:
             write(out, text)

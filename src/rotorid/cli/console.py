@@ -1,19 +1,21 @@
-"""What every command shares: one sentence for bad input, progress with the time left."""
+"""What every command shares: one sentence for bad input, how far a command is."""
 
 from __future__ import annotations
 
 import errno
 import os
 import sys
-import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 
 import typer
 
+from rotorid.cli.waiting import Waiting, keep, read_record
 from rotorid.errors import InputError
+from rotorid.steps import heard_by
 
 INTERRUPTED = 130
 TRACEBACK = "ROTORID_TRACEBACK"
@@ -58,53 +60,26 @@ def unexpected(error: Exception) -> str:
     )
 
 
-def span(seconds: float) -> str:
-    """`40 s` or `3 min`, for people."""
-    return f"{max(seconds, 1):.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
-
-
 @contextmanager
-def progress(expected_s: float | None, quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """A function that takes a step's name; on a terminal a bar with the time left, else a line a step.
+def progress(command: str, quiet: bool = False) -> Iterator[None]:
+    """Show at which step a command is, since when, and how long is left where earlier runs of it tell.
 
-    All goes to standard error, so that standard output holds results alone.
+    All goes to standard error, so that standard output holds results alone: on a terminal a line that is kept up to
+    date, else a line now and then.
     """
-    if quiet:
-        yield lambda text: None
-    elif not sys.stderr.isatty():
-        start = time.monotonic()
-        if expected_s is not None:
-            typer.echo(f"  about {span(expected_s)} to go", err=True)
-        yield lambda text: typer.echo(f"  {time.monotonic() - start:5.1f} s  {text}", err=True)
-    else:
-        with _bar(expected_s) as step:
-            yield step
-
-
-@contextmanager
-def _bar(expected_s: float | None) -> Iterator[Callable[[str], None]]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.live import Live
     from rich.text import Text
 
-    class Left(ProgressColumn):
-        """Time left by what such recordings cost, in words."""
+    terminal = sys.stderr.isatty()
+    say = None if quiet or terminal else partial(typer.echo, err=True)
+    waiting = Waiting(read_record().get(command, []), say)
 
-        def render(self, task) -> Text:
-            if expected_s is None or task.elapsed is None:
-                return Text("")
-            left = expected_s - task.elapsed
-            return Text(f"about {span(left)} left" if left > 0 else "longer than usual", style="dim")
+    def line() -> Text:
+        return Text(waiting.line(), no_wrap=True, overflow="ellipsis")
 
-    class Share(BarColumn):
-        """The bar follows the clock: the steps differ too much in length to count them."""
-
-        def render(self, task):
-            if expected_s is not None and task.elapsed is not None:
-                task.completed = min(task.elapsed / expected_s, 0.98) * (task.total or 1)
-            return super().render(task)
-
-    columns = [TextColumn("{task.description}"), Share(), TimeElapsedColumn(), Left()]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("reading", total=None if expected_s is None else 1.0)
-        yield lambda text: bar.update(task, description=text)
+    shown = Live(get_renderable=line, console=Console(stderr=True), transient=True) if terminal and not quiet else None
+    with shown or nullcontext(), heard_by(waiting.heard):
+        yield
+    waiting.heard(())
+    keep(command, waiting.done)

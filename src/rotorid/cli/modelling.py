@@ -11,6 +11,7 @@ import typer
 from rotorid.cli.console import one_sentence, progress
 from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
 from rotorid.errors import InputError
+from rotorid.steps import step
 
 
 def model(
@@ -61,9 +62,8 @@ def model(
 
 def write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tuple[list[Path], list[str]]:
     """Judge the set in `folder`, write verdict, export and comparison into `target`; the files, and what to say."""
-    with progress(None, quiet) as step, warnings.catch_warnings():
+    with progress("model", quiet), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        step(f"reading {folder.name}")
         from rotorid.recordings import read_set
 
         recordings = read_set(folder)
@@ -74,10 +74,9 @@ def write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tupl
         from rotorid.vehicle.exports import export_vehicle
         from rotorid.vehicle.exports.gazebo_airframe import gazebo_airframe
 
-        step(f"{recordings.name}: analysing {len(recordings.runs)} runs")
         analysis = analysis_of(recordings)
         files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-        verdict = write_files(analysis, *files, progress=lambda text: None if text.endswith(".") else step(text))
+        verdict = write_files(analysis, *files)
         improved = read_vehicle(files[2])
         exported = gazebo_airframe(improved) if to == "sdf" else export_vehicle(improved, to)
         texts = {exported.file_name: exported.text, **exported.companions}
@@ -88,8 +87,8 @@ def write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tupl
         said = [verdict.sentence, *(f"! {doubt.sentence}" for doubt in verdict.doubts)]
         said += [f"  - not expressed: {sentence}" for sentence in exported.left_out]
         try:
-            step("flying it next to the log")
-            found = next_to_log(analysis, to, exported)
+            with step("flying it next to the log"):
+                found = next_to_log(analysis, to, exported)
         except InputError as error:
             return written, [*said, f"not flown next to the log: {error}"]
         written += comparison(found, target)

@@ -12,6 +12,7 @@ import typer
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
 from rotorid.io.text.names import neighbour
+from rotorid.steps import step
 
 
 def plan(
@@ -49,37 +50,36 @@ def plan(
         if wishes and not flight:
             raise InputError(f"--want: intervals are planned for flights; this verdict is of a {content['kind']}")
         sources = recordings or sets_of(folder, content)
-        with progress(None, quiet) as step, warnings.catch_warnings():
+        with progress("plan", quiet), step("planning"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            step(f"fitting {content['set']} once more")
             source = read_sets(sources)
             if flight:
-                said, files, picture = flight_plan(source, content, allowed, wishes, out or folder / "plan", step)
+                said, files, picture = flight_plan(source, content, allowed, wishes, out or folder / "plan")
             else:
-                said, files, picture = session_plan(source, content, allowed, out or folder / "plan", step)
+                said, files, picture = session_plan(source, content, allowed, out or folder / "plan")
             onto_page(folder / "report.html", source.name, said, picture)
         for line in said:
             typer.echo(line)
         typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
 
 
-def flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder: Path, step):
+def flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder: Path):
     """Plan a flight and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.plan import plan as make_plan
     from rotorid.plan.questions import known_from
     from rotorid.plan.write import text, write
 
-    made = make_plan(known_from(source, content), allowed, wishes, step)
+    made = make_plan(known_from(source, content), allowed, wishes)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.pieces else None
 
 
-def session_plan(source, content: dict, allowed, folder: Path, step):
+def session_plan(source, content: dict, allowed, folder: Path):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.session import known_instrument_from, plan_session
     from rotorid.plan.write_session import text, write
 
-    made = plan_session(known_instrument_from(source, content), allowed, step)
+    made = plan_session(known_instrument_from(source, content), allowed)
     files = write(made, folder)
     return text(made), files, folder / "plan.png" if made.steps else None
 
@@ -168,23 +168,22 @@ def together(
     Example: `rotorid together flights next_flight`
     """
     with one_sentence():
-        from rotorid.io.text.writing import all_or_none
-        from rotorid.plan.together import answers, joined_sets, open_classes
-        from rotorid.recordings import read_set
-        from rotorid.report.deliver import analysis_of, write_files
-
-        sets = [read_set(p) for p in (first, *later)]
-        whole, notes = joined_sets(*sets)
-        target = out or Path(f"{whole.name}-verdict")
-        with progress(None, quiet) as step, warnings.catch_warnings():
+        with progress("together", quiet), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            step(f"{sets[0].name} alone")
-            before = open_classes(analysis_of(sets[0]))
-            step("all together")
+            from rotorid.io.text.writing import all_or_none
+            from rotorid.plan.together import answers, joined_sets, open_classes
+            from rotorid.recordings import read_set
+            from rotorid.report.deliver import analysis_of, write_files
+
+            sets = [read_set(p) for p in (first, *later)]
+            whole, notes = joined_sets(*sets)
+            target = out or Path(f"{whole.name}-verdict")
+            with step("the first set alone"):
+                before = open_classes(analysis_of(sets[0]))
             analysis = analysis_of(whole)
             analysis = type(analysis)(**{**vars(analysis), "notes": (*analysis.notes, *notes)})
             files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-            said = write_files(analysis, *files, lambda text: None if text.endswith(".") else step(text))
+            said = write_files(analysis, *files)
             found = answers(before, analysis.findings)
             with all_or_none(target / "answers.json") as (part,):
                 rows = [{"ids": list(a.ids), "answer": a.answer, "sentence": a.sentence} for a in found]

@@ -13,12 +13,10 @@ import typer
 from rotorid.cli.console import one_sentence, progress
 from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
 from rotorid.errors import InputError
+from rotorid.steps import step
 
 if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Verdict
-
-FIXED_S, PER_SAMPLE_S, MOST_SAMPLES = 5.0, 1.2e-3, 300_000
-"""What a flight costs on one core (benchmarks/mismatch.md): a fixed part, a part a sample, and where it levels off."""
 
 
 def verdict(
@@ -133,32 +131,25 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
 
     if series and not parquet_is_here():
         raise InputError(f"{target / 'series.parquet'}: {NO_PARQUET}")
-    with progress(None, quiet) as step:
-        step(f"reading {folder.name}")
+    # What a module warns of goes to no log here; the verdict itself says what a reader must know.
+    with progress("verdict", quiet), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         from rotorid.recordings import read_set
 
         recordings = read_set(folder)
         # The effects bring a compiler along, whose start takes seconds.
         from rotorid.report.deliver import analysis_of, write_files
 
-    samples = sum(len(run.table) for run in recordings.runs)
-    expected = FIXED_S + PER_SAMPLE_S * min(samples, MOST_SAMPLES) if recordings.vehicle.kind == "flight" else None
-    files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-    # What a module warns of goes to no log here; the verdict itself says what a reader must know.
-    with progress(expected, quiet) as step, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        step(f"{recordings.name}: analysing {len(recordings.runs)} runs")
         analysis = analysis_of(recordings)
-        # The last step reported is the verdict's own sentence, which the caller prints.
-        verdict = write_files(analysis, *files, progress=lambda text: None if text.endswith(".") else step(text))
+        files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
+        verdict = write_files(analysis, *files)
         if series:
             from rotorid.report.result import residuals_of
-
-            write_table(residuals_of(analysis), target / "series.parquet")
             from rotorid.report.series_files import write_viewers
 
-            step("writing the series for viewers")
-            write_viewers(analysis, target)
+            with step("writing the series"):
+                write_table(residuals_of(analysis), target / "series.parquet")
+                write_viewers(analysis, target)
         return verdict
 
 

@@ -6,7 +6,6 @@ in other places; with a known mass attached it is of another one (`rotorid.plan.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +28,7 @@ from rotorid.plan.separation import (
     step_of,
     world_of,
 )
+from rotorid.steps import step
 
 HANDLING_S = 300.0
 """A step by hand takes this long: land, work, take off."""
@@ -82,9 +82,7 @@ def steps_for(known: Known) -> list[tuple[list[Change], list[Question]]]:
     return [(choices, questions) for choices, questions in out if choices]
 
 
-def handled(
-    known: Known, limits: Limits, hover: Piece, least_s: float, still_s: float, progress: Callable[[str], None]
-) -> tuple[Handled, ...]:
+def handled(known: Known, limits: Limits, hover: Piece, least_s: float, still_s: float) -> tuple[Handled, ...]:
     """The best choice of each kind of step, the one with the largest smallest separation first.
 
     The piece `hover` is flown for `least_s` at least, `still_s` at rest before and after; `known` is the set alone.
@@ -92,7 +90,6 @@ def handled(
     found = []
     reference = joined([hover] * int(np.ceil(least_s / (hover.duration_s + still_s))), step_of(known), still_s)
     for choices, questions in steps_for(known):
-        progress(f"predicting by hand: {choices[0].words}")
         made = []
         for change in choices:
             try:
@@ -105,6 +102,7 @@ def handled(
     return tuple(sorted(found, key=lambda h: -(h.sigma or 0.0)))
 
 
+@step("predicting what is changed by hand")
 def of_change(known: Known, limits: Limits, reference, change: Change, questions: list[Question]) -> Questions:
     """Separations of each question's models with the flight after a change."""
     base = of_set(known)

@@ -9,7 +9,7 @@ stated, and by them the best of the three is the plan.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +37,7 @@ from rotorid.plan.separation import (
 )
 from rotorid.plan.simulate import Flown
 from rotorid.recordings import Vehicle
+from rotorid.steps import step
 
 YAW_SHARE = 0.2
 """Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch."""
@@ -150,7 +151,6 @@ def broken(flight: Flown, limits: Limits, vehicle: Vehicle) -> str:
 def tried(
     known: Known,
     limits: Limits,
-    progress: Callable[[str], None] = lambda text: None,
     wishes: Iterable[str] = (),
 ) -> list[Tried]:
     """Every candidate flown in simulation by the model as fitted, as large as the limits allow it to be flown.
@@ -178,7 +178,6 @@ def tried(
         seconds = piece.duration_s + BETWEEN_S
         information = None if reason else of_flights(known, flights, world, terms)
         out.append(Tried(piece, information, seconds, reason))
-        progress(f"flown in simulation: {name}")
     return out
 
 
@@ -196,6 +195,7 @@ def reached(known: Known, base: Information, information: Information, target: f
     return share_reached(sigmas, widths(known, base, information, wishes) if wishes else (), target)
 
 
+@step("choosing")
 def chosen_pieces(
     known: Known, limits: Limits, options: list[Tried], most: int = MOST_PIECES, wishes: dict[str, float] | None = None
 ) -> tuple[list[Tried], list[Tried]]:
@@ -269,6 +269,7 @@ def standard_piece(known: Known, limits: Limits, options: list[Tried], duration_
     return None
 
 
+@step("predicting a flight")
 def forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...], wishes: dict[str, float]) -> Forecast:
     """What is expected of a flight of these pieces; without any, what the set holds. `known` is the set alone.
 
@@ -301,12 +302,11 @@ def forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...],
     return Forecast(name, pieces, reference, flights[0], tuple(questions), tuple(widths(alone, base, after, wishes)))
 
 
-def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes, progress) -> Forecast:
+def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes) -> Forecast:
     """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left.
 
     They are flown for LEAST_S at least: an effect that one pass shows is none that the engine finds wherever it looks.
     """
-    progress(f"predicting the {name} flight")
     pieces = tuple(t.piece for t in taken)
     most = int((limits.duration_s - BETWEEN_S) / max(sum(t.flown_s for t in taken), BETWEEN_S)) if taken else 1
     least = int(np.ceil((LEAST_S - BETWEEN_S) / sum(t.flown_s for t in taken))) if taken else 1
@@ -321,7 +321,6 @@ def plan(
     known: Known,
     limits: Limits,
     wishes: dict[str, float] | None = None,
-    progress: Callable[[str], None] = lambda text: None,
 ) -> Plan:
     """The flight to fly next; without anything to settle, or any manoeuvre that helps, one without pieces."""
     wishes = wishes or {}
@@ -331,18 +330,17 @@ def plan(
     if not known.questions and not known.chains and not wishes:
         return Plan(**vars(forecast(known, limits, "chosen", (), {})), **about, not_testable=reasons)
     quick = expecting_quick(known, limits)
-    options = tried(quick, limits, progress, wishes)
-    progress("choosing")
+    options = tried(quick, limits, wishes)
     taken, judged = chosen_pieces(quick, limits, options, wishes=wishes)
     others = [t for t in judged if not taken or t.piece is not taken[0].piece]
-    found = [expected(known, limits, "chosen", taken, wishes, progress)]
+    found = [expected(known, limits, "chosen", taken, wishes)]
     if taken and (second := chosen_pieces(quick, limits, others, wishes=wishes)[0]):
-        found.append(expected(known, limits, "second", second, wishes, progress))
+        found.append(expected(known, limits, "second", second, wishes))
     longest = found[0].duration_s or limits.duration_s
     if (piece := standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
         found.append(forecast(known, limits, "standard", (piece,), wishes))
     found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
     hover = next((t.piece for t in options if t.piece.name == "hover" and t.information is not None), None)
-    hands = () if hover is None else handled(known, limits, hover, LEAST_S, BETWEEN_S, progress)
+    hands = () if hover is None else handled(known, limits, hover, LEAST_S, BETWEEN_S)
     about |= {"others": tuple(found[1:]), "by_hand": hands, "tried": tuple(judged), "not_testable": reasons}
     return Plan(**vars(found[0]), **about)

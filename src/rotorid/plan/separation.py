@@ -39,6 +39,7 @@ from rotorid.plan.limits import Limits
 from rotorid.plan.questions import Hypothesis, Known, Question
 from rotorid.plan.simulate import Flown, World, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.steps import step
 
 DRAWS = 400
 LEAST_RATE_HZ = 400.0
@@ -183,6 +184,7 @@ def columns_of(known: Known) -> tuple[str, ...]:
     return tuple(n for n in runs[0].table.columns if all(r.has(n) for r in runs))
 
 
+@step("flying a manoeuvre in simulation")
 def flown(world: World, reference: Reference, limits: Limits) -> tuple[Flown, ...]:
     """A reference flown by a competing model, with the loops as stated and slower (SLOWER_LOOPS)."""
     fast, slow = limits.attitude_bandwidth_rad_s, limits.position_bandwidth_rad_s

@@ -47,6 +47,7 @@ from rotorid.plan.together import in_thirds
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
+from rotorid.steps import step
 
 REST_S = 2.0
 """Unloaded before and after every step."""
@@ -297,6 +298,7 @@ def asked(known: KnownInstrument) -> list[Term]:
     return [t for t in known.regression.terms if t.key in wanted]
 
 
+@step("predicting a step")
 def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Information:
     """What the fitted part of a step would hold, in the columns of the set's regression."""
     return of_run(known, Run("planned", table_of(known, step)), terms).share(FITTED_SHARE)
@@ -359,21 +361,18 @@ def standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]
     return once * min(int(limits.duration_s / seconds), MOST_STEPS // len(once)) if once else []
 
 
-def plan_session(
-    known: KnownInstrument, limits: SessionLimits, progress: Callable[[str], None] = lambda text: None
-) -> SessionPlan:
+def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
     """The steps that settle most in the time allowed; none where nothing is open or nothing helps."""
     about = {"set": known.recordings.name, "kind": known.recordings.vehicle.kind, "limits": limits}
     about |= {"unanswerable": known.unanswerable}
     if not known.questions:
         return SessionPlan("chosen", (), (), **about, table=pd.DataFrame())
     terms, tried = asked(known), []
-    for step in options(known, limits):
+    for tested in options(known, limits):
         try:
-            tried.append(Tried(step, of_step(known, step, terms), step.duration_s))
+            tried.append(Tried(tested, of_step(known, tested, terms), tested.duration_s))
         except InputError as error:
-            tried.append(Tried(step, None, step.duration_s, str(error)))
-        progress(f"computed: {step.name}")
+            tried.append(Tried(tested, None, tested.duration_s, str(error)))
     taken, _ = chosen_pieces(known, limits, tried, MOST_STEPS)
     found = [forecast(known, "chosen", taken)]
     rest = [t for t in tried if taken and t.piece is not taken[0].piece]

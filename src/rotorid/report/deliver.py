@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,8 +35,8 @@ from rotorid.mismatch.tell.verdict import Verdict, make_verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, write_vehicle
 from rotorid.recordings.sufficient import sufficient
 from rotorid.report.page.make import make_page
+from rotorid.steps import step
 
-LOG = logging.getLogger(__name__)
 ONE_THREAD = threadpool_limits.wrap(limits=1)
 """The matrices are small: a second thread of the linear algebra costs half as much again and saves no time."""
 
@@ -47,12 +46,10 @@ def deliver(
     verdict_path: Path,
     page_path: Path,
     improved_path: Path,
-    progress: Callable[[str], None] = LOG.info,
     off: Collection[str] = (),
 ) -> Verdict:
     """Analyse a set and write its verdict, its page and the improved vehicle; rules named in `off` are left out."""
-    progress(f"{recordings.name}: analysing {len(recordings.runs)} runs")
-    return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path, progress)
+    return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path)
 
 
 @ONE_THREAD
@@ -64,7 +61,7 @@ def analysis_of(recordings: RecordingSet, off: Collection[str] = (), watch: Watc
     InputError in one sentence where the set does not suffice, or no rule has such a name.
     """
     usable = sufficient(recordings)
-    with rules.asking(off) as asked:
+    with rules.asking(off) as asked, step(f"analysing the {usable.vehicle.kind}"):
         flight = usable.vehicle.kind == "flight"
         analysis = analyse(usable, watch=watch) if flight else analyse_instrument(usable)
     without = tuple(f"Judged without the rule {name}: {rules.RULES[name].decides}" for name in sorted(asked.off))
@@ -108,13 +105,11 @@ def write_files(
     verdict_path: Path,
     page_path: Path,
     improved_path: Path,
-    progress: Callable[[str], None] = LOG.info,
 ) -> Verdict:
     """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
 
     `conditions.yaml` and `instruments.yaml` are written next to the improved vehicle where there is something to write.
     """
-    progress("locating")
     locations = locate(analysis)
     improved = improved_vehicle(analysis)
     others = [improved_path.with_name(name) for name in (CONDITIONS, INSTRUMENTS)]
@@ -132,7 +127,6 @@ def write_files(
         )
         reloaded = read_vehicle(improved_part)
         if analysis.instrument is None:
-            progress("running the simulation forward")
             forward = forward_channels(analysis)
             prove(analysis, model_of(reloaded, conditions, instruments), forward)
         else:
@@ -142,7 +136,5 @@ def write_files(
         verdict_part.write_text(verdict.text(), encoding="utf-8")
         decided = ledger(analysis, verdict)
         ledger_part.write_text(text_of(decided), encoding="utf-8")
-        progress("drawing")
         page_part.write_text(make_page(analysis, verdict, forward.notes, decided), encoding="utf-8")
-    progress(verdict.sentence)
     return verdict

@@ -147,7 +147,7 @@ def test_a_verdict_has_the_bytes_of_the_workflow_and_a_mismatch_is_no_error(flig
     done = run("verdict", flights, "-o", tmp_path / "out", "--json", "-q")
     assert done.exit_code == 0, done.output
     names = ("verdict.json", "report.html", "improved_vehicle.yaml")
-    deliver(read_set(flights), *(tmp_path / "flow" / n for n in names), progress=lambda text: None)
+    deliver(read_set(flights), *(tmp_path / "flow" / n for n in names))
     for name in names:
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "flow" / name).read_bytes()
     assert json.loads(done.stdout)["set"] == "flights"

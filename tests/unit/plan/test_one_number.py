@@ -24,7 +24,7 @@ def verdict(tmp_path_factory) -> Path:
     build(case, folder, folder / "answers")
     out = folder / "verdict"
     paths = [out / name for name in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-    write_files(analysis_of(read_set(folder / case.set_name)), *paths, progress=lambda text: None)
+    write_files(analysis_of(read_set(folder / case.set_name)), *paths)
     return out
 
 

@@ -55,6 +55,7 @@ from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import Statement, parameters, statements_of, widened
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.steps import step
 
 KEYS = {name: key for key, name in NAMES.items()}
 CONTRADICTION_NATS = 32.0
@@ -190,6 +191,7 @@ def changed_effects(reference: Reference, found: Found) -> Effects:
     return out
 
 
+@step("what changed")
 def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:
     """The most probable changes of force, moment and sensors, and where the chain changed those without; best first."""
     first = reference.chain if reference.found.commanded else None
@@ -242,6 +244,7 @@ def most_like(found: Fitted, chain: ChainTerms, variants: Sequence[Sequence[Segm
     return min(known, key=left, default=variants[0])
 
 
+@step("what changed between command and speed")
 def decided_of_speeds(
     found: Fitted, first: ChainTerms | None, both: tuple[Sequence[Segment], Sequence[Segment]], prior: Prior
 ) -> tuple[list[Option], Mapping[str, np.ndarray]] | None:

@@ -38,6 +38,7 @@ from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, evidence
 from rotorid.mismatch.posterior.prior import Prior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.steps import step
 
 Effects = Sequence[tuple[Form, np.ndarray]]
 """Forms with the values of their parameters."""
@@ -123,6 +124,7 @@ class Reference:
     """Mistakes in its recordings, corrected."""
 
 
+@step("the first set")
 def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     """The first set as a verdict fits it, all of its runs."""
     base, mistakes, _ = find_mistakes(replace(base, held_out=()))
@@ -210,6 +212,7 @@ def noisy_evidence(regression: Regression, noise: np.ndarray) -> Evidence:
     return replace(evidence, bias_gram=noise * evidence.blocks.sum())
 
 
+@step("the second set")
 def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
     """Two sets of flights on the same columns: corrected for the second set's mistakes, and as recorded.
 

@@ -19,6 +19,7 @@ from rotorid.mismatch.model.within_trust import ways
 from rotorid.mismatch.plant.channel_errors import growth
 from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import CHANNELS
+from rotorid.steps import step
 
 WORSE_RATIO = 1.01
 """Error over the other model's from which a channel is predicted worse: a percent is what refitting itself moves."""
@@ -107,6 +108,7 @@ def excess(worse: Sequence[Worse]) -> float:
     return float(sum(np.log(w.ratio) for w in worse))
 
 
+@step("what may be delivered")
 def gate(
     model: FittedModel,
     offer: Offer,

@@ -15,6 +15,7 @@ from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.belief import NO_BODY
 from rotorid.recordings.body import body_of, unfit
+from rotorid.steps import step
 from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.vehicle.exports.forms import FORMS, export_vehicle
 from rotorid.vehicle.flyable import flyable
@@ -91,6 +92,7 @@ def full_thrust_n(vehicle: Vehicle) -> float | None:
         return None
 
 
+@step("flying the vehicle in simulation")
 def cannot_fly(vehicle: Vehicle) -> str:
     """Why it does not fly the swings about hover of `rotorid simulate`; empty where it does.
 

@@ -54,6 +54,7 @@ from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.steps import step
 
 LOST_SHARE = 0.15
 """Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained."""
@@ -81,6 +82,7 @@ def one_load(finding: Finding, setup: Setup) -> Finding:
     )
 
 
+@step("searching what acts")
 def first_model(setup: Setup, terms: list[Term]) -> tuple[ReadingModel, ChainResult | None, tuple[Loading, ...] | None]:
     """The model of the reading as the search ends, what lies between command and rotor speed, and the loads by that.
 

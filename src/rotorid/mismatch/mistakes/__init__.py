@@ -7,13 +7,15 @@ from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units
 from rotorid.mismatch.mistakes.dead_voltmeter import connected
 from rotorid.mismatch.mistakes.signals import ReadSet, Result
 from rotorid.recordings import RecordingSet
+from rotorid.steps import step
 
 
+@step("looking for mistakes in the recordings")
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding, ...], tuple[str, ...]]:
     """The set of a vehicle in flight as corrected, what was wrong with it, and notes for the reader."""
     recordings, lost = dropout.find(ReadSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out))
     result = Result(recordings, (lost,) if lost else ())
-    for step in (units.find, connected, axes.find, rotor_layout.find, timing.find, vibration.find):
-        result = result.then(step)
+    for find in (units.find, connected, axes.find, rotor_layout.find, timing.find, vibration.find):
+        result = result.then(find)
     last = result.recordings
     return RecordingSet(last.name, last.vehicle, last.runs, last.held_out), result.findings, result.notes

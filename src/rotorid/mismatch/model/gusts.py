@@ -33,6 +33,7 @@ from rotorid.mismatch.plant.regression import Fit, Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import training_rule
 from rotorid.mismatch.posterior.status import Estimate
+from rotorid.steps import step
 
 KNOT_S, RESTLESS_KNOT_S = 0.3, 1.0
 """Distance of knots in a window, where a gust may set in within a fraction of a second, and where the wind changes
@@ -130,6 +131,7 @@ def blowing(knots_s: np.ndarray, wind_m_s: np.ndarray, time_s: np.ndarray) -> np
     return np.stack([np.interp(time_s, knots_s, w, left=0.0, right=0.0) for w in wind_m_s.T], axis=1)
 
 
+@step("gusts")
 def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> WrenchModel:
     """The model with the gusts that its residual shows; the same model where there are none.
 

@@ -49,6 +49,7 @@ from rotorid.mismatch.plant.unknowns import UNKNOWNS, empirical_effects
 from rotorid.mismatch.plant.voltmeter import without_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
+from rotorid.steps import step
 
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
@@ -232,6 +233,7 @@ def form_terms(effect_id: str, form: Form, suggested: tuple[tuple[float, ...], .
     return terms
 
 
+@step("preparing")
 def prepare(
     recordings: RecordingSet,
     cutoff_hz: float = HIGHEST_CUTOFF_HZ,

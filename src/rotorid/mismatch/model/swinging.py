@@ -20,6 +20,7 @@ from rotorid.mismatch.decision.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.model.wrench import WrenchModel
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.rows import UNKNOWNS_OF_A_STATE, Rows, Term
+from rotorid.steps import step
 
 PIECE_S, PERIODS, SHORTEST_PIECE_S = 5.0, 2.0, 1.2
 """A state is read for so long, and for so many swings at least; where it fails for less, but not for less than this."""
@@ -147,6 +148,7 @@ def cable_of(model: WrenchModel, term: Term) -> Cable:
     return Cable(*(term.values[i] for i in term.form.nonlinear), model.prepared.vehicle.gravity_m_s2)
 
 
+@step("a payload on a cable")
 def with_likely_length(model: WrenchModel, term: Term) -> Term | None:
     """A term on the cable near its own that explains most, the states free; None where nothing seems to swing."""
     cable = likely_cable(cable_of(model, term), stretches_of(model, model.segments, model.rows))

@@ -44,6 +44,7 @@ from rotorid.mismatch.plant.two_sensors import compared_alone
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal.kernels import causal
+from rotorid.steps import step
 from rotorid.vehicle.mixer import wrench_matrix
 
 LONGEST_BLOCKS = 400
@@ -168,6 +169,7 @@ def channel_floor(segments: list[Segment], vehicle: Vehicle) -> np.ndarray:
     return floor
 
 
+@step("searching what acts")
 def wrench_model(
     prepared: Prepared,
     terms: list[Term],
@@ -355,6 +357,7 @@ def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full
     return out
 
 
+@step("from command to rotor speed")
 def speed_path(
     prepared: Prepared,
     known: list[tuple[Form, np.ndarray]] | None = None,
@@ -460,6 +463,7 @@ def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:
     return found
 
 
+@step("refining")
 def refine_nonlinear(prepared: Prepared, model: WrenchModel, segments, wide: bool) -> dict[str, np.ndarray]:
     """Best nonlinear parameters of the active terms by a profile over each (others linear, free), bounded.
 
@@ -579,6 +583,7 @@ def in_wind(segments: list[Segment], wind: np.ndarray) -> list[Segment]:
     return [replace(s, motion=replace(s.motion, wind=air)) for s in segments]
 
 
+@step("wind")
 def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
     """The model with drag and lift built on airspeed, where a steady wind and drag were both found.
 

@@ -24,6 +24,7 @@ from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
 from rotorid.recordings.signal import kernels
 from rotorid.recordings.signal.kernels import causal
+from rotorid.steps import step
 
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0
@@ -408,6 +409,7 @@ class SpeedSearch:
         outermost = float(self.neutral(form)[0])
         return [np.array([middle + way * (outermost - middle)]) for way in LIMIT_WAYS]
 
+    @step("how large the noise is")
     def rich_noise(self) -> None:
         """Learn the noise from the richest chain: one form of every id, of commands that hold or of smooth ones.
 
@@ -581,6 +583,7 @@ class SpeedSearch:
         values = np.delete(fit.values, np.arange(where.start, where.stop))
         return self.problem.fit(chain, values, fit.shift_s)
 
+    @step("other forms")
     def _better_forms(self, fit: SpeedFit) -> SpeedFit:
         """Try the other forms of each id in the chain; the cheapest for its parameters stays."""
         for key in [k for k, _ in fit.chain]:
@@ -598,6 +601,7 @@ class SpeedSearch:
             fit = best
         return fit
 
+    @step("less what does not hold")
     def _pruned(self, fit: SpeedFit, dropped: dict[str, str]) -> tuple[SpeedFit, dict[str, SpeedFit]]:
         """The chain less what does not hold, and to each id that stays the chain fitted without it."""
         changed, bases = True, {}
@@ -616,6 +620,7 @@ class SpeedSearch:
                     break
         return fit, bases
 
+    @step("what else would do")
     def _alternatives(self, fit: SpeedFit, base: SpeedFit, key: str) -> tuple[str, ...]:
         """Ids that explain as much in the place of `key`: not worse by more than a coin's doubt."""
         own = base.cost - fit.cost

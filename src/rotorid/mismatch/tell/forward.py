@@ -28,6 +28,7 @@ from rotorid.mismatch.plant.motion import Segment, SensorNoise
 from rotorid.mismatch.plant.speedpath import commanded_path
 from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors
 from rotorid.recordings import Vehicle
+from rotorid.steps import step
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
 
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
@@ -53,6 +54,7 @@ class WindowErrors:
     channels: dict[str, np.ndarray]
 
 
+@step("running the simulation forward")
 def forward_channels(analysis: Analysis) -> Forward:
     """Errors of every channel that the recording allows, for the three models."""
     vehicle = analysis.recordings.vehicle

@@ -47,6 +47,7 @@ from rotorid.mismatch.tell.verdict import (
 )
 from rotorid.recordings import RecordingSet
 from rotorid.report.page.data import page_data
+from rotorid.steps import step
 
 WORDS = {
     "no_mismatch": "no mismatch",
@@ -71,6 +72,7 @@ def page_file(name: str) -> str:
     return files("rotorid.report.page").joinpath("files", name).read_text(encoding="utf-8")
 
 
+@step("drawing")
 def make_page(
     analysis: Analysis,
     verdict: Verdict,

@@ -160,7 +160,7 @@ def test_a_warning_is_on_the_page_on_the_screen_and_in_the_file(tmp_path, monkey
     def deliver(folder, target, quiet, series=False):
         target.mkdir()
         names = ("verdict.json", "report.html", "improved_vehicle.yaml")
-        return write_files(analysis, *(target / name for name in names), progress=lambda text: None)
+        return write_files(analysis, *(target / name for name in names))
 
     monkeypatch.setattr(verdicts, "deliver_set", deliver)
     done = CliRunner().invoke(app, ["verdict", str(folder), "-q", "-o", str(tmp_path / "out")])

@@ -32,7 +32,7 @@ def told(monkeypatch, tmp_path: Path) -> Path:
     calls = tmp_path / "calls"
     calls.touch()
 
-    def analysed(folder: Path, verdict: Path, page: Path, improved: Path, progress) -> None:
+    def analysed(folder: Path, verdict: Path, page: Path, improved: Path) -> None:
         with open(calls, "a", encoding="utf-8") as file:
             file.write(folder.name + "\n")
         verdict.write_text(json.dumps({"set": folder.name}))
