@@ -61,6 +61,21 @@ class Noise(_Strict):
     moment_n_m: Number | None = Field(None, ge=0)
 
 
+class Derivative(_Strict):
+    """What a channel of force or moment gains per unit of a quantity (`rotorid.vehicle.derivatives`)."""
+
+    channel: Literal["force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"]
+    quantity: Literal[
+        "constant", "u", "v", "w", "p", "q", "r", "thrust", "thrust_roll", "thrust_pitch", "thrust_yaw", "speed"
+    ]
+    unit: str
+    value: Number
+    interval_95: tuple[Number, Number]
+    low: Number
+    high: Number
+    """Range in which it holds; beyond, the quantity is held at the edge."""
+
+
 Length = Annotated[Number, Field(ge=-100, le=100)]
 Place = tuple[Length, Length, Length]
 SMALLEST_COEFFICIENT, LARGEST_COEFFICIENT = 1e-14, 1e2
@@ -95,6 +110,8 @@ class Vehicle(_Strict):
     """Factors of a bench's force readings by axis (`improved_vehicle.yaml` only)."""
     effects: tuple[dict[str, Any], ...] = ()
     """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""
+    derivatives: tuple[Derivative, ...] = ()
+    """Stability and control derivatives (`improved_vehicle.yaml` only) of what the effects leave."""
 
     @field_validator("trust")
     @classmethod

@@ -496,7 +496,7 @@ def value_row(name: str, row: BelievedValue) -> dict:
         "estimate": pretty(plus_minus(row.estimate, low, high)) if row.estimate is not None else "–",
         "delivered": cell(row.delivered),
         "change": pretty(change),
-        "note": pretty(f"not delivered: {row.withheld}" if row.withheld else "wrong" if row.wrong else ""),
+        "note": pretty("wrong" if row.wrong else ""),
     }
 
 

@@ -92,7 +92,9 @@ def expressed(vehicle: Vehicle, to: str) -> Vehicle:
     """
     parts = parts_of(vehicle, KNOWS[to])
     kept = tuple(e for e in parts.taken if e["id"] not in ("motor_lag", "command_saturation"))
-    return vehicle.model_copy(update={"effects": kept, "rotor_speed_limits_rad_s": parts.limits_rad_s})
+    return vehicle.model_copy(
+        update={"effects": kept, "derivatives": (), "rotor_speed_limits_rad_s": parts.limits_rad_s}
+    )
 
 
 def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
