@@ -16,10 +16,12 @@ from importlib.util import find_spec
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.drift import WINDOW_S
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.decision.shares import segments_of
+from rotorid.mismatch.delivery.flown import UNITS, driven_by
 from rotorid.mismatch.delivery.model import Model, model_of
-from rotorid.mismatch.tell.forward import UNITS, WINDOW_S, delivered_model, driven_by
+from rotorid.mismatch.tell.forward import delivered_model
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.exports import ardupilot_frame, sih
