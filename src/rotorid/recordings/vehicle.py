@@ -89,7 +89,7 @@ class Derivative(_Strict):
     def _consistent(self) -> Derivative:
         if self.low > self.high:
             raise ValueError(f"low is {self.low:g}, above high, {self.high:g}")
-        if self.quantity == "constant" and not self.low <= 1 <= self.high:
+        if self.quantity == "constant" and not self.low - 1e-9 <= 1 <= self.high + 1e-9:
             raise ValueError(f"a constant is 1, outside low to high, {self.low:g} to {self.high:g}")
         wanted = unit_of(self.channel, self.quantity)
         if self.unit != wanted:
