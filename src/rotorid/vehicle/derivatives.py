@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Form, Motion, Parameter
-from rotorid.recordings.vehicle import Derivative, Vehicle
+from rotorid.recordings.vehicle import Derivative, Vehicle, unit_of
 
 CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 CONTROLS = ("thrust", "thrust_roll", "thrust_pitch", "thrust_yaw", "speed")
@@ -22,16 +22,6 @@ QUANTITIES = ("constant", "u", "v", "w", "p", "q", "r", *CONTROLS)
 thrust less one; its parts about the roll and pitch axes, over the longest arm; its part by spin; mean speed."""
 _SIZE = len(QUANTITIES)
 _NEEDS = {**dict.fromkeys("uvw", "velocity"), **dict.fromkeys("pqr", "angular_velocity")}
-
-
-def unit_of(channel: str, quantity: str) -> str:
-    """Unit of a derivative: of its channel per unit of its quantity."""
-    force = channel.startswith("force")
-    if quantity in ("u", "v", "w"):
-        return "N s/m" if force else "N s"
-    if quantity in ("p", "q", "r"):
-        return "N s/rad" if force else "N m s/rad"
-    return "N" if force else "N m"
 
 
 def symbol_of(channel: str, quantity: str) -> str:
