@@ -222,8 +222,8 @@ class Analysis:
     """Values corrected within their trust, in words: `thrust coefficient −0.7 %`."""
     doubts: tuple[Doubt, ...] = ()
     """What `check` doubts in the set, and values that are only proposed."""
-    delivery: Delivery | None = None
-    """Which vehicle is taken home; None before it is chosen."""
+    delivery: Delivery = Delivery("believed", False, ())
+    """Which vehicle is taken home; before it is chosen the believed one."""
     believed_values: tuple[ValueRow, ...] = ()
     """Every believed value before and after, as an identification report has them."""
     value_correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)

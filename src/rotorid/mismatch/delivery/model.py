@@ -58,4 +58,4 @@ def _forms(vehicle: Vehicle, entry: Entry) -> list[ActiveForm]:
     if not entry.form:
         return []
     effects = ({"id": entry.id, "form": entry.form, "parameters": entry.parameters},)
-    return active_forms(vehicle.model_copy(update={"effects": effects}))
+    return active_forms(vehicle.model_copy(update={"effects": effects, "derivatives": ()}))
